@@ -4,6 +4,7 @@ people of our virtual laboratory and of one that is not ours.
     python benchmarks/bench_loads.py own 3 --into loads.jsonl          # sessions of 3 people, a line for every search
     python benchmarks/bench_loads.py foreign 3 --into loads.jsonl      # needs BIODANCE_FOREIGN_LAB
     python benchmarks/bench_loads.py unloaded 8 --into loads.jsonl     # unloaded foreign people, two sessions each
+    python benchmarks/bench_loads.py unloaded-own 8 --into loads.jsonl # the same of our laboratory
     python benchmarks/bench_loads.py table --into loads.jsonl          # the tables of docs/benchmarks/identification.md
 """
 
@@ -47,7 +48,7 @@ Row = dict[str, Any]
 
 def own(person: int, session: int, load: tuple[str, float] | None) -> Seen:
     """Return body, with the mass of the scale (unloaded), and trials of a person of our laboratory."""
-    one = visit(subjects()[person], "short", seed=900 + person, session=session, load=load)
+    one = visit(subjects(40)[person], "short", seed=900 + person, session=session, load=load)
     return one.body, one.fits
 
 
@@ -70,9 +71,12 @@ def foreign(person: int, session: int, load: tuple[str, float] | None) -> Seen:
     return result.body, tuple(fit for fit in fits if fit is not None)
 
 
+_LABS = {"own": own, "foreign": foreign}
+
+
 def loaded(lab: str, person: int) -> Iterator[Row]:
     """Yield every search of one person: unloaded, and loads declared either way."""
-    make = {"own": own, "foreign": foreign}[lab]
+    make = _LABS[lab]
     body, fits = make(person, 1, None)
     reference = identify_body(body, fits)
     mass = float(body.sip.mass.sum())
@@ -88,12 +92,12 @@ def loaded(lab: str, person: int) -> Iterator[Row]:
                     break
 
 
-def unloaded(person: int) -> Iterator[Row]:
-    """Yield the searches of one foreign person's two sessions without load."""
-    first, second = (identify_body(*foreign(person, session, None)) for session in (1, 2))
-    yield _row("foreign", person, "", 0.0, "with", "alone", added_mass(first))
-    yield _row("foreign", person, "", 0.0, "with", "alone", added_mass(second))
-    yield _row("foreign", person, "", 0.0, "with", "reference", added_mass(second, reference=first))
+def unloaded(lab: str, person: int) -> Iterator[Row]:
+    """Yield the searches of one person's two sessions without load."""
+    first, second = (identify_body(*_LABS[lab](person, session, None)) for session in (1, 2))
+    yield _row(lab, person, "", 0.0, "with", "alone", added_mass(first))
+    yield _row(lab, person, "", 0.0, "with", "alone", added_mass(second))
+    yield _row(lab, person, "", 0.0, "with", "reference", added_mass(second, reference=first))
 
 
 def _row(lab: str, person: int, segment: str, kg: float, way: str, against: str, found: LoadSearch) -> Row:
@@ -127,20 +131,23 @@ def _kind(row: Row) -> tuple[str, str, str, float, str]:
 
 
 def _cell(some: list[Row]) -> str:
-    """Return how many were found, of them in the right segment, the median error and how many intervals cover."""
+    """Return how many were found, of them in the right segment (and in the set that is told beside it), the median
+    error and how many intervals cover.
+    """
     found = [r for r in some if r["status"] == "found"]
     if not found:
         return f"0/{len(some)}" if some else ""
-    right = sum(r["best"] == r["segment"] for r in found)
+    answers = [[r["best"]] for r in found], [r["set"] for r in found]
+    right, told = (sum(r["segment"] in one for r, one in zip(found, named, strict=True)) for named in answers)
     error = float(np.median([abs(r["mass"] - r["kg"]) for r in found]))
     covers = sum(r["interval"][0] <= r["kg"] <= r["interval"][1] for r in found)
-    return f"{len(found)}/{len(some)}, {right}, {error:.2f} kg, {covers}"
+    return f"{len(found)}/{len(some)}, {right} ({told}), {error:.2f} kg, {covers}"
 
 
 def main() -> None:
     """Run what was asked for; every search is one line of JSON, so that an interrupted run is worth its lines."""
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("what", choices=("own", "foreign", "unloaded", "table"))
+    ask.add_argument("what", choices=("own", "foreign", "unloaded", "unloaded-own", "table"))
     ask.add_argument("people", type=int, nargs="?", default=1)
     ask.add_argument("--first", type=int, default=0, help="number of the first person")
     ask.add_argument("--into", type=Path, required=True)
@@ -150,7 +157,11 @@ def main() -> None:
         return
     with asked.into.open("a") as out:
         for person in range(asked.first, asked.first + asked.people):
-            for row in unloaded(person) if asked.what == "unloaded" else loaded(asked.what, person):
+            if asked.what.startswith("unloaded"):
+                rows = unloaded("own" if asked.what == "unloaded-own" else "foreign", person)
+            else:
+                rows = loaded(asked.what, person)
+            for row in rows:
                 print(json.dumps(row), file=out, flush=True)
 
 

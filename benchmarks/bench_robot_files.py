@@ -110,7 +110,7 @@ def try_robot(name: str, folder: Path, out: Path) -> str:
     angle = one_legged(body, np.random.default_rng(1))
     wrench, time = needed(real, angle), np.arange(1, len(angle) - 1) / RATE
     names = tuple(joint.name for joint in body.joints)
-    write_robot_trial(out / name, "run", names, time, angle[1:-1], wrench, lab=RobotLab(), seed=0)
+    write_robot_trial(out / name / "run", names, time, angle[1:-1], wrench, lab=RobotLab(), seed=0)
     made = clock.process_time()
     try:
         result = identify_robot(out / name, urdf=folder / path, feet=feet, mend=mend)

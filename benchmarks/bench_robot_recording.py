@@ -158,7 +158,7 @@ def record(fit: str, unseen: str, urdf: str, out: str, *words: str) -> None:
         time, *true = np.load(cache).values()
         angle, wrench = hidden(drawn, troubles, *true)
         lab = RobotLab(ahead=0.37 + k, place=(0.03 - 0.05 * k, -0.02), yaw=0.1 - 0.3 * k)
-        write_robot_trial(folder, name, tuple(j.name for j in drawn.joints), time, angle, wrench, lab=lab, seed=k)
+        write_robot_trial(folder / name, tuple(j.name for j in drawn.joints), time, angle, wrench, lab=lab, seed=k)
         tell(f"{name}: {time[-1]:.1f} s, stayed up")
     truth_file = folder.with_name(folder.name + ".truth.json")
     truth_file.write_text(json.dumps({"links": truth.segments, "phi": truth.sip.phi.tolist(), "troubles": troubles}))

@@ -1,7 +1,13 @@
 """How many threads does the linear algebra get? One: our matrices are small and many, and threads would only wait."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 
 @contextmanager
@@ -13,7 +19,13 @@ def one_thread() -> Iterator[None]:
     (docs/decisions). More cores are used by whole processes instead. What the environment says (OMP_NUM_THREADS, ...)
     is left alone, and so are threads of programs that call us.
     """
+    with _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
+        yield
+
+
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> "ThreadpoolController":
+    """Return the libraries with threads, looked for anew where ``modules`` have been imported since: 1 ms a search."""
     from threadpoolctl import ThreadpoolController
 
-    with ThreadpoolController().limit(limits=1, user_api="blas"):
-        yield
+    return ThreadpoolController()

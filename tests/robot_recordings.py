@@ -75,5 +75,5 @@ def recorded(
     body = real_robot()
     time, angle, wrench = danced(body, seed, seconds)
     names = tuple(joint.name for joint in body.joints)
-    write_robot_trial(folder, name, names, time, angle, wrench, lab=lab or RobotLab(), seed=seed)
+    write_robot_trial(folder / name, names, time, angle, wrench, lab=lab or RobotLab(), seed=seed)
     return folder

@@ -196,8 +196,8 @@ def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
-        found = run_batch(archive, tmp_path / "out", scheduler=cluster.scheduler_address, work=batch_work.count)
-        real = run_batch(archive, tmp_path / "real", scheduler=cluster.scheduler_address, pages=False)
+        found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.count)
+        real = run_batch(archive, tmp_path / "real", workers=cluster.scheduler_address, pages=False)
     assert found.fresh == 3
     assert worked(archive) == {"s0": 1, "s1": 1, "s2": 1}
     assert real.counts == {"refused": 3}, "the work itself runs in the threads of a cluster"
@@ -206,4 +206,4 @@ def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
 def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     with pytest.raises(BiodanceError, match="no Dask scheduler answers there"):
-        run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", scheduler="nobody://x", work=batch_work.count)
+        run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", workers="nobody://x", work=batch_work.count)

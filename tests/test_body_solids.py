@@ -12,8 +12,8 @@ import trimesh
 from biodance.body.export import write_model
 from biodance.body.human.human import human
 from biodance.body.inertia import RigidInertia
-from biodance.body.solids import box_solid, marker_hull, mesh_lump, read_mesh, segment_solids
-from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.body.solids import box_solid, mesh_lump, read_mesh, segment_solids
+from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 
@@ -84,18 +84,6 @@ def test_the_solid_of_a_box_touches_its_six_faces_and_is_closed():
     assert (
         0.78 * np.prod(box[1] - box[0]) < solid.volume < np.prod(box[1] - box[0])
     )  # the exact superellipsoid of exponent 4: 0.8097
-
-
-def test_a_hull_holds_markers_and_joints():
-    hull = marker_hull(MAN, "pelvis")
-    on = [p for p, s in zip(MAN.markers.position, MAN.markers.segment, strict=True) if s == 0]
-    joints = [j.translation for j in MAN.joints if j.parent == -1]
-    outward = np.array([*on, *joints])[:, None] - hull.triangles_center
-    assert len(on) >= 4
-    assert np.einsum("pfk,fk->pf", outward, hull.face_normals).max() < 1e-9  # behind every face
-    assert mesh_lump(hull, density=1000.0).mass > 0.1
-    with pytest.raises(UnknownName):
-        marker_hull(MAN, "tail")
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "glb", "dae"])

@@ -8,10 +8,9 @@ import pytest
 from small_dances import BODY, small_dance
 
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
-from biodance.dance.design import _walked
 from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.vocabulary import read_vocabulary, words_for
-from biodance.dance.followable.walk import Walk
+from biodance.dance.followable.walk import Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, mass_centre
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
 from biodance.dance.performers import perform_with, rehearse_imprecisely
@@ -34,9 +33,8 @@ def walked():
         work = DesignContext(
             CHAIN, excitation_blocks(BODY), PLAN, 0, Checkpoint(None, BODY, PLAN, 0), pool, lambda *_: None
         )
-        stances = support_sequence(BODY, PLAN)
-        steps, moves = Walk(work).take(stances)
-        return steps, _walked(work, stances, steps, moves)
+        steps, moves = Walk(work).take(support_sequence(BODY, PLAN))
+        return steps, walked_dance(work, steps, moves)
 
 
 def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
@@ -68,18 +66,18 @@ def test_a_catalogue_stands_balanced_on_its_feet() -> None:
 
 def test_an_exact_performer_does_the_dance_itself() -> None:
     exact = Imprecision(tracking=0.0, timing=0.0, sway=0.0, pace=1.0)
-    found = rehearse_imprecisely(small_dance(), PLAN.limits, count=1, how=exact)
+    found = rehearse_imprecisely(small_dance(), PLAN.limits, who=(0,), how=exact)
     motion = small_dance().motion(5.0)
     gap, _ = solid_distances(BODY, poses(BODY, motion.q))
     assert found["self_collision"].worst == pytest.approx(gap.min(), abs=2e-3)
-    bad = rehearse_imprecisely(small_dance(), PLAN.limits, count=3)
+    bad = rehearse_imprecisely(small_dance(), PLAN.limits, who=range(3))
     assert all(bad[name].worst < found[name].worst for name in ("self_collision", "balance"))
 
 
 def test_performers_are_the_same_in_groups() -> None:
     with ThreadPoolExecutor(2) as pool:
-        together = perform_with(pool, small_dance(), PLAN.limits, count=4)
-    assert together == rehearse_imprecisely(small_dance(), PLAN.limits, count=4)
+        together = perform_with(pool, small_dance(), PLAN.limits, who=range(4))
+    assert together == rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4))
 
 
 def test_closed_form_distances_are_those_of_coal() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.postures.selection import _FORCE, _MOMENT, _RATE, choose, learned
+from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, choose, learned
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
@@ -39,16 +39,16 @@ def information(x: Array, order: tuple[int, ...]) -> Array:
     any, at first).
     """
     rows, last = [], {}
-    basis = rest_to_rest(PLAN.move, via=0, rate=_RATE)
+    basis = rest_to_rest(PLAN.move, via=0, rate=SAMPLE_RATE)
     for p in order:
         origin = last.get(STANCES[p], next(q for q in range(12) if STANCES[q] == STANCES[p] and q != p))
         ends = x[[origin, p]]
         parts = [part[1:-1] @ ends for part in (basis.position, basis.velocity, basis.acceleration)]
         for q, v, a in (parts, (x[p][None], *np.zeros((2, 1, CHAIN.size)))):
-            rows.append(regressor(BODY, CHAIN.motion(np.arange(len(q)) / _RATE, q, v, a)).reshape(-1, 120))
+            rows.append(regressor(BODY, CHAIN.motion(np.arange(len(q)) / SAMPLE_RATE, q, v, a)).reshape(-1, 120))
         last[STANCES[p]] = p
     rows = np.concatenate(rows)
-    return rows / np.tile(np.repeat([_FORCE, _MOMENT], 3), len(rows) // 6)[:, None]
+    return rows / np.tile(SAMPLE_ERROR, len(rows) // 6)[:, None]
 
 
 def test_what_is_left_unknown_is_the_posterior_of_the_textbook(x: Array) -> None:

@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import os
+from functools import cache
 
 import pytest
 from docstrings import faults, public
@@ -10,6 +11,8 @@ from small_dances import small_dance
 
 import biodance
 
+SLOW = ("examine", "identify", "diagnose", "register")
+"""What an example asks for again with the same arguments is computed once."""
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -21,6 +24,9 @@ def names(tmp_path_factory):
     folder, before = tmp_path_factory.mktemp("examples"), os.getcwd()
     os.chdir(folder)
     biodance.simulate(biodance.Subject(62.0, 1.70, "F", 31.0), "short", "visit", seed=1)
+    patch = pytest.MonkeyPatch()
+    for name in SLOW:
+        patch.setattr(biodance, name, cache(getattr(biodance, name)))
     session = biodance.read_session("visit")
     result = biodance.examine(session)
     shared = {
@@ -32,6 +38,7 @@ def names(tmp_path_factory):
     }
     small_dance().save("dance.npz")
     yield {"biodance": biodance, "dance": small_dance(), **shared}
+    patch.undo()
     plt.close("all")
     os.chdir(before)
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from biodance.body.body_file import parse_body
+from biodance.body.human.girths import stadium, stadium_stack
 from biodance.body.human.human import human
-from biodance.body.stadium import stadium, stadium_stack
 from biodance.errors import SessionRefused
 from biodance.lab.girths import legal_girths, usual_girths
 from biodance.lab.session.file import read_session_file

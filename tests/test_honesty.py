@@ -3,9 +3,7 @@ checks, and real recordings without fault (BIODANCE_DATA).
 """
 
 import itertools
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,12 +18,9 @@ from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import built, held, needed, settle, stands
 from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Gate, effects
-from biodance.lab.session.read import read_session
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.attention import EXPLAINS, headline, is_well, session_attention, told
-from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import Check
-from biodance.pipeline.session import examine
 from biodance.records import Motion, Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.uncertainty.tolerances import shipped, table_sizes, without_habits
@@ -290,28 +285,3 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
     row = next(one for one in adequacy(found) if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
     assert row.size == pytest.approx(6.0 / np.sqrt(2), rel=0.15)
     assert row.unit == "N"
-
-
-# ---- real recordings
-
-EXCHANGED = {
-    "HC038A": ("LWRA/LWRB", "RWRA/RWRB"),
-    "HC050A": ("LWRA/LWRB",),
-    "HC055A": ("LBHD/RBHD", "LFHD/RFHD"),
-}
-"""Truly exchanged in one walk each: finger markers on the palm, distances to elbow and within the head say so, too."""
-CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
-
-
-@pytest.mark.parametrize("name", [*(f"biomechzoo/{child}" for child in CHILDREN), "adl_gait", "pycgm"])
-def test_a_real_recording_without_fault_gets_no_name(name: str) -> None:
-    data = os.environ.get("BIODANCE_DATA")
-    if not data:
-        pytest.skip("BIODANCE_DATA is not set: no real recordings here")
-    found = diagnose_session(examine(read_session(Path(data) / name))).diagnosis
-    said = next(one for one in found.attention if one.about == ABOUT)
-    named = {(one.effect, one.target) for one in found.findings}
-    assert named == {("labels_swapped", pair) for pair in EXCHANGED.get(name.removeprefix("biomechzoo/"), ())}
-    assert named or "what could be judged" in said.text or said.text.startswith("Cannot tell")
-    assert not is_well(found)
-    assert any(row.missed for row in found.judged) or found.doubt

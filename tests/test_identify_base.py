@@ -5,7 +5,7 @@ import pytest
 from random_bodies import random_body, random_motion
 
 from biodance.identification.base_parameters import estimate_base, structural_base
-from biodance.identification.information import information, merge_information
+from biodance.identification.information import information
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.uncertainty.noise import Noise
 
@@ -51,11 +51,7 @@ def test_estimate_recovers_the_base_parameters_and_states_its_error() -> None:
         error = rng.normal(size=(400, 6)) * [2, 2, 2, 0.5, 0.5, 0.5]
         error[:, 3:] += np.cross(about, error[:, :3])
         wrench = type(clean)(clean.time, clean.value + error)
-        half = np.arange(400) < 200
-        data = merge_information(
-            [information(body, motion, wrench, noise, use=half), information(body, motion, wrench, noise, use=~half)]
-        )
-        found = estimate_base(data, base)
+        found = estimate_base(information(body, motion, wrench, noise), base)
         z.append((found.value - truth) / found.sd)
     assert np.std(z) == pytest.approx(1.0, abs=0.05)
     assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.02)

@@ -9,12 +9,13 @@ from test_motion_functional_joints import displaced, hidden, scaling
 
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
+from biodance.body.parts import JointError
 from biodance.identification.information import Information
 from biodance.identification.knowledge import known_together
-from biodance.identification.placement import goes_along, more_probable_place, placed_as
+from biodance.identification.placement import goes_along, more_probable_table, placed_as, with_sides
 from biodance.motion.ik.joint_unknowns import JointUnknowns, own_centre
 from biodance.records import Sip
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import from_true_centres, misplaced, widened
 
 TRUNK = 7
 
@@ -53,14 +54,15 @@ def test_matter_along_with_the_joint_keeps_its_mass_and_its_place_over_the_joint
 def test_the_more_probable_place_is_kept(along: bool, seed: int) -> None:
     body = low_joint()
     true = body.at_joint if along else body.sip
-    found, words = more_probable_place(moments(body, true, seed), widened(body.sip), body)
+    found, _, words = more_probable_table(moments(body, true, seed), widened(body.sip), body)
     assert goes_along(found, body) == along
-    assert ("along with the joint" in words) == along
+    assert ("along with the joint" in words[0]) == along
 
 
 def test_the_height_of_pelvis_and_trunk_is_known_to_the_way_between_cut_and_joint() -> None:
-    body, table = low_joint(), widened(low_joint().sip)
-    found, _ = more_probable_place(moments(body, body.sip), table, body)
+    body, table = low_joint(), widened(low_joint().sip, low_joint().joint_errors)
+    found, apart, _ = more_probable_table(moments(body, body.sip), table, body)
+    assert not apart  # data that show no side leave the table as it is
     way = float(np.linalg.norm((body.at_joint.com - body.sip.com)[TRUNK]))
     more = np.diag(found.covariance - table.covariance).reshape(12, 10)
     for i in (0, TRUNK):
@@ -68,12 +70,12 @@ def test_the_height_of_pelvis_and_trunk_is_known_to_the_way_between_cut_and_join
         np.testing.assert_allclose(more[i, [0, 1, 3]], 0.0, atol=1e-9)  # mass and the other axes are not less known
         assert (more[i, [4, 9]] > 0).all()  # about the axes across the spine
     assert np.abs(np.delete(more, [0, TRUNK], axis=0)).max() < 1e-9
-    assert more_probable_place(moments(body, body.sip), table, replace(body, at_joint=None)) == (table, "")
+    assert more_probable_table(moments(body, body.sip), table, replace(body, at_joint=None)) == (table, False, ())
 
 
 def test_a_prior_of_another_mass_is_placed_at_that_mass_and_back_again() -> None:
     body = low_joint()
-    placed, _ = more_probable_place(moments(body, body.sip), widened(body.sip), body)
+    placed, _, _ = more_probable_table(moments(body, body.sip), widened(body.sip), body)
     heavy = Sip(body.segments, 1.1 * placed.phi, 1.21 * np.asarray(placed.covariance))
     there = placed_as(heavy, body, along=True)
     np.testing.assert_allclose(there.com, body.at_joint.com, atol=1e-12)
@@ -82,6 +84,48 @@ def test_a_prior_of_another_mass_is_placed_at_that_mass_and_back_again() -> None
     np.testing.assert_allclose(back.phi, heavy.phi)
     np.testing.assert_allclose(back.covariance, heavy.covariance)
     assert placed_as(heavy, replace(body, at_joint=None), along=True) is heavy
+
+
+def legs_of(body: Body, heavier: float) -> Information:
+    """Return data that show the masses of both thighs, the right one ``heavier`` kg than the table's, to 50 g."""
+    rows = np.zeros((3, 121))
+    rows[0, 10], rows[1, 40], rows[2, :-1:10] = 20.0, 20.0, 20.0
+    true = np.array(body.sip.phi)
+    true[[10, 40]] += heavier, -heavier
+    rows[:, -1] = rows[:, :-1] @ true
+    return Information(np.linalg.qr(np.vstack([rows, np.zeros((121, 121))]), mode="r"), 3)
+
+
+def test_sides_are_alike_until_the_data_show_them_apart() -> None:
+    body = replace(low_joint(), at_joint=None)
+    table = widened(body.sip)
+    for heavier, apart in ((0.05, False), (2.0, True)):
+        found, sides, words = more_probable_table(legs_of(body, heavier), table, body)
+        assert sides == apart == bool(words)
+    total, one = np.tile(np.eye(10)[0], 12), np.eye(120)[10]
+    both, differ = one + np.eye(120)[40], one - np.eye(120)[40]
+    for way, times in ((both, 1.0), (differ, 5.0), (total, 1.0)):  # two people's difference: 1 / (1 - 0.8)
+        assert way @ found.covariance @ way == pytest.approx(times * (way @ table.covariance @ way), rel=1e-6)
+    np.testing.assert_allclose(with_sides(found, apart=False).covariance, table.covariance, atol=1e-9)
+    told = replace(table, measured=body.segments)
+    np.testing.assert_array_equal(with_sides(told, apart=True).covariance, told.covariance)
+
+
+def test_what_is_known_about_true_centres() -> None:
+    placed = tuple(JointError(joint, 0.01, 0.0) for joint in ("trunk", "right_hip", "left_knee", "left_elbow"))
+    body = replace(low_joint(), joint_errors=placed)
+    table = widened(body.sip, body.joint_errors)
+    off = misplaced(table, body.joint_errors)
+    nothing = from_true_centres(table, table, body.joint_errors).covariance
+    np.testing.assert_allclose(nothing, table.covariance - off, atol=1e-7)  # what the table is off
+    all_told = from_true_centres(replace(table, covariance=np.zeros((120, 120))), table, body.joint_errors)
+    np.testing.assert_allclose(all_told.covariance, off)  # what the joints are off
+    draw = np.random.default_rng(5).normal(size=(120, 120))
+    belief = np.linalg.inv(np.linalg.inv(table.covariance) + draw[:, :40] @ draw[:, :40].T)
+    known = from_true_centres(replace(table, covariance=belief), table, body.joint_errors).covariance
+    scale = np.sqrt(np.diag(table.covariance))
+    assert np.linalg.eigvalsh(known / np.outer(scale, scale)).min() > -1e-9
+    assert from_true_centres(table, table, ()).covariance[11, 11] > table.covariance[11, 11]
 
 
 def test_a_body_file_keeps_both_places() -> None:

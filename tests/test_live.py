@@ -18,7 +18,7 @@ from biodance.identification.running import belief_before
 from biodance.pipeline.live import LiveSession, LiveState
 from biodance.pipeline.replay import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench
-from biodance.report.live_page import LivePage
+from biodance.report.live import LivePage
 from biodance.virtual_lab.simulate import simulate_session
 
 FAULT = 6.0

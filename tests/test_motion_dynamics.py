@@ -8,7 +8,7 @@ from random_bodies import random_body, random_motion
 
 from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName
-from biodance.motion.dynamics import distribute, joint_torques, zmp
+from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Wrench
@@ -130,7 +130,7 @@ def test_the_nearer_foot_carries_more_and_its_force_acts_at_it() -> None:
 def test_on_level_ground_the_shares_are_eq_2_with_the_feet_exchanged() -> None:
     total, right, left = standing()
     left[:, 2] = 0
-    point = zmp(total)
+    point = total.cop()
     d_right, d_left = (np.linalg.norm((point - centre)[:, :2], axis=1) for centre in (right, left))
     feet = distribute(total, right, left, np.ones((total.time.size, 2), dtype=bool))
     assert feet[0].force[:, 2] == pytest.approx(total.force[:, 2] * d_left / (d_right + d_left))
@@ -147,5 +147,5 @@ def test_without_load_the_total_is_halved() -> None:
 
 def test_the_zero_moment_point_moves_with_height_along_the_force() -> None:
     total, *_ = standing()
-    low, high = zmp(total), zmp(total, height=0.1)
+    low, high = total.cop(), total.cop(height=0.1)
     assert (high - low)[:, :2] == pytest.approx(0.1 * total.force[:, :2] / total.force[:, 2:3])

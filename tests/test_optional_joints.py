@@ -2,7 +2,6 @@
 should.
 """
 
-import os
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
@@ -18,13 +17,11 @@ from biodance.body.human.marker_groups import marker_groups
 from biodance.body.human.optional_joints import OPTIONAL_JOINTS, with_optional
 from biodance.body.inertia import RigidInertia, inertial_parameters, shift_matter, smallest_eigenvalues
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.session.read import read_session
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
 from biodance.motion.optional_joints import NEED, with_shown_joints
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
-from biodance.pipeline.session import examine
 from biodance.records import Array, Markers, Motion, Sip, Source, Subject, Trial
 from biodance.settings import Settings
 
@@ -147,16 +144,3 @@ def test_markers_are_judged_in_four_groups(plain: Body) -> None:
         wanted = {"RASI": "legs", "LTOE": "legs", "C7": "trunk", "RSHO": "trunk", "LFIN": "arms", "RELB": "arms"}
         assert {name: groups[name] for name in wanted} == wanted
         assert {groups[name] for name in groups if name.endswith("HD")} == {"head"}
-
-
-def test_a_real_walk_is_followed_closer_and_the_page_says_what_the_forces_make_of_it() -> None:
-    if not os.environ.get("BIODANCE_DATA"):
-        pytest.skip("BIODANCE_DATA is not set: real recordings are not here")
-    result = examine(read_session(Path(os.environ["BIODANCE_DATA"]) / "adl_gait"))
-    (walk,) = (one for one in result.trials if one.trial.role == "fit")
-    assert "forearms" in result.shown_joints.taken
-    assert walk.fit is not None
-    assert walk.fit.total_rms < 0.012  # 18.9 mm with 23 axes
-    assert result.body is not None
-    assert "vertical force" in result.body.notes[-1]
-    assert len(result.identification.identification.sip.segments) == 12  # type: ignore[union-attr]

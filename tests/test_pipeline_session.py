@@ -1,6 +1,5 @@
 """The whole pipeline: a session that obeys the model exactly, and real sessions against what is known of them."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,10 +7,8 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.front_movement import describe_movement
 from biodance.pipeline.session import examine
 from biodance.records import Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
 
@@ -96,73 +93,3 @@ def test_a_heavier_load_on_the_plates_is_seen_in_mass_and_wrench():
 def test_the_same_session_gives_the_same_numbers(perfect):
     again = examine(perfect.session)
     np.testing.assert_array_equal(again.trials[1].comparison.simulated, perfect.trials[1].comparison.simulated)
-
-
-def recording(name: str):
-    """Return the result of a real session, or skip where the recordings are not on this machine."""
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder of real recordings")
-    result = examine(read_session(Path(folder) / name))
-    failed = [step.text for trial in result.trials for step in trial.steps if step.status == "failed"]
-    assert failed == []
-    return result
-
-
-@pytest.mark.parametrize(("name", "declared"), [("HC030A", 45.80), ("HC032A", 60.30), ("HC038A", 56.80)])
-def test_the_weight_of_real_statics_is_the_declared_one(name, declared):
-    result = recording(f"biomechzoo/{name}")
-    assert result.subject.mass == pytest.approx(declared, abs=0.01)
-    assert abs(result.mass_difference) < 0.3
-    static, walk, *_ = result.trials
-    assert static.trial.role == "static"
-    assert static.fit.total_rms < 0.002
-    assert 0.3 < walk.comparison.used.sum() / RATE < 1.5
-    assert walk.comparison.correlation[3] > 0.5
-    near_what_vicon_says(describe_movement(result)[walk.name])
-
-
-def near_what_vicon_says(moved):
-    """Events and joint angles of a real walk lie where the software of its laboratory puts them."""
-    for one in moved.file_events:
-        assert one.missed <= 1
-        assert abs(one.late) < 0.025
-    limits = {"hip_flexion": (8.0, 0.95), "knee_flexion": (6.0, 0.97), "ankle_dorsiflexion": (5.0, 0.95)}
-    found = {one.joint.partition("_")[2]: one for one in moved.file_angles}
-    for joint, (offset, correlation) in limits.items():
-        assert abs(found[joint].offset) < offset, joint
-        assert found[joint].correlation > correlation, joint
-
-
-def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared():
-    result = recording("pycgm")
-    static, stairs = result.trials
-    assert "nobody stands on the plates" in static.reason
-    assert static.fit is not None
-    assert result.standing is None
-    assert stairs.comparison.used.sum() > 150
-    assert stairs.comparison.correlation[2] > 0.9
-
-
-def test_a_static_of_one_frame_scales_the_body():
-    result = recording("adl_gait")
-    assert "static trial 2014001_ST" in result.body_source
-    walk = result.trials[1]
-    assert walk.fit.total_rms < 0.025
-    assert walk.comparison.correlation.min() > 0.8
-
-
-def test_plates_alone_are_weighed():
-    result = recording("biomdp")
-    weights = {trial.trial.name: trial.standing.mass for trial in result.trials}
-    assert weights["kistler_COP"] == pytest.approx(666 / 9.80665, abs=0.5)
-    assert all("no markers" in trial.reason for trial in result.trials)
-
-
-def test_labels_of_no_known_set_are_guessed_and_legs_and_trunk_followed():
-    result = recording("c3d_parser")
-    assert {trial.trial.worn for trial in result.trials} == {"guessed"}
-    assert all(trial.fit.total_rms < 0.02 for trial in result.trials)
-    assert "the map was guessed from names and posture: " in " ".join(result.session.notes)
-    assert "carry no markers that place elbow and wrist" in " ".join(result.body.notes)
-    assert result.session.subject.mass == pytest.approx(36.3, abs=0.1)

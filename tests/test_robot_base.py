@@ -53,8 +53,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     standard = turn @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     pitch, roll = -np.arcsin(standard[:, 2, 0]), np.arctan2(standard[:, 2, 1], standard[:, 2, 2])
     write_robot_trial(
-        folder / "run",
-        "run",
+        folder / "run" / "run",
         (*names, "imu_roll", "imu_pitch"),
         time,
         np.column_stack([shown, roll, pitch]),

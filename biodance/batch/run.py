@@ -60,8 +60,7 @@ def run_batch(
     archive: str | Path,
     out: str | Path,
     *,
-    workers: int | None = None,
-    scheduler: str | None = None,
+    workers: int | str | None = None,
     chosen: tuple[str, ...] = (),
     pages: bool = True,
     limit: float = 1800.0,
@@ -79,10 +78,9 @@ def run_batch(
         Folder with session folders at any depth.
     out : str or pathlib.Path
         Folder for the results: empty, new, or of an earlier run over this archive.
-    workers : int, optional
-        Processes of this machine; by default one for each core.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers see both folders; instead of processes of this machine.
+    workers : int or str, optional
+        Processes of this machine, by default one for each core; or the address of a Dask scheduler whose workers see
+        both folders.
     chosen : tuple of str
         Settings, such as ``filter.cutoff=6``.
     pages : bool
@@ -102,13 +100,13 @@ def run_batch(
     Raises
     ------
     BiodanceError
-        There is no session, the results' folder is taken, or settings, workers or scheduler are not legal.
+        There is no session, the results' folder is taken, or settings or workers are not legal.
     """
     archive, folder = Path(archive), Path(out)
     assignments(chosen)
     if folder.resolve() in (archive.resolve(), *archive.resolve().parents):
         raise BiodanceError(f"{folder}: results must not lie among the recordings. Choose another --out.")
-    if workers is not None and workers < 1:
+    if isinstance(workers, int) and workers < 1:
         raise BiodanceError(f"--workers {workers}: at least one process is needed. Leave it out for one a core.")
     sessions, indices = archive_folders(archive)
     inside = folder.resolve()
@@ -130,7 +128,7 @@ def run_batch(
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
     with Ledger(folder, archive) as ledger:
-        fresh = _work_off(tasks, ledger, workers, scheduler, work, tell)
+        fresh = _work_off(tasks, ledger, workers, work, tell)
         outcomes = tuple(found for task in tasks if (found := outcome_of(task) or ledger.told(task)))
         run = BatchRun(archive, folder, outcomes, fresh, tuple(str(path.relative_to(archive)) for path in indices))
         tell("writing the summary", len(tasks), len(tasks))
@@ -141,8 +139,7 @@ def run_batch(
 def _work_off(
     tasks: list[SessionTask],
     ledger: Ledger,
-    workers: int | None,
-    scheduler: str | None,
+    workers: int | str | None,
     work: Work,
     tell: Callable[[str, int, int], None],
 ) -> int:
@@ -156,8 +153,8 @@ def _work_off(
     tell("beginning", done, len(tasks))
     if not open_tasks:
         return 0
-    if scheduler:
-        finished = run_on_dask(open_tasks, work, scheduler=scheduler)
+    if isinstance(workers, str):
+        finished = run_on_dask(open_tasks, work, scheduler=workers)
     else:
         finished = run_here(open_tasks, work, workers=min(workers or os.cpu_count() or 1, len(open_tasks)))
     for task, outcome in finished:

@@ -76,33 +76,6 @@ def _head_in(box: Array, height: float) -> Array:
     return head
 
 
-def marker_hull(body: Body, segment: str) -> "Trimesh":
-    """Return the convex hull of the markers on a segment, its own joint and the joints of the segments that hang on it.
-
-    Raises
-    ------
-    UnknownName
-        The body has no such segment.
-    BiodanceError
-        These points lie in one plane and enclose nothing.
-    """
-    from scipy.spatial import QhullError
-    from trimesh.convex import convex_hull
-
-    index = body.segment_index(segment)
-    carrier = body.segment_joint[index]
-    joints = [joint.translation for joint in body.joints if joint.parent == carrier]
-    on = np.array(body.markers.segment, dtype=int) == index
-    points = np.concatenate([np.zeros((1, 3)), np.reshape(joints, (-1, 3)), body.markers.position[on]])
-    try:
-        hull = convex_hull(points)
-    except (QhullError, ValueError, IndexError) as error:
-        raise BiodanceError(
-            f"Segment {segment}: its {on.sum()} markers and its joints enclose no volume. Put on more markers."
-        ) from error
-    return hull
-
-
 def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
     """Return the mesh in a file, all its parts as one, times ``scale`` (one number or (3,): m per unit of the file).
 

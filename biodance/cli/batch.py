@@ -42,7 +42,7 @@ def batch_command(
 
     with progress() as tell:
         found = run_batch(
-            archive, out, workers=workers, scheduler=scheduler, chosen=chosen, pages=pages, limit=limit,
+            archive, out, workers=scheduler or workers, chosen=chosen, pages=pages, limit=limit,
             tell=lambda what, done, of: tell(f"{done} of {of} sessions: {what}"),
         )  # fmt: skip
     if json:

@@ -5,12 +5,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
-from biodance.cli.options import NO_ROBOT, ForceOption, JsonOption, OutOption, RobotFile
+from biodance.cli.options import NO_ROBOT, NOBODY, ForceOption, JsonOption, OutOption, PersonFacts, RobotFile
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -22,10 +22,7 @@ FileOut = Annotated[Path, Parameter(name="--out", help="The file to write, such 
 @app.command(name="dance")
 def dance_command(
     *,
-    sex: Literal["F", "M"] | None = None,
-    height: Annotated[float | None, Parameter(help="Stature, m.")] = None,
-    mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None,
-    age: Annotated[float, Parameter(help="Age, years; strength falls with it.")] = float("nan"),
+    person: PersonFacts = NOBODY,
     protocol: Annotated[
         str, Parameter(help="easy, patient, chair, short, one_segment, full, or a TOML file.")
     ] = "full",
@@ -55,8 +52,8 @@ def dance_command(
     )
     from biodance.report.dance_write import print_dance, write_dance
 
-    plan, person = read_plan(protocol), read_person(limits) if limits else HEALTHY
-    who = _who(sex, height, mass, age, robot)
+    plan, able = read_plan(protocol), read_person(limits) if limits else HEALTHY
+    who = _who(person, robot)
     if isinstance(who, RobotFile):
         body, make = robot_dancer(*who.named(), mend=who.mend), make_robot_dance
     else:
@@ -64,7 +61,7 @@ def dance_command(
     folder = dance_folder(out, force=force)
     with counted_progress() as tell:
         try:
-            result = make(body, plan, person, seed=seed, tell=tell, resume=folder / UNFINISHED)
+            result = make(body, plan, able, seed=seed, tell=tell, resume=folder / UNFINISHED)
         except KeyboardInterrupt:
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
             return STOPPED
@@ -139,20 +136,15 @@ def play_command(
     return DONE if found.playback.stays_up else NEEDS_A_PERSON
 
 
-def _who(
-    sex: Literal["F", "M"] | None,
-    height: float | None,
-    mass: float | None,
-    age: float,
-    robot: RobotFile,
-) -> "Subject | RobotFile":
+def _who(person: PersonFacts, robot: RobotFile) -> "Subject | RobotFile":
     """Return the person or the robot; BiodanceError if it is neither or both."""
     from biodance.records import Subject
 
+    sex, height, mass = person.sex, person.height, person.mass
     if robot.urdf is not None and robot.feet is not None and (sex, height, mass) == (None, None, None):
         return robot
     if sex is not None and height is not None and mass is not None and not robot.given:
-        return Subject(mass, height, sex, age)
+        return Subject(mass, height, sex, person.age)
     raise BiodanceError(
         "Say who dances: a person with --sex, --height and --mass, or a robot with --urdf FILE and --feet RIGHT,LEFT."
     )

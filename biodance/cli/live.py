@@ -45,9 +45,7 @@ def live_command(
     from rich.console import Console
 
     from biodance.pipeline.replay import body_and_stream, replay
-    from biodance.report.documents.live import live_document
-    from biodance.report.live_page import LivePage
-    from biodance.report.terminal_live import print_live, state_line, warning_line
+    from biodance.report.live import LivePage, live_document, print_live, state_line, warning_line
     from biodance.settings import assignments
 
     with progress() as tell, LivePage(page) if page is not None else nullcontext() as shown:

@@ -1,9 +1,9 @@
-"""The options that commands share, and the two groups of them that travel together."""
+"""The options that commands share, and the groups of them that travel together."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -96,6 +96,20 @@ class Reading:
 
 
 USUAL_READING = Reading()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class PersonFacts:
+    """Who moves, where no recording says it."""
+
+    sex: Annotated[Literal["F", "M"] | None, Parameter(help="Of the person.")] = None
+    height: Annotated[float | None, Parameter(help="Stature, m.")] = None
+    mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None
+    age: Annotated[float, Parameter(help="Age, years; strength falls with it.")] = float("nan")
+
+
+NOBODY = PersonFacts()
 
 
 @Parameter(name="*")

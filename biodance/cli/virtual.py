@@ -1,15 +1,37 @@
 """Commands of the virtual lab: simulate, demo."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, app
-from biodance.cli.options import ForceOption, OutOption
+from biodance.cli.options import NOBODY, ForceOption, OutOption, PersonFacts
 from biodance.cli.progress import progress
 from biodance.cli.session import print_reported, report_session
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """What chance and the user put into a simulated session: the person's own body, how well they copy, the laboratory,
+    hidden causes.
+    """
+
+    seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")]
+    performer: Annotated[
+        Literal["steady", "normal", "restless"],
+        Parameter(help="How well the dance is copied: 2, 5 or 7 degrees off; 5, 10 or 20 % off in tempo; swaying."),
+    ] = "normal"
+    effect: Annotated[
+        tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")
+    ] = ()
+    lab_seed: Annotated[
+        int | None,
+        Parameter(help="Number of a laboratory of the family: other plates, cameras, soft tissue, tolerances."),
+    ] = None
 
 
 @app.command(name="simulate")
@@ -17,26 +39,14 @@ def simulate_command(
     *,
     protocol: str | None = None,
     dance: Annotated[
-        Path | None, Parameter(name="--dance", help="dance.npz of `biodance dance`, performed instead of a protocol.")
+        Path | None,
+        Parameter(
+            name="--dance",
+            help="dance.npz of `biodance dance`, performed instead of a protocol; by default by the person it is for.",
+        ),
     ] = None,
-    performer: Annotated[
-        Literal["steady", "normal", "restless"],
-        Parameter(help="How well the dance is copied: 2, 5 or 7 degrees off; 5, 10 or 20 % off in tempo; swaying."),
-    ] = "normal",
-    sex: Annotated[
-        Literal["F", "M"] | None, Parameter(help="Of the person; by default as the dance was designed for.")
-    ] = None,
-    height: Annotated[float | None, Parameter(help="Stature, m; by default the dance's.")] = None,
-    mass: Annotated[float | None, Parameter(help="Body mass, kg; by default the dance's.")] = None,
-    age: Annotated[float, Parameter(help="Age, years.")] = float("nan"),
-    seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")],
-    effect: Annotated[
-        tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")
-    ] = (),
-    lab_seed: Annotated[
-        int | None,
-        Parameter(help="Number of a laboratory of the family: other plates, cameras, soft tissue, tolerances."),
-    ] = None,
+    person: PersonFacts = NOBODY,
+    drawn: Drawn,
     out: OutOption,
     force: ForceOption = False,
 ) -> int:
@@ -51,14 +61,15 @@ def simulate_command(
     from biodance.pipeline import front_dance
 
     shown = None if dance is None else Dance.load(dance)
-    who = front_dance.virtual_subject(shown, sex=sex, height=height, mass=mass, age=age)
+    who = front_dance.virtual_subject(shown, sex=person.sex, height=person.height, mass=person.mass, age=person.age)
     if force:
         _forget_simulated(out)
     with progress() as tell:
         tell(f"simulating {protocol or dance}")
         folder = front_dance.simulate(
-            who, protocol, out, seed=seed, effects=effect, dance=shown, performer=performer, lab_seed=lab_seed
-        )
+            who, protocol, out, seed=drawn.seed, effects=drawn.effect, dance=shown, performer=drawn.performer,
+            lab_seed=drawn.lab_seed,
+        )  # fmt: skip
     sys.stdout.write(f"{folder}\n")
     return DONE
 

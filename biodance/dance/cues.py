@@ -65,8 +65,7 @@ def cue_sheet(
     stances: tuple[str, ...],
     planted: tuple[tuple[str, ...], ...],
     *,
-    move: float = 2.0,
-    hold: float = 2.0,
+    tempo: tuple[float, float] = (2.0, 2.0),
     said: tuple[tuple[str, ...], ...] | None = None,
     names: tuple[str, ...] = (),
     about: tuple[str, ...] = (),
@@ -76,8 +75,8 @@ def cue_sheet(
     ``said`` (P) what is called for each, by default what moves; ``names`` (P) what they are called, if they are known
     ones; ``about`` sentences that stand before them.
 
-    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet SIDES stand. ``move`` and
-    ``hold`` s.
+    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet SIDES stand; ``tempo`` s of a
+    move and of a hold.
 
     Raises
     ------
@@ -89,6 +88,7 @@ def cue_sheet(
             f"Cue sheet: angles {angles.shape}, {len(stances)} stances, {len(planted)} planted; "
             f"expected ({len(stances)}, {len(body.joints)}) and as many of each."
         )
+    move, hold = tempo
     degrees = np.degrees(np.concatenate([np.zeros((1, angles.shape[1])), angles]))
     lines = [
         "# The dance, posture by posture",

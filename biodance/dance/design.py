@@ -9,16 +9,15 @@ faster or how often it was interrupted.
 from collections.abc import Iterable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.followable.walk import DanceStep, Walk, name_of
+from biodance.dance.followable.mending import mended_dance
+from biodance.dance.followable.walk import NoWay, Walk
 from biodance.dance.limits import Limit
-from biodance.dance.performers import PERFORMER_COUNT, perform_with
 from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
@@ -26,7 +25,6 @@ from biodance.dance.postures.selection import choose
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
-from biodance.dance.transitions.move import Move
 from biodance.dance.transitions.planner import Way
 from biodance.dance.transitions.schedule import replan
 from biodance.dance.verify import Margin, broken, verify_with
@@ -34,10 +32,6 @@ from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
 WORKERS = 2
-_ATTEMPTS = 10
-"""Walks that are tried on performers."""
-_FEW = 40
-"""Performers of a first look."""
 _SHORT = 1.0
 """s that postures in between are held."""
 
@@ -91,33 +85,23 @@ def design(
 
 
 def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
-    """Return a dance that people can follow, and what imprecise performers leave: postures at which one of them has too
-    little room are not asked of anybody.
+    """Return a dance that people can follow, and what imprecise performers leave; feet on which this person has no
+    posture are left out, and this is said.
     """
-    stances, walk = support_sequence(work.chain.body, work.plan), Walk(work)
-    for attempt in range(_ATTEMPTS):
-        steps, moves = walk.take(stances)
-        dance = _walked(work, stances, steps, moves)
-        work.tell("performers", attempt, 0)
-        few = _FEW if attempt < _ATTEMPTS - 1 else PERFORMER_COUNT
-        found = perform_with(work.workers, dance, work.plan.limits, count=few)
-        found = perform_with(work.workers, dance, work.plan.limits) if found.safe else found
-        bad = {walk.key(steps[p]): limit for p, limit in found.bad}
-        if found.safe or bad.keys() <= walk.banned.keys():
+    plan, notes = work.plan, list[str]()
+    while True:
+        walk = Walk(replace(work, plan=plan))
+        try:
+            steps, moves = walk.take(support_sequence(work.chain.body, plan))
             break
-        walk.banned |= bad
-    return dance, found.margins(dance)
-
-
-def _walked(work: DesignContext, stances: tuple[Stance, ...], steps: list[DanceStep], moves: list[Move]) -> Dance:
-    """Return the dance of a walk."""
-    plan, x = work.plan, np.array([step.x for step in steps])
-    hold = np.array([plan.hold if stance.over is None else min(_SHORT, plan.hold) for stance in stances])
-    feet = tuple(under(*pair) for pair in pairwise(stances))
-    via = np.array([move.via for move in moves]).reshape(-1, 2, x.shape[1])
-    duration, names = np.array([move.duration for move in moves]), tuple(name_of(step) for step in steps)
-    dance = Dance(plan.name, work.chain.body, x, stances, hold, via, duration, feet, work.seed)
-    return replace(dance, names=names, mirrored=tuple(p for p, step in enumerate(steps) if step.mirror))
+        except NoWay as way:
+            blocks = tuple(block for block in plan.blocks if block[0] != way.stance)
+            if not blocks or len(blocks) == len(plan.blocks):
+                raise
+            notes.append(f"Left out: all postures {way.stance.replace('_', ' ')}. {way}")
+            plan = replace(plan, blocks=blocks)
+    dance, found = mended_dance(walk, steps, moves, work.workers)
+    return replace(dance, notes=(*notes, *dance.notes)), found.margins(dance)
 
 
 def _postures(work: DesignContext) -> Course:

@@ -61,16 +61,19 @@ def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> t
     return time, duration * done / done[-1]
 
 
-def _noise(rng: np.random.Generator, time: Array, columns: int, cutoff: float, *, slow: float = 0.0) -> Array:
+def _noise(
+    rng: np.random.Generator, time: Array, columns: int, cutoff: float, *, slow: float = 0.0, part: slice = slice(None)
+) -> Array:
     """Return smooth random curves (T, columns) of unit standard deviation, whose amplitudes fall with exp(-(f /
-    cutoff)²); ``slow`` s²: divided by 1 + slow (2 pi f)², as the mass of a pendulum moves when its support sways.
+    cutoff)²); ``slow`` s²: divided by 1 + slow (2 pi f)², as the mass of a pendulum moves when its support sways;
+    ``part`` of them.
     """
     duration = 1.3 * (time[-1] - time[0]) + 1.0
     frequency = np.arange(1, int(np.ceil(2.5 * cutoff * duration)) + 1) / duration
     weight = np.exp(-((frequency / cutoff) ** 2))
     weight /= np.sqrt(np.sum(weight**2)) * (1 + slow * (2 * np.pi * frequency) ** 2)
     cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
-    phase = 2 * np.pi * np.outer(time, frequency)
+    phase = 2 * np.pi * np.outer(time[part], frequency)
     return np.asarray(np.cos(phase) @ cosine + np.sin(phase) @ sine)
 
 
@@ -123,10 +126,13 @@ class PlannedDance:
             tops.append(ankle[:, side, 2] + np.sqrt(np.maximum(reach**2 - across, 0.01)) - hip[:, 2] + up[:, side])
         return np.asarray(-np.log(np.exp(-_SOFT * np.array(tops)).sum(axis=0)) / _SOFT)
 
-    def performed(self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision) -> Copied:
-        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s."""
-        error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER)
-        return self._copied(time, when, error, how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM), how)
+    def performed(
+        self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision, part: slice = slice(None)
+    ) -> Copied:
+        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s; ``part`` of it."""
+        error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
+        sway = how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM, part=part)
+        return self._copied(time[part], when[part], error, sway, how)
 
     def held_by(self, count: int, when: Array, how: Imprecision = USUAL_IMPRECISION) -> Copied:
         """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by

@@ -2,7 +2,7 @@
 place is everybody's own and not judged.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -20,8 +20,10 @@ OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
-_DRAWN, _SIGMAS = 96, 3.5
-"""Imprecise copies of an instant that are looked at, and standard deviations of what is left that it must bear."""
+_DRAWN = 96
+"""Imprecise copies of an instant that are looked at."""
+_STILL = 1e-4
+"""Least deviation, in the limit's unit."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +45,13 @@ class Room:
 @dataclass(frozen=True)
 class Rehearsed:
     """What ``count`` imprecise performers leave of every limit that they must keep: ``rooms``; ``bad`` postures
-    (indices) at which somebody had too little, with the limit.
+    (indices) at which somebody had too little, with the limit; ``failed`` the numbers of those people.
     """
 
     count: int
     rooms: tuple[Room, ...]
     bad: tuple[tuple[int, str], ...]
+    failed: tuple[int, ...] = ()
 
     def __getitem__(self, limit: str) -> Room:
         return next(room for room in self.rooms if room.limit == limit)
@@ -78,20 +81,21 @@ def rehearse_imprecisely(
     dance: Dance,
     limits: tuple[Limit, ...],
     *,
-    count: int = PERFORMER_COUNT,
+    who: Sequence[int] = range(PERFORMER_COUNT),
     seed: int = 0,
-    first: int = 0,
+    only: tuple[int, ...] = (),
     how: Imprecision = USUAL_IMPRECISION,
 ) -> Rehearsed:
-    """Return what ``count`` performers leave of the ``limits`` in ``dance``; performer number k from ``first`` on is
-    the same whoever else dances.
+    """Return what performers leave of the ``limits`` in ``dance``; ``who`` are their numbers, and each is the same
+    whoever else dances. ``only``: neighbouring postures (indices) to or in which they are looked at.
     """
     plan, postures = PlannedDance(dance), len(dance.postures)
     asked = for_imprecise(limits)
     found: dict[Limit, list[_Least]] = {limit: [] for limit in asked}
-    for k in range(first, first + count):
+    for k in who:
         time, when = draw_clock(np.random.default_rng([seed, 7, k]), dance.duration, how)
-        copy = plan.performed(np.random.default_rng([seed, 8, k]), time, when, how)
+        part = _part(plan.posture[plan.phase_at(when)], only)
+        copy = plan.performed(np.random.default_rng([seed, 8, k]), time, when, how, part)
         rows, posture = copy.on, plan.posture[copy.on]
         for limit, one in asked.items():
             left = one.left(copy)
@@ -105,33 +109,54 @@ def rehearse_imprecisely(
         for one in parts
         for p in np.flatnonzero(one.each < asked[limit].least)
     }
-    return Rehearsed(count, rooms, tuple(sorted(bad)))
+    failed = {
+        k for limit, parts in found.items() for k, one in zip(who, parts, strict=True) if one.room < asked[limit].least
+    }
+    return Rehearsed(len(who), rooms, tuple(sorted(bad)), tuple(sorted(failed)))
 
 
-def lost_by_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> str:
-    """Return the limit of which people leave too little who stop at one of the instants ``when`` s of a ``dance`` and
-    are off as performers are; "" if none.
+def _part(posture: NDArray[np.intp], only: tuple[int, ...]) -> slice:
+    """Return the instants at which somebody dances to or in the postures ``only``, and two beyond for differences."""
+    if not only:
+        return slice(None)
+    inside = np.flatnonzero(np.isin(posture, only))
+    return slice(max(0, inside[0] - 2), inside[-1] + 3)
+
+
+def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> tuple[float, str]:
+    """Return by how many deviations people who stop at one of the instants ``when`` s of a ``dance``, and are off as
+    performers are, stay within what is demanded, and the limit of which that is least; infinite and "" if nothing is
+    demanded there. Deviations are those towards the limit: an arm beside the head errs farther towards it than away.
     """
     plan = PlannedDance(dance)
     when = when[~plan.stepping[plan.phase_at(when)]]
     if not when.size:
-        return ""
-    copy = plan.held_by(_DRAWN, when)
+        return np.inf, ""
+    copy, found = plan.held_by(_DRAWN, when), [(np.inf, "")]
     for limit, one in for_imprecise(limits).items():
         left = one.left(copy).value.reshape(len(when), _DRAWN, -1)
-        if (left.mean(axis=1) - _SIGMAS * left.std(axis=1) < one.least).any():
-            return limit.name
-    return ""
+        left = left[:, :, np.isfinite(left).all(axis=(0, 1))]
+        usual = np.median(left, axis=1)
+        below = np.sqrt(2 * np.mean(np.minimum(left - usual[:, None], 0.0) ** 2, axis=1))
+        found.append((float(((usual - one.least) / np.maximum(below, _STILL)).min(initial=np.inf)), limit.name))
+    return min(found)
 
 
 def perform_with(
-    workers: Executor, dance: Dance, limits: tuple[Limit, ...], *, count: int = PERFORMER_COUNT, seed: int = 0
+    workers: Executor,
+    dance: Dance,
+    limits: tuple[Limit, ...],
+    *,
+    who: Sequence[int] = range(PERFORMER_COUNT),
+    seed: int = 0,
+    only: tuple[int, ...] = (),
 ) -> Rehearsed:
     """Return what `rehearse_imprecisely` does, found by two ``workers`` side by side."""
-    half = count // 2
+    half = (len(who) + 1) // 2
     tasks = [
-        workers.submit(rehearse_imprecisely, dance, limits, count=n, seed=seed, first=f)
-        for n, f in ((half, 0), (count - half, half))
+        workers.submit(rehearse_imprecisely, dance, limits, who=part, seed=seed, only=only)
+        for part in (who[:half], who[half:])
+        if part
     ]
     parts = [task.result() for task in tasks]
     count = sum(part.count for part in parts)
@@ -141,7 +166,8 @@ def perform_with(
         return replace(min(rooms, key=lambda room: room.worst), failing=failing)
 
     rooms = tuple(together(some) for some in zip(*(part.rooms for part in parts), strict=True))
-    return Rehearsed(count, rooms, tuple(sorted({bad for part in parts for bad in part.bad})))
+    bad = tuple(sorted({bad for part in parts for bad in part.bad}))
+    return Rehearsed(count, rooms, bad, tuple(k for part in parts for k in part.failed))
 
 
 def _joined(limit: Limit, least: float, found: list["_Least"]) -> Room:

@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 from biodance.diagnosis.diagnosis import Adequacy, Verdict
 from biodance.diagnosis.evidence import believe
 from biodance.diagnosis.model import Model
-from biodance.records import CHANNELS, Array
+from biodance.records import CHANNELS, Array, Motion
 from biodance.uncertainty.bands import BANDS
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ STRETCHED = 7.0
 sessions (own and foreign laboratory), with it out of the family 7.8 to 24 wherever it had hidden there.
 """
 
+_STRIDE, _EQUAL, _FEWEST = (0.4, 2.0), 0.95, 3
+"""s of a stride; correlation of joint angles a stride apart from which strides are equal; so many fit into a trial."""
 LOUDER, _LOUDEST = 1.15, 2.0
 """A laboratory is believed to be so many times as loud as the one of the tolerances from the first number on, and at
 most the second: 95 % of the family of laboratories (`virtual_lab.recording.family`, whose sizes are drawn with a
@@ -158,10 +160,38 @@ def strain_as_loud(found: Model) -> float:
     plain = strain(found)
     if plain <= STRAINED:
         return plain
+    return strain(_weighed(found, np.minimum(1.0, np.sqrt(found.tolerances.energy / energies(found)))))
+
+
+def with_strides_once(found: Model) -> Model:
+    """Return the model in which the equal strides of a trial (treadmills) count as one: whoever walks on repeats the
+    errors of skin, joints and segments, and twenty equal strides are no twenty pieces of evidence on a body.
+    """
+    where = found.problem.spectrum
+    repeats = np.array([strides_alike(case.motion) for case in found.problem.cases])
+    if (repeats == 1).all():
+        return found
+    return _weighed(found, 1 / np.sqrt(repeats[where.trial])[:, None])
+
+
+def strides_alike(motion: Motion) -> float:
+    """Return how often a motion repeats itself with the period of a stride; 1 where it does not."""
+    angles = motion.q[:, 7:] - motion.q[:, 7:].mean(axis=0)
+    lags = np.arange(round(_STRIDE[0] * motion.rate), round(min(_STRIDE[1] * motion.rate, len(angles) / _FEWEST)))
+    if not lags.size or not np.square(angles).sum() > 0:
+        return 1.0
+    alike = [1 - np.square(angles[k:] - angles[:-k]).mean() / (2 * np.square(angles).mean()) for k in lags]
+    best = int(np.argmax(alike))
+    return float(len(angles) / lags[best]) if alike[best] > _EQUAL else 1.0
+
+
+def _weighed(found: Model, weight: Array) -> Model:
+    """Return the model with the plates' rows weighed: by band and channel (B, 6), or one by one (n, 1)."""
     belief, band = found.belief, found.problem.spectrum.band
-    weight = np.ones(belief.y.size)
-    weight[: 6 * band.size] = np.minimum(1.0, np.sqrt(found.tolerances.energy / energies(found)))[band].ravel()
-    return strain(replace(found, belief=believe(weight[:, None] * belief.X, weight * belief.y)))
+    every = np.ones(belief.y.size)
+    rows = weight[band] if len(weight) == len(BANDS) else weight
+    every[: 6 * band.size] = np.broadcast_to(rows, (band.size, 6)).ravel()
+    return replace(found, belief=believe(every[:, None] * belief.X, every * belief.y))
 
 
 def stretch(found: Model) -> float:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from biodance import display
+from biodance.identification.knowledge import SIGMAS
 from biodance.records import Array, frozen_array
 from biodance.records.attention import Attention, Judged
 
@@ -30,8 +31,6 @@ plates are accurate to (0.2-0.5 %); 0.3 N·m are 0.4 mm of centre of pressure, w
 (Collins 2009, doi:10.1016/j.gaitpost.2008.10.060), and 0.004 N·m/kg in a joint moment, where the smallest
 meaningful differences are some 0.05.
 """
-_SIGMAS = 1.959964
-"""Half width of a 95 % interval in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Estimate:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
-        return self.value - _SIGMAS * self.sd, self.value + _SIGMAS * self.sd
+        return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from biodance.diagnosis.adequacy import (
     strain_as_loud,
     stretch,
     verdict,
+    with_strides_once,
 )
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.constancy import felt, hanging
@@ -238,7 +239,8 @@ def _strange(found: Model, *, named: bool) -> tuple[str, ...]:
     """Say what had to be unlike people or laboratories for the rest to fit; where a cause is ``named``, it has to fit
     without any excuse.
     """
-    body = (strain(found) if named else strain_as_loud(found)) > STRAINED
+    once = with_strides_once(found)
+    body = (strain(once) if named else strain_as_loud(once)) > STRAINED
     rest = stretch(found) > STRETCHED
     return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 

@@ -1,5 +1,6 @@
 """What the witnesses of a session saw: their observations, and what every cause would add to each of them."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -27,6 +28,8 @@ _BLIND = 0.2
 """Standard deviations that a usual fault adds to an observation that is blind to it."""
 _HABIT = 3.0
 """Standard deviations of laboratories beyond which a norm is no habit of one."""
+_REPEATED = 0.5
+"""Share of the variance of one step that the strides of a trial repeat."""
 _ALIKE = 0.9
 """Correlation of what two causes add from which they cannot be told apart."""
 
@@ -150,6 +153,21 @@ def hear(
         {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
         {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
         {one.trial.name: one.seconds for one in seen},
+    )
+
+
+def _alike(found: tuple[Observation, ...]) -> tuple[Observation, ...]:
+    """Return the observations of one trial, strides of one foot on one plate erring together in part: a person who
+    walks on repeats the error of a step, and twenty equal strides are no twenty witnesses.
+    """
+    count = Counter(one.stride for one in found)
+    return tuple(
+        one
+        if count[one.stride] == 1
+        else replace(
+            one, sd=one.sd * (1 - _REPEATED) ** 0.5, norms=dict(one.norms) | {one.stride: one.sd * _REPEATED**0.5}
+        )
+        for one in found
     )
 
 

@@ -25,6 +25,7 @@ _SECONDS = 2.0
 _WORDS = {
     "corners": r"corners run the wrong way round",
     "axes": r"the plate axes were turned by (\d+) degrees",
+    "Fz": r"Fz alone was turned round",
     "shear": r"shear channels seem to have the wrong sign",
 }
 

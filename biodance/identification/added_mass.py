@@ -19,7 +19,7 @@ from biodance.identification.identification import Identification
 from biodance.identification.information import Information
 from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
 from biodance.identification.loads import unit_load
-from biodance.identification.rival_bodies import expect_unloaded, rivals, surprised
+from biodance.identification.rival_bodies import alike_table, expect_unloaded, rivals, surprised
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 
@@ -124,7 +124,7 @@ def added_mass(
     NotSolved
         Nothing was identified from the reference.
     """
-    before = session.belief.prior if reference is None else expect_unloaded(reference, session)
+    before = alike_table(session) if reference is None else expect_unloaded(reference, session)
     units = tuple(unit_load(session.body, i) for i in range(len(before.segments)))
     bodies = tuple(
         _Rival.of(session.data, units, sip, log) for sip, log in rivals(before, weighed=reference is not None)

@@ -22,12 +22,12 @@ from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identification.placement import more_probable_place
+from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
-from biodance.identification.statistics import Fit, Statistics, believable, empty, layout_for, statistics
+from biodance.identification.statistics import Fit, Statistics, believable, layout_for, statistics_together
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
-from biodance.uncertainty.caution import about_true_centres, widened
+from biodance.uncertainty.caution import from_true_centres, widened
 from biodance.uncertainty.noise import Noise
 
 if TYPE_CHECKING:
@@ -70,6 +70,8 @@ class Identification:
         Every quantity of every segment with interval and verdict; () where the fit failed.
     notes : tuple of str
         What a person should know.
+    apart : bool
+        Whether the prior takes the masses of right and left each on its own, by evidence.
 
     References
     ----------
@@ -93,6 +95,7 @@ class Identification:
     frames: int
     known: tuple[Known, ...]
     notes: tuple[str, ...]
+    apart: bool = False
 
     def __repr__(self) -> str:
         return f"Identification({self.status}, {len(self.sip.segments)} segments from {', '.join(self.trials)})"
@@ -208,11 +211,8 @@ def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None
         There is no trial, or none has a usable frame.
     """
     used, about, notes = usable(body, fits)
-    layout = layout_for(about)
-    total: Statistics = empty(10 * len(body.segments), layout)
-    for fit in used:
-        total = total + statistics(body, fit, layout)
-    noise, _ = learn_noise(total, may_carry(body, prior or widened(body.sip)))
+    total = statistics_together(body, used, layout_for(about))
+    noise, _ = learn_noise(total, may_carry(body, prior or widened(body.sip, body.joint_errors)))
     found = conclude(
         body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior
     )
@@ -260,13 +260,13 @@ def conclude(
     ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count
     noise alone, far too short, and the notes say so.
     """
-    before = prior or widened(body.sip)
+    before = prior or widened(body.sip, body.joint_errors)
     room = before if machine else may_carry(body, before)
     noise = noise or learn_noise(total, room)[0]
     data, sizes = _discounted(total, noise, found, room)
     as_measured = data, sizes, noise
     for _ in range(_ROUNDS if found is not None and not machine else 0):
-        table = more_probable_place(data, before, body)[0] if prior is None else before
+        table = more_probable_table(data, before, body)[0] if prior is None else before
         belief = posterior(data, table)
         real = undiluted(total, belief.mean, body.segments)
         noise = learn_noise(real, room, rounds=_AGAIN)[0]
@@ -274,20 +274,20 @@ def conclude(
         if carried_away(belief, posterior(data, table)):
             data, sizes, noise = as_measured
             break
-    before, placed = more_probable_place(data, before, body) if prior is None else (before, "")
+    before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
     base = estimate_base(data, structural_base(body))
     known: tuple[Known, ...] = ()
-    words: tuple[str, ...] = (*(() if found else (NOISE_ALONE,)), *((placed,) if placed else ()))
+    words: tuple[str, ...] = (*(() if found else (NOISE_ALONE,)), *chosen)
     if fit.status == "solved":
         first = before
         if not machine:
-            fit = replace(fit, sip=about_true_centres(fit.sip, body.joint_errors))
-            first = about_true_centres(before, body.joint_errors)
+            fit = replace(fit, sip=from_true_centres(fit.sip, before, body.joint_errors))
+            first = from_true_centres(before, before, body.joint_errors)
         known = knowledge(fit.sip, first, belief)
         words += _notes(known, fit)
-    return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words)
+    return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words, apart)
 
 
 def _discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Sip) -> tuple[Information, Sizes]:

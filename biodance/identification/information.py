@@ -6,14 +6,14 @@ batch result. The wrench is taken about a point near the feet, where its noise h
 assumes.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import TrialRefused
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion, Wrench
 from biodance.uncertainty.noise import Noise
@@ -96,11 +96,3 @@ def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used
         part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
         W = regressor(body, part)
         yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))
-
-
-def merge_information(parts: Iterable[Information]) -> Information:
-    """Return the information of several trials together."""
-    parts = tuple(parts)
-    if not parts:
-        raise BiodanceError("There is no trial to identify from: give at least one trial with role fit.")
-    return Information(fold(np.concatenate([part.R for part in parts])), sum(part.frames for part in parts))

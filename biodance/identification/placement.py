@@ -1,13 +1,16 @@
-"""Where the trunk's matter lies when movement puts its joint elsewhere than the table cuts the trunk from the pelvis:
-where the table has it in the person, or along with the joint. Both are measured, the more probable one is kept; either
-way the place is known no better than the two are apart.
+"""What the table leaves open about a person, answered by the session: where the trunk's matter lies when movement puts
+its joint elsewhere than the table cuts the trunk from the pelvis (where the table has it in the person, or along with
+the joint), and whether the masses of the two sides are alike or each on its own. All answers are measured, the most
+probable one is kept.
 """
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.posterior import posterior
 from biodance.records import Sip
@@ -15,6 +18,8 @@ from biodance.uncertainty.caution import shift_slope, widened
 
 _ALONG = 1
 """The axis along the spine in the frames of pelvis and trunk."""
+_ODDS = np.log(2.0)
+"""Log evidence by which sides each on their own must be more probable than sides alike, which most people have."""
 
 
 def goes_along(prior: Sip, body: Body) -> bool:
@@ -49,23 +54,54 @@ def _at(body: Body, mass: float, *, along: bool) -> Sip:
         cut = slice(10 * i, 10 * i + 10)
         slope = way * shift_slope(table.phi[cut])[:, _ALONG]
         covariance[cut, cut] += np.outer(slope, slope)
-    other = widened(replace(table, covariance=covariance))
+    other = widened(replace(table, covariance=covariance), body.joint_errors)
     ratio = mass / float(other.mass.sum())
     return replace(other, phi=ratio * other.phi, covariance=ratio**2 * np.asarray(other.covariance))
 
 
-def more_probable_place(data: Information, table: Sip, body: Body) -> tuple[Sip, str]:
-    """Return the ``table`` with the trunk's matter where the ``data`` of the session are more probable (evidence under
-    the table's own standard deviations and those of its place), and that in words; "" where there is no choice.
+def with_sides(table: Sip, *, apart: bool) -> Sip:
+    """Return ``table``, of which the masses of right and left are as alike as tables have them (or ``apart``), with
+    these masses each on its own (or alike again): their difference is as uncertain as that of two people, their sum as
+    before. Masses that the person's own shape told stay as they are.
     """
-    if body.at_joint is None:
-        return table, ""
-    both = [_at(body, float(table.mass.sum()), along=along) for along in (False, True)]
-    evidence = [posterior(data, one).log_evidence for one in both]
-    gain, trunk = evidence[1] - evidence[0], body.segment_index("trunk_head")
-    apart = 1e3 * float(np.linalg.norm((both[1].com - both[0].com)[trunk]))
-    where = "is taken along with the joint" if gain > 0 else "stays where the table has it"
-    return both[int(gain > 0)], (
-        f"The trunk turns {apart:.0f} mm from where the table cuts it from the pelvis. Its matter {where}: more "
-        f"probable by a natural logarithm of {abs(gain):.1f}."
-    )
+    alike = error_size("left_right_correlation", "mass")
+    more, sign = alike / (1 - alike) if apart else -alike, np.array([1.0, -1.0])
+    covariance = np.array(table.covariance)
+    for i, name in enumerate(table.segments):
+        other = name.replace("right_", "left_")
+        if other == name or name in table.measured or other not in table.segments:
+            continue
+        at = 10 * np.array([i, table.segments.index(other)])
+        unsure = sign @ table.covariance[np.ix_(at, at)] @ sign / 4
+        way = np.zeros(len(table.phi))
+        for k, one in zip(at, sign, strict=True):
+            way[k : k + 10] = one * table.phi[k : k + 10] / max(float(table.phi[k]), 1e-12)
+        covariance += more * unsure * np.outer(way, way)
+    return replace(table, covariance=covariance)
+
+
+def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
+    """Return the ``table`` with the trunk's matter and the sides as the ``data`` of the session make more probable
+    (evidence under the table's own standard deviations and those of the trunk's place), whether the sides are apart in
+    it, and both in words.
+    """
+    places = (False, True) if body.at_joint is not None else (False,)
+    placed = [_at(body, float(table.mass.sum()), along=x) if len(places) > 1 else table for x in places]
+    choices = {(x, s): with_sides(placed[x], apart=True) if s else placed[x] for x, s in product(places, (False, True))}
+    evidence = {choice: posterior(data, one).log_evidence for choice, one in choices.items()}
+    along, apart = best = max(evidence, key=lambda choice: evidence[choice] - _ODDS * choice[1])
+    words = []
+    if len(places) > 1:
+        trunk, gain = body.segment_index("trunk_head"), evidence[best] - evidence[not along, apart]
+        off = 1e3 * float(np.linalg.norm((placed[1].com - placed[0].com)[trunk]))
+        where = "is taken along with the joint" if along else "stays where the table has it"
+        words.append(
+            f"The trunk turns {off:.0f} mm from where the table cuts it from the pelvis. Its matter {where}: more "
+            f"probable by a natural logarithm of {gain:.1f}."
+        )
+    if apart:
+        words.append(
+            f"The masses of the right and left side are taken each on its own: more probable than sides as alike as "
+            f"the table expects by a natural logarithm of {evidence[best] - evidence[along, False]:.1f}."
+        )
+    return choices[best], apart, tuple(words)

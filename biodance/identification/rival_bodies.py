@@ -5,7 +5,7 @@ from scipy.linalg import solve_triangular
 
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
-from biodance.identification.placement import goes_along, placed_as
+from biodance.identification.placement import goes_along, placed_as, with_sides
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 from biodance.uncertainty.caution import in_other_frames
@@ -35,6 +35,20 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     shift = table.phi - reference.belief.prior.phi
     moved = Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
     return in_other_frames(moved, session.body.joint_errors)
+
+
+def alike_table(session: Identification) -> Sip:
+    """Return the table of ``session`` with sides alike, whatever the data make of them: a load on one side may not pass
+    for a person whose sides are not.
+    """
+    return with_sides(session.belief.prior, apart=False) if session.apart else session.belief.prior
+
+
+def table_like(one: Identification, other: Identification) -> Sip:
+    """Return the table of session ``one`` with the trunk's matter and the sides as in session ``other``."""
+    table = placed_as(one.belief.prior, one.body, along=goes_along(other.belief.prior, other.body))
+    apart = one.apart and table is one.belief.prior
+    return table if apart == other.apart else with_sides(table, apart=other.apart)
 
 
 def weighing(prior: Sip, mass: float) -> Sip:

@@ -5,7 +5,7 @@ weight lost).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from biodance.errors import BiodanceError, NotSolved
 from biodance.identification.added_mass import added_mass
@@ -13,10 +13,9 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
 from biodance.identification.loads import may_carry
 from biodance.identification.physical import physical_fit
-from biodance.identification.placement import goes_along, placed_as
 from biodance.identification.posterior import Posterior, posterior
-from biodance.identification.rival_bodies import weighing
-from biodance.records import Array
+from biodance.identification.rival_bodies import table_like, weighing
+from biodance.records import Array, Sip
 from biodance.threads import one_thread
 
 
@@ -74,8 +73,8 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
             "The two sessions have different segments and cannot be compared. Use the same kind of body in both."
         )
     mass = float(earlier.belief.prior.mass.sum())
-    along = goes_along(earlier.belief.prior, earlier.body)
-    first, second = (_with_room(one, other, mass, along=along) for one, other in ((earlier, later), (later, earlier)))
+    tables = (weighing(table_like(one, earlier), mass) for one in (earlier, later))
+    first, second = (_with_room(*three) for three in zip(tables, (earlier, later), (later, earlier), strict=True))
     mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
     values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]
@@ -87,7 +86,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
         sd = np.sqrt(np.maximum(np.diag(slope @ spread[cut, cut] @ slope.T), 0.0))
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
             value = float(after[0][k] - before[0][k])
-            p = float(2 * norm.sf(abs(value) / sd[k])) if sd[k] > 0 else 1.0
+            p = float(2 * ndtr(-abs(value) / sd[k])) if sd[k] > 0 else 1.0
             informed = any(one.known[10 * i + k].verdict != "cannot be known" for one in (earlier, later))
             rows.append(Difference(segment, quantity, unit, value, float(sd[k]), p, informed))
     return tuple(rows)
@@ -112,11 +111,10 @@ def _possible(belief: Posterior, one: Identification) -> Array:
     return fit.sip.phi
 
 
-def _with_room(one: Identification, other: Identification, mass: float, *, along: bool) -> Posterior:
-    """Return the belief of session ``one`` with room for the loads that it carries beyond ``other``, its table at
-    ``mass`` kg with the trunk's matter ``along`` with the joint or not.
+def _with_room(table: Sip, one: Identification, other: Identification) -> Posterior:
+    """Return the belief of session ``one`` after its ``table`` with room for the loads that it carries beyond
+    ``other``.
     """
     chance = {found.segment: found.probability for found in added_mass(one, reference=other).suspects}
     share = np.array([chance[segment] for segment in one.body.segments])
-    table = placed_as(one.belief.prior, one.body, along=along)
-    return posterior(one.data, may_carry(one.body, weighing(table, mass), share=share))
+    return posterior(one.data, may_carry(one.body, table, share=share))

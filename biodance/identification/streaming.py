@@ -114,7 +114,7 @@ class Stream:
         without them the intervals count the noise alone, and the notes say so.
         """
         found = self.statistics
-        noise, _ = learn_noise(found, may_carry(self.body, widened(self.body.sip)))
+        noise, _ = learn_noise(found, may_carry(self.body, widened(self.body.sip, self.body.joint_errors)))
         disturbed = mismatch(self.body, fits, noise) if fits else None
         return conclude(self.body, found, tuple(fit.name for fit in fits) or ("stream",), noise=noise, found=disturbed)
 
@@ -225,7 +225,8 @@ def _settle(stream: Stream) -> Stream:
     closed = _close(stream)
     if len(stream.pending) < SHORTEST or not stream.verdicts:
         return closed
-    noise, _ = learn_noise(closed.statistics, may_carry(stream.body, widened(stream.body.sip)))
+    prior = widened(stream.body.sip, stream.body.joint_errors)
+    noise, _ = learn_noise(closed.statistics, may_carry(stream.body, prior))
     more = mismatch(stream.body, (_pending_fit(stream),), noise)
     old = stream.disturbed
     return replace(closed, disturbed=Mismatch(old.kinematics + more.kinematics, old.plates + more.plates))

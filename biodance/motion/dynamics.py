@@ -74,16 +74,6 @@ def joint_torques(body: Body, motion: Motion, contacts: Mapping[str, Wrench]) ->
     return JointTorques(motion.time, total[:, root:], residual)
 
 
-def zmp(wrench: Wrench, *, height: float = 0.0, threshold: float = COP_FORCE) -> Array:
-    """Return the zero-moment point (T, 3) m of a wrench on the horizontal plane ``z = height`` m; NaN where |Fz| <
-    ``threshold`` N.
-
-    For a measured wrench it is the centre of pressure, for a simulated one the point that must lie inside the base of
-    support.
-    """
-    return wrench.cop(height=height, threshold=threshold)
-
-
 def distribute(
     total: Wrench, right: Array, left: Array, touching: NDArray[np.bool_], *, threshold: float = COP_FORCE
 ) -> tuple[Wrench, Wrench]:

@@ -64,18 +64,18 @@ class Grounded:
         return tuple((SIDES[self.foot[a]], float(time[a]), float(time[b - 1])) for a, b in pairwise(edges))
 
 
-def even_angles(encoders: Encoders, *, rate: float = RATE) -> tuple[Array, Array]:
+def even_angles(encoders: Encoders) -> tuple[Array, Array]:
     """Return times (T,) s, evenly spaced from the encoders' first, and the joint angles (T, n) rad at them.
 
-    What is faster than 0.4 times ``rate`` is taken off before, so that it does not appear as something slow.
+    What is faster than 0.4 times that `RATE` is taken off before, so that it does not appear as something slow.
     """
     own, angle = encoders.rate, encoders.angle
     count = int((encoders.time[-1] - encoders.time[0]) * own) + 1
     even = encoders.time[0] + np.arange(count) / own
     angle = np.stack([np.interp(even, encoders.time, one) for one in angle.T], axis=1)
-    if own > rate:
-        angle = low_pass(angle, own, LowPass(cutoff=0.4 * rate))
-    time = encoders.time[0] + np.arange(int((even[-1] - even[0]) * rate) + 1) / rate
+    if own > RATE:
+        angle = low_pass(angle, own, LowPass(cutoff=0.4 * RATE))
+    time = encoders.time[0] + np.arange(int((even[-1] - even[0]) * RATE) + 1) / RATE
     return time, np.stack([np.interp(time, even, one) for one in angle.T], axis=1)
 
 

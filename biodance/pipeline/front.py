@@ -9,12 +9,12 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
-from biodance.errors import SessionRefused
 from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
 from biodance.pipeline.carry import known_body, read_lab
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
-from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification, identify_trials, trial_fit
+from biodance.pipeline.front_dance import performance_of
+from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.mended import with_right_labels
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from biodance.dance.dance import Dance
-    from biodance.dance.scoring import PerformanceScore
 
 Visit: TypeAlias = Session | SessionResult | str | Path
 """A session: as read, as examined, or its folder."""
@@ -267,26 +266,6 @@ def examined_visit(
     read = session.session if isinstance(session, SessionResult) else session
     read = read if isinstance(read, Session) else read_session(read, tell=tell)
     return examine(carried.corrected(read), reference=reference, known=known, tell=tell)
-
-
-def performance_of(result: SessionResult, dance: "Dance | str | Path") -> "PerformanceScore":
-    """Return how well a dance was danced in the trials with role fit of an examined visit.
-
-    Raises
-    ------
-    FileRefused
-        The file is no dance.
-    BiodanceError
-        The dance is of another body, or nothing was recorded.
-    """
-    from biodance.dance.dance import Dance
-    from biodance.dance.scoring import score_performance
-
-    one = dance if isinstance(dance, Dance) else Dance.load(dance)
-    if result.body is None:
-        raise SessionRefused(f"{result.session.folder}: {result.body_source} So nobody knows how the dance was danced.")
-    fits = [trial_fit(trial) for trial in result.trials if trial.trial.role in FITTED_ROLES]
-    return score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))
 
 
 def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:

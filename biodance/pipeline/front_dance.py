@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.records import Subject
 
 if TYPE_CHECKING:
     from biodance.dance.dance import Dance
     from biodance.dance.limits import Limit
+    from biodance.dance.scoring import PerformanceScore
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance_result import DanceResult
+    from biodance.pipeline.results import SessionResult
     from biodance.virtual_lab.faults.causes import Hidden
 
 
@@ -255,3 +257,24 @@ def virtual_subject(
         raise BiodanceError(f"Simulating needs a person, and {where}: add --{', --'.join(missing)}.")
     years = known.age if known is not None and np.isnan(age) else age
     return Subject(float(who["mass"]), float(who["height"]), who["sex"], years)  # type: ignore[arg-type]
+
+
+def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "PerformanceScore":
+    """Return how well a dance was danced in the trials with role fit of an examined visit.
+
+    Raises
+    ------
+    FileRefused
+        The file is no dance.
+    BiodanceError
+        The dance is of another body, or nothing was recorded.
+    """
+    from biodance.dance.dance import Dance
+    from biodance.dance.scoring import score_performance
+    from biodance.pipeline.identification import FITTED_ROLES, trial_fit
+
+    one = dance if isinstance(dance, Dance) else Dance.load(dance)
+    if result.body is None:
+        raise SessionRefused(f"{result.session.folder}: {result.body_source} So nobody knows how the dance was danced.")
+    fits = [trial_fit(trial) for trial in result.trials if trial.trial.role in FITTED_ROLES]
+    return score_performance(one, result.body, tuple((fit.motion, fit.use) for fit in fits if fit))

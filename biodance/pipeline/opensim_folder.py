@@ -2,14 +2,16 @@
 its inverse dynamics, whose torques are ours.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.export import write_model
+from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
+from biodance.body.parts import UPRIGHT
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
 from biodance.lab.opensim.inverse_dynamics import external_loads, ground_table, inverse_dynamics_setup
@@ -20,10 +22,24 @@ from biodance.lab.session.results_folder import made_folder
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
-from biodance.pipeline.coordinates import opensim_coordinates
 from biodance.pipeline.movement import contact_of
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import SIDES, Motion, Wrench, runs
+
+
+def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
+    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as
+    in ``body``.
+    """
+    names = [joint.name for joint in body.joints]
+    angles = motion.q[:, body.nq - len(names) :]
+    if not body.n_root:
+        return TimeTable(body.name, tuple(names), motion.time, angles)
+    turned = UPRIGHT.T @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix()
+    turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
+    root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]
+    return TimeTable(body.name, (*root, *names), motion.time, np.hstack([turns, motion.q[:, :3] @ UPRIGHT, angles]))
+
 
 MODEL = "model.osim"
 _SHORTEST = 10
@@ -49,7 +65,6 @@ def write_opensim_folder(
     *,
     source: str,
     solids: SegmentSolids | None = None,
-    tell: Callable[[str], None] = lambda _: None,
 ) -> tuple[OpensimTrial, ...]:
     """Write ``model.osim`` with the meshes of its segments, and the files of every trial that gives a motion.
 
@@ -74,12 +89,10 @@ def write_opensim_folder(
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
     made_folder(folder)
-    tell("writing the model")
     solids = segment_solids(body) if solids is None else solids
     write_model(body, folder / MODEL, format="osim", source=source, solids=solids)
     written = []
     for one in moving:
-        tell(f"writing {one.name}")
         written.append(_trial(one, body, folder))
     return tuple(written)
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
-from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
+from biodance.lab.c3d.write import FileValue
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques

@@ -14,8 +14,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.rehearsal import Rehearsal
 from biodance.dance.verify import Margin
-from biodance.lab.c3d.parameters import FileValue
-from biodance.lab.c3d.write import write_c3d
+from biodance.lab.c3d.write import FileValue, write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.still import posture_still
@@ -191,8 +190,7 @@ def cues(dance: Dance, about: tuple[str, ...] = ()) -> str:
         angles,
         words,
         planted,
-        move=float(np.median(dance.move)),
-        hold=float(np.max(dance.hold)),
+        tempo=(float(np.median(dance.move)), float(np.max(dance.hold))),
         said=dance_instructions(dance),
         names=dance.names,
         about=about,

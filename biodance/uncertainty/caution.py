@@ -29,11 +29,12 @@ JOINT = {
 """The joint at the origin of each segment's frame."""
 
 
-def widened(prior: Sip) -> Sip:
-    """Return ``prior`` with the same values and a covariance that holds for frames that are turned and centres that
-    are displaced.
+def widened(prior: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
+    """Return ``prior``, known about the true joint centres, with the same values and a covariance that holds for frames
+    that are turned and centres that are displaced: as far as the functional calibration that ``placed`` the joints
+    leaves them, or as joints usually are.
     """
-    covariance = np.array(prior.covariance) + _mass_spread(prior)
+    covariance = np.array(prior.covariance) + _mass_spread(prior) + misplaced(prior, placed)
     for i, segment in enumerate(prior.segments):
         cut = slice(10 * i, 10 * i + 10)
         phi, own = prior.phi[cut], covariance[cut, cut].copy()
@@ -52,8 +53,49 @@ def frame_turn(segment: str) -> Array:
     return turn
 
 
+def misplaced(sip: Sip, placed: tuple[JointError, ...]) -> Array:
+    """Return the covariance (p, p) of the parameters of ``sip`` in the model's frames that comes from joint centres
+    off their true places, each on its own.
+    """
+    names = {error.joint for error in placed}
+    out = np.zeros((len(sip.phi), len(sip.phi)))
+    for i, segment in enumerate(sip.segments):
+        cut = slice(10 * i, 10 * i + 10)
+        slope = _centre_size(segment, names) * shift_slope(sip.phi[cut])
+        out[cut, cut] = slope @ slope.T
+    return out
+
+
+def _centre_size(segment: str, placed: set[str]) -> float:
+    """Return the standard deviation per axis, m, of the centre at the origin of a segment's frame."""
+    joint = _joint_of(segment)
+    if not placed:
+        return error_size("joint_centre", "other", state="before")
+    if joint in placed:
+        return error_size("joint_centre", joint.partition("_")[2] or joint, state="after")
+    return joint_size("joint_centre", joint or segment)
+
+
+def from_true_centres(sip: Sip, table: Sip, placed: tuple[JointError, ...]) -> Sip:
+    """Return ``sip``, believed in the model's frames after the prior ``table`` (`widened` for joints that were
+    ``placed``), with a covariance about the true joint centres.
+
+    With the prior covariance P in the model's frames, D of it from misplaced centres and B of the belief, the error
+    about the true centres has the covariance B + D - K B - B K', K = D P^-1: where the data told nothing P - D, what
+    the table is off; where they told all D, what the joints are off. Centres that no movement placed come on top.
+    """
+    if not placed:
+        return about_true_centres(sip)
+    off, scale = misplaced(table, placed), np.sqrt(np.diag(table.covariance))
+    unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    inverse = np.linalg.pinv(table.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
+    shared = (off * unit) @ inverse * unit @ sip.covariance
+    return Sip(sip.segments, sip.phi, sip.covariance + off - shared - shared.T)
+
+
 def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
-    """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find.
+    """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find, where
+    these are no part of what was believed before.
 
     The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as
     uncertain as the formula that predicted it, or as the movement that ``placed`` it left it.

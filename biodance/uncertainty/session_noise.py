@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.kinematics import jacobian, poses
+from biodance.motion.kinematics import place_jacobian, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
-from biodance.uncertainty.bands import BANDS, Bands
+from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, InstrumentNoise, Tolerances
 
@@ -85,7 +85,7 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     pose = poses(body, q[None])
     segment = list(body.markers.segment)
     points = pose.points(segment, body.markers.position)
-    place, _ = jacobian(body, pose, segment, points)
+    place = place_jacobian(body, pose, segment, points)
     weighted = np.repeat(np.asarray(body.markers.weight), 3)[:, None] * place[0]
     inverse = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv))
     spread = inverse @ weighted.T @ weighted @ inverse
@@ -100,21 +100,21 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     return np.asarray(per @ spread @ per.T)
 
 
-def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float, bands: Bands = BANDS) -> Array:
+def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float) -> Array:
     """Return (B, 6, 6): covariance of one coefficient per band that marker noise of ``noise`` m at ``rate`` Hz adds to
     the wrench residual, mean over the ``postures`` (n, nq).
     """
     lever = np.mean([carried(body, q, about) for q in postures], axis=0)
-    edges = np.array(bands.edges)
+    edges = np.array(BANDS.edges)
     power = (2 * np.pi) ** 4 * np.diff(edges**5) / (5 * np.diff(edges))
-    return np.asarray(noise**2 * min(1.0, bands.rate / rate) * power[:, None, None] * lever)
+    return np.asarray(noise**2 * min(1.0, BANDS.rate / rate) * power[:, None, None] * lever)
 
 
-def of_plates(density: Array, count: int, bands: Bands = BANDS) -> Array:
+def of_plates(density: Array, count: int) -> Array:
     """Return (6, 6): covariance of one coefficient from the noise of ``count`` plates of ``density`` (6,) N, N·m per
     root Hz each.
     """
-    return np.diag(count * density**2 * bands.rate / 2)
+    return np.diag(count * density**2 * BANDS.rate / 2)
 
 
 def added_noise(

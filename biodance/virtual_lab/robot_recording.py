@@ -35,8 +35,7 @@ class RobotLab:
 
 
 def write_robot_trial(
-    folder: Path,
-    name: str,
+    path: Path,
     joints: tuple[str, ...],
     time: Array,
     angle: Array,
@@ -46,7 +45,7 @@ def write_robot_trial(
     seed: int,
     markers: tuple[tuple[str, ...], Array] | None = None,
 ) -> None:
-    """Write ``NAME_joints.csv`` and ``NAME_plate.c3d`` of one motion: joint ``angle`` (T, n) rad as the encoders see it
+    """Write ``PATH_joints.csv`` and ``PATH_plate.c3d`` of one motion: joint ``angle`` (T, n) rad as the encoders see it
     and the ``wrench`` (T, 6) N, N·m of the ground on the robot at ``time`` (T,) s, about a point of the ground;
     ``markers`` names (K) and places (T, K, 3) m in the same frame.
     """
@@ -55,15 +54,15 @@ def write_robot_trial(
     seen = np.stack([np.interp(clock + time[0], time, one) for one in angle.T], axis=1)
     seen = seen + lab.encoder * rng.normal(size=seen.shape)
     table = np.column_stack([clock, seen])
-    folder.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     heading = ",".join(["time (s)", *(f"{joint} (rad)" for joint in joints)])
-    np.savetxt(folder / f"{name}_joints.csv", table, fmt="%.6f", delimiter=",", header=heading, comments="")
+    np.savetxt(path.with_name(f"{path.name}_joints.csv"), table, fmt="%.6f", delimiter=",", header=heading, comments="")
     per = round(_PLATE_RATE / _CAMERA_RATE)
     ticks = np.arange(int((length + lab.ahead) * _CAMERA_RATE) * per) / _PLATE_RATE - lab.ahead + time[0]
     pressed = np.stack([np.interp(ticks, time, one) for one in wrench.T], axis=1)
     size = np.array([lab.force] * 3 + [lab.moment] * 3)
     write_c3d(
-        folder / f"{name}_plate.c3d",
+        path.with_name(f"{path.name}_plate.c3d"),
         markers=_seen(markers, time, ticks[::per], lab, rng),
         plates=[_plate(pressed, lab, size * rng.normal(size=pressed.shape))],
         analog_rate=_PLATE_RATE,

@@ -8,6 +8,8 @@ altered as the cause would alter it, and the witness is asked again (`traces`).
 """
 
 import inspect
+import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,6 +21,9 @@ import numpy as np
 from biodance.discovery import Chosen, Family
 from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
 from biodance.witnesses._recording import ONSET, FootPath, FootStep, SeenTrial, recording
+
+_TIME = re.compile(r" (at|from) [-\d.]+ s")
+"""When a step was, as its name says it."""
 
 __all__ = [
     "ONSET",
@@ -74,6 +79,11 @@ class Observation:
         return f"{self.witness} {phase}" if comma else self.witness
 
     @property
+    def stride(self) -> str:
+        """Witness, trial and what, but for the time: the same in all strides of one foot on one plate in a trial."""
+        return f"{self.witness}, {self.trial}, {_TIME.sub('', self.what)}"
+
+    @property
     def expected_sd(self) -> float:
         """Standard deviation of what is expected of one such observation in a recording without fault."""
         return float(np.sqrt(self.sd**2 + sum(size**2 for size in self.norms.values())))
@@ -122,7 +132,7 @@ def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Wi
 def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
     """Return all that the witnesses saw in one trial, finite values only."""
     found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
-    return tuple(one for one in found if np.isfinite([one.value, one.expected, one.sd]).all())
+    return tuple(one for one in found if all(map(math.isfinite, (one.value, one.expected, one.sd))))
 
 
 def traces(

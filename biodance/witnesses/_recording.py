@@ -5,6 +5,7 @@ force comes late, must not hide the very steps that show it.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +30,18 @@ _LEVEL = 0.005
 """m: plates side by side differ by less in height."""
 _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
+_BELT = 0.25
+"""m/s of a standing foot from which a belt carries it; slower ones pivot."""
 _LIFTED = 0.06
 """m of a foot above its lowest place in the trial from which it cannot stand."""
 _FLAT = 0.03
 """m of both markers above their lowest place of a foot that stands on a belt."""
 _UNSEEN = 0.05
 """s over which a marker that was not seen is believed to go on straight."""
+
+
+_KEPT = 64
+"""Sets of times at which a foot's place is kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +52,19 @@ class FootPath:
     time: Array
     heel: Array
     toe: Array
+    _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, time: Array) -> tuple[Array, Array]:
-        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
-        return _between(self.time, self.heel, time), _between(self.time, self.toe, time)
+        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
+
+        It is kept: witnesses are asked for the same times again and again, of recordings whose plates were altered.
+        """
+        key = time.tobytes()
+        if key not in self._known:
+            if len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = _between(self.time, self.heel, time), _between(self.time, self.toe, time)
+        return self._known[key]
 
     def outline(self, time: Array) -> Array:
         """Return the sole (n, P, 2) m seen from above, from heel and toe marker."""
@@ -78,7 +94,7 @@ class FootPath:
         """Hz of the markers."""
         return rate_of(self.time)
 
-    @property
+    @cached_property
     def velocity(self) -> Array:
         """(T, 3) m/s of the middle between the two markers."""
         if self.time.size < 2:
@@ -116,8 +132,8 @@ class FootStep:
 @dataclass(frozen=True, eq=False)
 class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
-    markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times with its ``velocity``
-    (T, 3) m/s below 8 Hz (None = not seen), and whether somebody stands ``still`` throughout.
+    markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and
+    whether somebody stands ``still`` throughout.
     """
 
     trial: Trial
@@ -125,7 +141,6 @@ class SeenTrial:
     feet: tuple[FootPath, ...]
     steps: tuple[FootStep, ...]
     pelvis: Array | None
-    velocity: Array | None
     still: bool
     _stances: dict[FootStep, slice | None] = field(default_factory=dict, init=False, repr=False)
 
@@ -167,17 +182,22 @@ class SeenTrial:
         off = np.linalg.norm(_between(other.time, other.velocity, time) - belt, axis=1)
         return np.asarray(np.nan_to_num(off, nan=0.0) > _STILL)
 
+    def belt(self, step: FootStep) -> Array | None:
+        """Return the velocity (2,) m/s of the belt that carries the foot of a step; None on the ground."""
+        drift = self.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))[:2]
+        return drift if np.linalg.norm(drift) > _BELT else None
+
     @property
     def seconds(self) -> float:
         """Time s that one foot stands alone on a plate."""
         parts = [(self.plate(step.plate).wrench.time, self.stance(step)) for step in self.steps]
         return float(sum(time[part.stop - 1] - time[part.start] for time, part in parts if part is not None))
 
-    def pelvis_velocity(self, time: Array) -> Array:
-        """Return (n, 3) m/s of the pelvis at times (n,) s; NaN where it was not seen."""
-        if self.velocity is None or self.trial.markers is None:
+    def pelvis_at(self, time: Array) -> Array:
+        """Return where (n, 3) m the pelvis is at times (n,) s; NaN where it was not seen."""
+        if self.pelvis is None or self.trial.markers is None:
             return np.full((len(time), 3), np.nan)
-        return _between(self.trial.markers.time, self.velocity, time)
+        return _between(self.trial.markers.time, self.pelvis, time)
 
 
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
@@ -195,9 +215,8 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
         if feet
     )
     pelvis = _pelvis(trial.markers, known)
-    velocity = _velocity(trial.markers, pelvis) if trial.markers is not None and pelvis is not None else None
     steps = tuple(sorted(steps, key=lambda step: step.middle))
-    return SeenTrial(trial, mass, feet, steps, pelvis, velocity, is_still(trial))
+    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial))
 
 
 def _between(known: Array, path: Array, time: Array) -> Array:
@@ -243,21 +262,6 @@ def _pelvis(markers: Markers | None, known: tuple[str, ...]) -> Array | None:
             middle = ((right + left) / 2 + back) / 2
             return middle if np.isfinite(middle).any() else None
     return None
-
-
-def _velocity(markers: Markers, path: Array) -> Array:
-    """Return the velocity (T, 3) m/s of a path (T, 3) m below 8 Hz; NaN where it was not seen."""
-    from scipy.signal import butter, sosfiltfilt
-
-    seen = np.isfinite(path).all(axis=1)
-    rate = markers.rate
-    if seen.sum() < 12 or not rate > 20:
-        return np.full(path.shape, np.nan)
-    filled = np.stack([np.interp(markers.time, markers.time[seen], column) for column in path[seen].T], axis=1)
-    smooth = sosfiltfilt(butter(2, 8.0, fs=rate, output="sos"), filled, axis=0, padlen=min(20, len(filled) - 1))
-    velocity = np.gradient(smooth, markers.time, axis=0)
-    velocity[~seen] = np.nan
-    return velocity
 
 
 def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:

@@ -1,6 +1,7 @@
 """Which way the shear points: a step brakes first and pushes then, and it turns with the plate.
 
-The direction of walking is that of the pelvis over the standing foot, so that it holds on a treadmill, too.
+The direction of walking is that of the pelvis over the ground or belt under the standing foot, at each instant: in a
+turn the shear turns with it, and what pushes inwards there bends the way.
 """
 
 import numpy as np
@@ -10,17 +11,18 @@ from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import StepCourse, step_course
 
 _PARTS = {
-    "braking": (0.08, 0.35, 0, -0.145, 0.030),
-    "pushing": (0.65, 0.92, 0, 0.150, 0.035),
-    "inwards": (0.20, 0.80, 1, -0.045, 0.025),
+    "braking": (0.08, 0.35, 0, -0.145, 0.015, 0.030),
+    "pushing": (0.65, 0.92, 0, 0.150, 0.015, 0.035),
+    "inwards": (0.20, 0.80, 1, 0.010, 0.012, 0.012),
 }
-"""Start and stop as shares of stance, direction (0 ahead, 1 outwards), expected share of the mean vertical force, sd of
-one person."""
-_STEP = 0.015
-_STRAIGHT = 0.2
-"""rad between the ways of the first and the second half of a stance: in a turn the shear points to its middle."""
-_SLANT = 0.075
-"""rad: sd of the direction in which shear goes from braking to pushing, of one step."""
+"""Start and stop as shares of stance, direction (0 ahead, 1 inwards, beyond what bends the way), expected share of the
+mean vertical force, sd of one step and of one person."""
+_SLANT = (0.025, 0.055, 0.025)
+"""rad: expected direction in which shear goes from braking to pushing, its sd of one step and of one person's foot."""
+_GOES = 0.2
+"""m/s of the pelvis over the ground from which somebody walks."""
+_FRAMES = 8
+"""Frames of a stance that show how the pelvis goes."""
 
 
 class Shear(Witness):
@@ -42,20 +44,23 @@ class Shear(Witness):
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = step_course(seen, step)
-        ahead = way(seen, step, part) if part is not None else None
-        if part is None or ahead is None:
+        path = way(seen, step, part) if part is not None else None
+        if part is None or path is None:
             return []
-        left = np.array([-ahead[1], ahead[0]])
-        along = np.stack([part.force[:, :2] @ ahead, part.force[:, :2] @ left * (1 if step.side == "left" else -1)])
-        weight = float(part.force[:, 2].mean())
+        velocity, bending = path
+        ahead = velocity / np.linalg.norm(velocity, axis=1)[:, None]
+        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        inwards, weight = (1 if step.side == "left" else -1), float(part.force[:, 2].mean())
+        bends = float(bending @ left[len(left) // 2]) / seen.trial.settings.gravity * inwards
+        along = np.stack([np.sum(part.force[:, :2] * one, axis=1) for one in (ahead, left)])
         found = []
-        for what, (start, stop, axis, expected, person) in _PARTS.items():
+        for what, (start, stop, axis, expected, sd, person) in _PARTS.items():
             value = part.mean(along[axis], start, stop) / weight
-            norms = {f"person {what}": person}
-            found.append(self._observation(seen, step, what, value, _STEP, expected, "1", norms))
-        slant = float(np.arctan(_slope(part.force[:, :2] @ left, along[0], part.force[:, 2])))
-        norms = {f"person {step.side} slant": _SLANT / 2}
-        return [*found, self._observation(seen, step, "slant", slant, _SLANT, 0.02, "rad", norms)]
+            value = value * inwards - bends if axis else value
+            found.append(self._observation(seen, step, what, value, sd, expected, "1", {f"person {what}": person}))
+        slant, (expected, sd, person) = float(np.arctan(_slope(along[1], along[0], part.force[:, 2]))), _SLANT
+        norms = {f"person {step.side} slant": person}
+        return [*found, self._observation(seen, step, "slant", slant, sd, expected, "rad", norms)]
 
     def _observation(
         self, seen: SeenTrial, step: FootStep, what: str, value: float, sd: float, expected: float, unit: str,
@@ -71,22 +76,21 @@ def _slope(left: Array, ahead: Array, vertical: Array) -> float:
     return float(np.linalg.lstsq(np.stack([ahead, vertical], axis=1), left, rcond=None)[0][0])
 
 
-def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> Array | None:
-    """Return the unit vector (2,) along which the pelvis goes over the foot in the middle of a stance; None where it
-    hardly goes, or turns.
+def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> tuple[Array, Array] | None:
+    """Return the horizontal velocity (n, 2) m/s of the pelvis over the ground or belt during a stance, evenly
+    accelerated, and that acceleration (2,) m/s²; None where the pelvis is not seen or hardly goes.
     """
-    time = part.time[(part.phase > 0.2) & (part.phase < 0.8)]
     assert seen.trial.markers is not None
-    here = (seen.trial.markers.time >= time[0]) & (seen.trial.markers.time <= time[-1])
-    foot = seen.foot(step.side)
-    path = (seen.pelvis - foot.heel)[here, :2] if seen.pelvis is not None else np.empty((0, 2))
-    path = path[np.isfinite(path).all(axis=1)]
-    if len(path) < 5:
+    known, middle = seen.trial.markers.time, float(np.mean(part.time[[0, -1]]))
+    here = (known >= part.time[0]) & (known <= part.time[-1])
+    path = seen.pelvis[here, :2] if seen.pelvis is not None else np.empty((0, 2))
+    if np.isfinite(path).all(axis=1).sum() < _FRAMES:
         return None
-    moved, halves = path[-1] - path[0], np.array([path[len(path) // 2] - path[0], path[-1] - path[len(path) // 2]])
-    length = float(np.linalg.norm(moved))
-    bent = abs(np.arctan2(halves[0, 0] * halves[1, 1] - halves[0, 1] * halves[1, 0], np.sum(halves[0] * halves[1])))
-    return moved / length if length > 0.1 and bent < _STRAIGHT else None
+    at, path = known[here][np.isfinite(path).all(axis=1)] - middle, path[np.isfinite(path).all(axis=1)]
+    bend, speed, _ = np.polyfit(at, path, 2)
+    belt = seen.belt(step)
+    velocity = speed - (np.zeros(2) if belt is None else belt) + 2 * bend * (part.time - middle)[:, None]
+    return (velocity, 2 * bend) if np.linalg.norm(velocity, axis=1).min() > _GOES else None
 
 
 WITNESS = Shear

@@ -1,23 +1,32 @@
 """What the plates weigh while somebody walks: the mean vertical force over whole steps, and over one foot alone.
 
-From the middle of one stance to the middle of the next the body comes back to the same height and speed: the mean force
-is its weight but for the change of velocity, which the pelvis shows. In the middle of a stance the other foot swings:
-one plate alone says the same a little coarser, and plates are told from each other.
+From one single support into the next the mean force is the weight but for the change of velocity, which the pelvis
+shows. The mean is taken with weights that begin and end smoothly: then no velocity of one instant is needed. In the
+middle of a stance the other foot swings: one plate alone says the same a little coarser, and plates are told from each
+other. A foot that reaches over the edge of its plate does not weigh: what it treads on beside it is not measured.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
+from biodance.witnesses._stance import step_course
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
-_STEP, _ALONE, _HORIZONTAL = (-0.001, 0.0065), (0.009, 0.013), 0.012
-"""Expected error and sd of the mass as shares of it: of a whole step, of one foot alone; sd of the mean horizontal
-force over a step as a share of the weight."""
+_STEP, _ALONE, _HORIZONTAL = (-0.001, 0.003, 0.0045), (0.009, 0.0085, 0.008), 0.012
+"""Expected error of the mass as a share of it, its sd of one step and of one person: of a whole step, of one foot
+alone; sd of the mean horizontal force over a step as a share of the weight."""
+_ON = (0.0, 0.002, 0.003)
+"""The same of all strides of somebody who goes on on a belt, walking or running: nothing is trodden on beside it."""
+_MANY = 6
+"""Steps from which somebody goes on."""
+_FADES = 0.3
+"""Share of a step in which the weights of its mean begin, and end."""
 _ONE = (0.2, 0.8)
 """Start and stop, as shares of stance, of the time in which the other foot swings."""
 _SHORTEST = 0.15
@@ -25,8 +34,8 @@ _SHORTEST = 0.15
 
 
 class StrideForce(Witness):
-    """Mass (kg) by the mean vertical force over a step or over one foot alone, and mean horizontal force (N) over a
-    step.
+    """Mass (kg) by the mean vertical force over a step, over one foot alone, over all strides on a belt, and
+    mean horizontal force (N) over a step.
     """
 
     name = "stride_force"
@@ -38,58 +47,75 @@ class StrideForce(Witness):
         """Return one mass for each foot alone, and one mass and two horizontal forces for each whole step."""
         if seen.pelvis is None or not seen.mass > 0:
             return ()
-        alone = [one for step in seen.steps for one in self._alone(seen, step)]
-        return (*alone, *(one for pair in _pairs(seen) for one in self._whole(seen, *pair)))
+        alone = [one for step in seen.steps if not step.overhang for one in self._alone(seen, step)]
+        return (*alone, *(one for pair in _pairs(seen) for one in self._whole(seen, *pair)), *self._lasting(seen))
+
+    def _lasting(self, seen: SeenTrial) -> list[Observation]:
+        moving = [step for step in seen.steps if seen.belt(step) is not None]
+        if len(moving) < _MANY or len(moving) < len(seen.steps) or not _one_clock(seen):
+            return []
+        total, names = seen.trial.wrench, {step.plate for step in moving}
+        here = (total.time >= moving[0].middle) & (total.time <= moving[-1].middle)
+        value = _mass(seen, total.time[here], total.force[here])
+        return [
+            _weighed(self.name, "all strides", seen, value, "going on", _ON, names.pop() if len(names) == 1 else "")
+        ]
 
     def _alone(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
-        if part is None:
+        if part is None or step_course(seen, step) is None:
             return []
         wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
         if step.beside:
             here = np.flatnonzero(seen.swings(step, wrench.time[span])) + span.start
             span = slice(here[0], here[-1] + 1) if here.size else slice(0, 0)
-        if span.stop - span.start < _SHORTEST * wrench.rate or _beside(seen, step.plate, *step.beside, span=span):
+        if span.stop - span.start < _SHORTEST * wrench.rate or _elsewhere(seen, step.plate, *step.beside)[span].any():
             return []
-        value = _mass(seen, wrench.time[span], wrench.force[span, 2])
-        bias, sd = _ALONE
-        return [_weighed(self.name, f"{step.name}, alone", seen, value, bias, sd, step.plate)]
+        value = _mass(seen, wrench.time[span], wrench.force[span])
+        return [_weighed(self.name, f"{step.name}, alone", seen, value, "on one foot", _ALONE, step.plate)]
 
     def _whole(self, seen: SeenTrial, first: FootStep, last: FootStep) -> list[Observation]:
-        span = _middle_to_middle(seen, first, last)
+        span = _both(seen, first, last)
         if span is None:
             return []
         total, g, name = seen.trial.wrench, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
         time, force = total.time[span], total.force[span]
         what = f"{name} from {first.middle:.2f} s"
-        found = [_weighed(self.name, what, seen, _mass(seen, time, force[:, 2]), *_STEP)]
-        change = seen.mass * _change(seen, time) / (time[-1] - time[0])
+        found = [_weighed(self.name, what, seen, _mass(seen, time, force), "in a step", _STEP)]
+        needed = _means(seen, time, force)
         for axis, channel in enumerate(("Fx", "Fy")):
-            value = float(force[:, axis].mean() - change[axis])
-            sd = _HORIZONTAL * seen.mass * g
+            value, sd = float(needed[0, axis] - seen.mass * needed[1, axis]), _HORIZONTAL * seen.mass * g
             found.append(Observation(self.name, f"{what}, mean {channel}", seen.trial.name, value, sd, 0.0, "N"))
         return found
 
 
 def _weighed(
-    name: str, what: str, seen: SeenTrial, value: float, bias: float, sd: float, plate: str = ""
+    name: str, what: str, seen: SeenTrial, value: float, way: str, norm: tuple[float, float, float], plate: str = ""
 ) -> Observation:
-    norms = {"person declared mass": DECLARED * seen.mass}
+    bias, sd, person = norm
+    norms = {"person declared mass": DECLARED * seen.mass, f"person weighs {way}": person * seen.mass}
     expected = (1 + bias) * seen.mass
     return Observation(name, what, seen.trial.name, value, sd * seen.mass, expected, "kg", plate, norms)
 
 
-def _change(seen: SeenTrial, time: Array) -> Array:
-    """Return (3,) m/s: the change of the pelvis's velocity from the first to the last time."""
-    velocity = seen.pelvis_velocity(time[[0, -1]])
-    return np.asarray(velocity[1] - velocity[0])
+def _means(seen: SeenTrial, time: Array, force: Array) -> Array:
+    """Return the mean force (3,) N and the mean acceleration (3,) m/s² of the pelvis, with weights that begin and end
+    as a cosine does: the acceleration is that of the path, weighed with the weights' second derivative.
+    """
+    lasts = time[-1] - time[0]
+    edge = np.minimum((time - time[0]) / lasts, (time[-1] - time) / lasts) / _FADES
+    weight = np.where(edge < 1, 0.5 * (1 - np.cos(np.pi * edge)), 1.0)
+    bend = np.where(edge < 1, 0.5 * (np.pi / (_FADES * lasts)) ** 2 * np.cos(np.pi * edge), 0.0)
+    path = seen.pelvis_at(time)
+    both = np.stack([weight[:, None] * force, bend[:, None] * (path - path.mean(axis=0))])
+    return np.asarray(np.trapezoid(both, time, axis=1) / np.trapezoid(weight, time))
 
 
-def _mass(seen: SeenTrial, time: Array, vertical: Array) -> float:
-    """Return the mass kg whose weight and change of velocity need the mean vertical force."""
-    change = _change(seen, time)[2] / (time[-1] - time[0])
-    return float(vertical.mean() / (seen.trial.settings.gravity + change))
+def _mass(seen: SeenTrial, time: Array, force: Array) -> float:
+    """Return the mass kg whose weight and acceleration need the mean vertical force of ``force`` (n, 3) N."""
+    needed, moved = _means(seen, time, force)[:, 2]
+    return float(needed / (seen.trial.settings.gravity + moved))
 
 
 def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
@@ -105,21 +131,28 @@ def _one_clock(seen: SeenTrial) -> bool:
     return all(np.array_equal(plate.wrench.time, time) for plate in seen.trial.plates)
 
 
-def _beside(seen: SeenTrial, *plates: str, span: slice) -> bool:
-    """Return whether another plate than ``plates`` is loaded in ``span``: the other foot stands there."""
+def _elsewhere(seen: SeenTrial, *plates: str) -> NDArray[np.bool_]:
+    """Return (S,) whether another plate than ``plates`` is loaded: the other foot stands there."""
     others = [plate for plate in seen.trial.plates if plate.name not in plates] if _one_clock(seen) else []
-    return any(bool((plate.wrench.force[span, 2] > ONSET).any()) for plate in others)
+    none = np.zeros(seen.plate(plates[0]).wrench.time.size, dtype=bool)
+    return np.any([none, *(plate.wrench.force[:, 2] > ONSET for plate in others)], axis=0)
 
 
-def _middle_to_middle(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
-    """Return the samples from the middle of one stance to that of the next; None where a foot is in the air between
-    or a plate without a foot of these steps is loaded.
+def _both(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
+    """Return the samples from the single support of one step to the end of that of the next, or less, as long as no
+    other plate is loaded; None where a foot is in the air between, reaches beside its plate or stands elsewhere.
     """
-    parts = [seen.stance(step) for step in (first, last)]
-    if parts[0] is None or parts[1] is None or parts[1].start >= parts[0].stop:
+    one, two = seen.stance(first), seen.stance(last)
+    if one is None or two is None or two.start >= one.stop or first.overhang or last.overhang:
         return None
-    span = slice((parts[0].start + parts[0].stop) // 2, (parts[1].start + parts[1].stop) // 2)
-    return None if _beside(seen, first.plate, last.plate, span=span) else span
+    middle = slice((one.start + one.stop) // 2, (two.start + two.stop) // 2)
+    begin = one.start + round(_ONE[0] * (one.stop - one.start))
+    end = two.start + round(_ONE[1] * (two.stop - two.start))
+    loaded = _elsewhere(seen, first.plate, last.plate)
+    if loaded[middle].any():
+        return None
+    before, after = np.flatnonzero(loaded[begin : middle.start]), np.flatnonzero(loaded[middle.stop : end])
+    return slice(begin + before[-1] + 1 if before.size else begin, middle.stop + after[0] if after.size else end)
 
 
 WITNESS = StrideForce

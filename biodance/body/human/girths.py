@@ -12,7 +12,7 @@ import numpy as np
 
 from biodance.body.human.fractions import MAN, WOMAN, mean_fraction
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
-from biodance.body.stadium import stadium_stack
+from biodance.body.inertia import RigidInertia
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import parts as table_parts
@@ -20,7 +20,52 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.reference import Reference, Sex
 from biodance.errors import SessionRefused
 from biodance.lab.girths import legal_girths, usual_girths
-from biodance.records import Subject
+from biodance.records import Array, Subject
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
+
+
+def stadium(girth: Array, aspect: Array) -> tuple[Array, Array]:
+    """Return radius r and half length t (n,) m of stadia from their girths (n,) m and breadth over depth (n,), at
+    least 1: girth = 2 pi r + 4 t, breadth over depth = (r + t) / r.
+    """
+    radius = np.asarray(girth) / (2 * np.pi + 4 * (np.asarray(aspect) - 1))
+    return radius, (np.asarray(aspect) - 1) * radius
+
+
+def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -> RigidInertia:
+    """Return volume (as ``mass``, m³), centroid and second moments of volume of a stack along -y from the origin.
+
+    Parameters
+    ----------
+    level : array_like
+        (n,) ascending, share of the length from the proximal end; the first section reaches up to 0, the last to 1.
+    girth : array_like
+        (n,) m.
+    aspect : array_like
+        (n,) breadth (z) over depth (x).
+    length : float
+        m.
+
+    Returns
+    -------
+    RigidInertia
+        x anterior, y up, z right, origin in the middle of the proximal section; inertia (m⁵) about the centroid.
+    """
+    radius, half = stadium(girth, aspect)
+    ends = np.unique(np.concatenate([[0.0], level, [1.0]]))
+    low, step = ends[:-1, None], np.diff(ends)[:, None]
+    place = (low + step * (1 + _NODES) / 2).ravel()
+    weight = (step * _WEIGHTS / 2).ravel() * length
+    r, t, y = np.interp(place, level, radius), np.interp(place, level, half), -place * length
+    area = np.pi * r**2 + 4 * r * t
+    volume = float(weight @ area)
+    middle = float(weight @ (area * y)) / volume
+    xx = weight @ (np.pi * r**4 / 4 + 4 * t * r**3 / 3)
+    zz = weight @ (np.pi * r**4 / 4 + 8 * t * r**3 / 3 + np.pi * r**2 * t**2 + 4 * r * t**3 / 3)
+    yy = weight @ (area * (y - middle) ** 2)
+    return RigidInertia(volume, np.array([0.0, middle, 0.0]), np.diag([yy + zz, xx + zz, xx + yy]))
+
 
 _CONTRADICTION = 0.15
 """Share of the body mass by which the girths may miss it."""

@@ -3,8 +3,9 @@ as a covariance.
 """
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -23,6 +24,8 @@ from biodance.body.tables.reference import Reference, proportion
 from biodance.records import Array, Sip, Subject
 
 _AXES = ("sagittal", "longitudinal", "transverse")
+_BOTH = (WOMAN, MAN)
+TRUNK = ("pelvis", "trunk_head")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,20 +48,31 @@ def table_spread(kind: str) -> Spread:
     """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm,
     forearm_hand).
     """
-    units = [_in_lengths(person, kind) for who in (WOMAN, MAN) for person in published_people(who.sex)]
-    masses = [fraction for who in (WOMAN, MAN) for fraction in published_fractions(kind, who)]
+    alike = kind not in TRUNK
+    people = _by_sex([[_in_lengths(one, kind) for one in published_people(who.sex)] for who in _BOTH], alike)
+    masses = _by_sex([published_fractions(kind, who) for who in _BOTH], alike)
     inner = _within(kind)
-    tensor = np.array([unit.inertia for unit in units])
+    tensors = [[unit.inertia for unit in units] for units in people]
     return Spread(
-        float(np.hypot(np.std(masses, ddof=1) / np.mean(masses), inner.mass)),
-        np.hypot(_sd(unit.com for unit in units), inner.com),
-        np.hypot(_sd(0.5 * np.log(np.diag(one)) for one in tensor), inner.radii),
-        _sd(one[(0, 0, 1), (1, 2, 2)] for one in tensor),
+        float(np.hypot(_sd([np.array(one) / np.mean(one) for one in masses]), inner.mass)),
+        np.hypot(_sd([[unit.com for unit in units] for units in people]), inner.com),
+        np.hypot(_sd([[0.5 * np.log(np.diag(one)) for one in some] for some in tensors]), inner.radii),
+        _sd([[one[(0, 0, 1), (1, 2, 2)] for one in some] for some in tensors]),
     )
 
 
-def _sd(values: Iterable[Array]) -> Array:
-    return np.asarray(np.std(np.array(list(values)), axis=0, ddof=1))
+def _by_sex(groups: list[list[Any]], alike: bool) -> list[list[Any]]:
+    """Return the groups of women and men apart where the sexes are cut ``alike``, else together: where a table cuts
+    pelvis from trunk is no difference between the sexes, but one of its ways to cut.
+    """
+    return groups if alike else [[one for group in groups for one in group]]
+
+
+def _sd(groups: Iterable[Sequence[Array]]) -> Array:
+    """Return the standard deviation about the mean of each of ``groups``, pooled."""
+    each = [np.array(group) for group in groups]
+    squares = sum(((one - one.mean(axis=0)) ** 2).sum(axis=0) for one in each)
+    return np.asarray(np.sqrt(squares / sum(len(one) - 1 for one in each)))
 
 
 def _in_lengths(person: Reference, kind: str) -> RigidInertia:
@@ -89,7 +103,6 @@ def _radius_sd(part: str, axis: str) -> float:
     return 0.5 * float(np.sqrt(max((moment_sd / moment) ** 2 - (mass_sd / mass) ** 2, 0.0)))
 
 
-TRUNK = ("pelvis", "trunk_head")
 MIRROR = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 """Signs of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] under reflection at z = 0."""
 
@@ -275,7 +288,9 @@ def com_sd(segment: str, skeleton: Skeleton) -> Array:
 
 
 def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
-    """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of one segment."""
+    """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of one segment about its true joint
+    centre.
+    """
     kind, own = table_spread(kind_of(segment)), lump.inertia / lump.mass
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))
@@ -287,7 +302,7 @@ def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
         )
         for i, j in TENSOR
     ]
-    return np.array([kind.mass * lump.mass, *com_sd(segment, skeleton), *tensor])
+    return np.array([kind.mass * lump.mass, *(kind.com * length), *tensor])
 
 
 def parameter_jacobian(lump: RigidInertia) -> Array:

@@ -14,7 +14,7 @@ def error_rows(*, whose: str = "believed") -> tuple[TableRow, ...]:
 
 
 @functools.cache
-def error_size(quantity: str, target: str, *, state: str = "any", whose: str = "believed") -> float:
+def error_size(quantity: str, target: str, *, state: str = "any") -> float:
     """Return one standard deviation of an error in the unit of the table (SI, per axis).
 
     ``state`` of a joint: "before" or "after" functional calibration; "any" for what does not depend on it.
@@ -24,9 +24,8 @@ def error_size(quantity: str, target: str, *, state: str = "any", whose: str = "
     UnknownName
         The table has no such row.
     """
-    return float(
-        read_table("uncertainty", "sizes").row(quantity=quantity, target=target, state=state, whose=whose)["sd"]
-    )
+    row = {"quantity": quantity, "target": target, "state": state, "whose": "believed"}
+    return float(read_table("uncertainty", "sizes").row(**row)["sd"])
 
 
 def joint_size(quantity: str, joint: str) -> float:

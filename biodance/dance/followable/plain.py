@@ -2,7 +2,7 @@
 and at last with the pelvis and a lifted leg going round.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,46 +13,76 @@ from biodance.records import Array
 
 _SLOWER = (1.0, 1.4, 1.8)
 """Factors on the duration of a straight move, one after the other."""
+ENOUGH, SURE = 3.2, 4.0
+"""Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _ITERATIONS = (12, 8)
 _STOP = 0.08
 """rad that a lifted leg keeps from the stops of its joints."""
-_STEP = (0.5, -0.1, 0.0, 0.55, 0.0, 0.0)
+_STEPS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0.8, -0.2, 0.0, 0.9, 0.0, 0.0))
 """rad by which hip, knee and ankle of a leg bend on the way of a lifted foot, and it goes away from the other one."""
 
 
-def plain_move(task: Task, lost: Callable[[Move], str]) -> Move:
-    """Return the move of ``task`` in which nothing goes out of its way that need not, and of which imprecise people do
-    not lose a limit (``lost`` names it, "" if none); if none keeps all limits, the one that violates least.
+def plain_move(task: Task, room: Callable[[Move], tuple[float, str]]) -> tuple[Move, float]:
+    """Return the move of ``task`` in which nothing goes out of its way that need not, and by how many deviations
+    imprecise people keep its limits (``room``, and of which limit); if none keeps all limits, the one that violates
+    least.
     """
     tried, eased = [], {limit.name for limit in task.limits if limit.mended_by_slowness}
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
-        ways = [slow.straight(), *([_stepping(slow)] if len(task.stance.planted) == 1 else [])]
-        tried.append(min((_copied(evaluate_move(slow, way)[0], lost) for way in ways), key=_badness))
-        if tried[-1].violation == 0 or tried[-1].limit not in eased:
+        tried.append(_roomiest((evaluate_move(slow, way)[0] for way in _shapes(slow)), room))
+        if tried[-1][0].violation == 0 or tried[-1][0].limit not in eased:
             break
-    best = min(tried, key=_badness)
-    if best.violation == 0 or task.stance.seat:
+    best = min(tried, key=lambda one: one[0].violation)
+    if best[0].violation == 0 or task.stance.seat:
         return best
-    return _copied(_round(replace(task, duration=best.duration), best), lost)
+    return _roomiest([_round(replace(task, duration=best[0].duration), best[0])], room)
 
 
-def _badness(move: Move) -> tuple[float, bool]:
-    return move.violation, bool(move.limit)
+def other_ways(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
+    """Yield moves of ``task`` that keep all limits and differ from the ``last`` one, which takes as long, or less where
+    they are to be ``slower``.
+    """
+    for factor in (factor for factor in _SLOWER if (factor * task.duration > last.duration + 1e-9) == slower):
+        slow = replace(task, duration=factor * task.duration)
+        for via in _shapes(slow):
+            move = evaluate_move(slow, via)[0]
+            if not move.limit and (slower or not np.allclose(via, last.via)):
+                yield move
 
 
-def _copied(move: Move, lost: Callable[[Move], str]) -> Move:
-    """Return the move with the limit of which imprecise people leave too little, where the exact one keeps all."""
-    return move if move.limit else replace(move, limit=lost(move))
+def _shapes(task: Task) -> list[Array]:
+    """Return the ways (2, n) that are tried: straight on, on one leg also by steps that are higher or wider."""
+    steps = _STEPS if len(task.stance.planted) == 1 else ()
+    return [task.straight(), *(_stepping(task, step) for step in steps)]
 
 
-def _stepping(task: Task) -> Array:
-    """Return the via points (2, n) of a straight move on which the free leg is lifted, within its joints' ranges."""
+def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) -> tuple[Move, float]:
+    """Return the first move that keeps all limits and that imprecise people `SURE`ly keep, too, or else the one that
+    leaves them most, with the limit of which it is too little, and by how many deviations; if none keeps all limits,
+    the one that violates least.
+    """
+    tried, best, most = list[Move](), None, -np.inf
+    for move in moves:
+        tried.append(move)
+        if not move.limit:
+            found, limit = room(move)
+            if best is None or found > most:
+                best, most = replace(move, limit=limit if found < ENOUGH else ""), found
+            if found > SURE:
+                break
+    return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)
+
+
+def _stepping(task: Task, step: tuple[float, ...]) -> Array:
+    """Return the via points (2, n) of a straight move on which the free leg takes the ``step``, within its joints'
+    ranges.
+    """
     via, limits = task.straight(), task.chain.body.limits
     for side in {0, 1} - set(task.stance.planted):
         columns = np.array(task.chain.leg_columns[side])
         low, high = limits.lower[columns - ROOT] + _STOP, limits.upper[columns - ROOT] - _STOP
-        via[:, columns] = np.clip(via[:, columns] + _STEP, np.minimum(low, via[:, columns]), high)
+        via[:, columns] = np.clip(via[:, columns] + step, np.minimum(low, via[:, columns]), high)
     return via
 
 

@@ -2,21 +2,23 @@
 
 Every step takes, of all postures within reach of the last one - at most so many instructions away, or its mirror image
 - the one that tells most per second (`selection`), where an instruction costs time, too: the price of `simplicity`.
-What a posture must keep it keeps also for people who copy it imprecisely (`catalogue`).
+Where the feet must change, only postures count from which they can in time (`reach`). What a posture must keep it keeps
+also for people who copy it imprecisely (`catalogue`).
 """
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import islice, pairwise
 
 import numpy as np
 
-from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.dance import Dance
-from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.plain import plain_move
-from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
-from biodance.dance.performers import lost_by_copies
-from biodance.dance.postures.selection import learned
+from biodance.dance.followable.naming import name_of
+from biodance.dance.followable.plain import ENOUGH, SURE, plain_move
+from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
+from biodance.dance.performers import deviations_of_copies
+from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
@@ -26,40 +28,32 @@ from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array
 
-_PARTS = 2
-"""Parts of the body that change at a time."""
 _INSTRUCTION = 0.5
 """s that one instruction is worth at simplicity 1."""
-_FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
-"""N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
+_WAYS_ON = 5
+"""Postures that are tried after another one before that one is given up."""
+_AT_ONCE = 12
+"""Postures of which one that imprecise people surely can is taken before others that tell more."""
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of a move at which imprecise people must have room, too."""
 _LIFTING = 1.4
 """Times as long as others that a move takes in which a foot is lifted or put down."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
+_SHORT = 1.0
+"""s that postures in between are held."""
 
 
-@dataclass(frozen=True, eq=False)
-class DanceStep:
-    """Posture ``s`` of a ``catalogue``, what is ``said`` on the way to it; ``mirror`` True for the last one's image."""
+class NoWay(BiodanceError):
+    """No posture follows on the feet ``stances[number]``; ``stance``, of what is danced, needs that change of feet."""
 
-    catalogue: Catalogue
-    s: int
-    said: tuple[str, ...]
-    mirror: bool = False
-
-    @property
-    def x(self) -> Array:
-        """(n,) coordinates."""
-        return np.asarray(self.catalogue.x[self.s])
-
-    @property
-    def words(self) -> dict[str, Word]:
-        """The word of every part."""
-        return self.catalogue.chosen(self.s)
+    def __init__(self, message: str, stances: tuple[Stance, ...], number: int) -> None:
+        super().__init__(message)
+        before, after = stances[:number][-1:], [one for one in stances[number:] if one.over is None]
+        alone = [one for one in before if len(one.planted) == 1 and stances[number].over is not None]
+        self.stance = (alone or after or stances[:1])[0].name
 
 
 @dataclass(eq=False)
@@ -73,93 +67,114 @@ class _Place:
 
 @dataclass(eq=False)
 class Walk:
-    """The search for one dance: what was worked out is kept, so that another round with other ``banned`` postures
-    (feet, number: the limit that somebody broke there) costs little.
-    """
+    """The search for one dance; what was worked out is kept, so that another look costs little."""
 
     work: DesignContext
-    banned: dict[tuple[str, int], str] = field(default_factory=dict)
-    _catalogues: dict[str, Catalogue] = field(default_factory=dict)
-    _broken: dict[tuple[str, int], str] = field(default_factory=dict)
-    _moves: dict[tuple[bytes, bytes], Move] = field(default_factory=dict)
+    _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
+    _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         chain, plan = self.work.chain, self.work.plan
-        self.words, self.factor = read_vocabulary(), prior_factor(chain.body.sip)
+        self.reach = Reach(self.work, self._can)
+        self.factor = prior_factor(chain.body.sip)
         before = np.sum(self.factor**2, axis=1)
         weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
         self.scale = self.factor * np.sqrt(weight / np.where(before > 0, before, 1.0))[:, None]
-        self.samples = rest_to_rest(plan.move, via=0, rate=_RATE)
+        self.samples = rest_to_rest(plan.move, via=0, rate=SAMPLE_RATE)
 
     def take(self, stances: tuple[Stance, ...]) -> tuple[list[DanceStep], list[Move]]:
         """Return one step for each of ``stances`` and the moves between them.
 
         Raises
         ------
-        BiodanceError
+        NoWay
             From some posture no other one can be reached; the message names the limit that most of them break.
         """
-        path = [_Place(None, np.eye(self.factor.shape[1]))]
-        why: dict[str, int] = {}
+        self._check_feet(stances)
+        path, farthest = [_Place(None, np.eye(self.factor.shape[1]))], 0
+        why: dict[int, dict[str, int]] = {}
         for _ in range(_TRIES):
-            number, taken = len(path) - 1, [place.taken for place in path[1:]]
+            number, steps = len(path) - 1, [place.taken[0] for place in path[1:]]
             if number == len(stances):
-                return [step for step, _ in taken], [move for _, move in taken if move is not None]
+                return steps, [move for _, move in (place.taken for place in path[1:]) if move is not None]
+            farthest = max(farthest, number)
             self.work.tell("postures", number, len(stances))
-            steps = [step for step, _ in taken]
-            path[-1].left = path[-1].left or self._possible(steps, stances[number], path[-1].belief, why)
+            if path[-1].left is None:
+                broken = why.setdefault(number, {})
+                path[-1].left = islice(self.possible(steps, stances, path[-1].belief, broken), _WAYS_ON)
             found = next(path[-1].left, None)
             if found is not None:
-                Z = learned(path[-1].belief, self._told(steps[-1] if steps else None, found[0]))
-                path.append(_Place(None, path[-1].belief - Z.T @ Z, found))
+                path.append(_Place(None, self.belief_after(path[-1].belief, steps, found[0]), found))
             elif number:
                 path.pop()
             else:
                 break
-        raise BiodanceError(self._stuck(stances[max(0, len(path) - 1)], len(path) - 1, why))
+        raise NoWay(self._stuck(stances[farthest], farthest, why.get(farthest, {})), stances, farthest)
+
+    def _check_feet(self, stances: tuple[Stance, ...]) -> None:
+        """Raise `NoWay` where this body cannot change feet in any posture of trunk and legs."""
+        for number, pair in enumerate(pairwise(stances), start=1):
+            if feet_key(pair[0]) == feet_key(pair[1]):
+                continue
+            was, now = (self.reach.catalogue(stance) for stance in pair)
+            if self.reach.steps_to(was, now).min() >= UNREACHABLE:
+                limits = [move.limit for move, _ in self._moves.values() if move.limit]
+                raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
     def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
         """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
         steps, belief = list[DanceStep](), np.eye(self.factor.shape[1])
         for number, stance in enumerate(stances):
-            step = next((one for one in self._ranked(steps, stance, belief) if not self._wrong(one)), None)
+            step = next((one for one in self._ranked(steps, stances, belief) if not self._kept(one)[1]), None)
             if step is None:
-                raise BiodanceError(self._stuck(stance, number, {}))
-            Z = learned(belief, self._told(steps[-1] if steps else None, step))
-            belief = belief - Z.T @ Z
+                raise NoWay(self._stuck(stance, number, {}), stances, number)
+            belief = self.belief_after(belief, steps, step)
             steps.append(step)
         return steps
 
-    def _possible(
-        self, steps: list[DanceStep], stance: Stance, belief: Array, why: dict[str, int]
+    def belief_after(self, belief: Array, steps: list[DanceStep], step: DanceStep) -> Array:
+        """Return what is believed (k, k) when ``step`` follows on ``steps``, before whom it was ``belief``."""
+        Z = learned(belief, self._told(steps[-1] if steps else None, step))
+        return np.asarray(belief - Z.T @ Z)
+
+    def possible(
+        self, steps: list[DanceStep], stances: tuple[Stance, ...], belief: Array, why: dict[str, int]
     ) -> Iterator[tuple[DanceStep, Move | None]]:
-        """Yield the postures that follow on these feet with the move to them, the best first; ``why`` counts the limits
-        that others break.
+        """Yield the postures that follow with the move to them, the best first, of a handful those first that imprecise
+        people surely can; ``why`` counts the limits that others break.
         """
-        last = steps[-1] if steps else None
-        for step in self._ranked(steps, stance, belief):
-            move = None if last is None or self._wrong(step) else self._move(last, step)
-            broken = self._wrong(step) or (move.limit if move is not None else "")
-            if not broken:
-                yield step, move
-            else:
-                why[broken] = why.get(broken, 0) + 1
+        last, ranked = steps[-1] if steps else None, self._ranked(steps, stances, belief)
+        while some := list(islice(ranked, _AT_ONCE)):
+            doubtful = list[tuple[float, DanceStep, Move | None]]()
+            for step in some:
+                room, broken, move = *self._kept(step), None
+                if last is not None and not broken:
+                    move, least = self._way(last, step)
+                    room, broken = min(room, least), move.limit
+                if broken:
+                    why[broken] = why.get(broken, 0) + 1
+                elif room >= SURE:
+                    yield step, move
+                else:
+                    doubtful.append((room, step, move))
+            yield from ((step, move) for _, step, move in sorted(doubtful, key=lambda one: -one[0]))
 
     def _stuck(self, stance: Stance, number: int, why: dict[str, int]) -> str:
         most = max(why, key=lambda name: why[name]).replace("_", " ") if why else "number of instructions"
         return (
             f"No posture {stance.name.replace('_', ' ')} can be reached from posture {number}: most of those within "
-            f"{self.work.plan.instructions:g} instructions exceed the limit on {most}. Try another seed, which "
-            f"draws other postures; else widen that limit, allow more instructions, or leave this stance out of the "
-            f"protocol."
+            f"{self.work.plan.instructions:g} instructions exceed the limit on {most}. Widen that limit, allow more "
+            f"instructions, or leave this stance out of the protocol."
         )
 
-    def _ranked(self, steps: list[DanceStep], stance: Stance, belief: Array) -> Iterator[DanceStep]:
-        """Yield the postures within reach on these feet, the best first."""
-        catalogue = self._catalogue(stance)
+    def _ranked(self, steps: list[DanceStep], stances: tuple[Stance, ...], belief: Array) -> Iterator[DanceStep]:
+        """Yield the postures within reach on the next feet, the best first."""
+        stance, catalogue = stances[len(steps)], self.reach.catalogue(stances[len(steps)])
         last = steps[-1] if steps else None
-        used = {step.s for step in steps if step.catalogue is catalogue}
-        found = [step for step in self._reach(last, catalogue) if step.s not in used]
+        used, late = {step.s for step in steps if step.catalogue is catalogue}, self._late(len(steps), stances)
+        found = [step for step in self.reach.after(last, catalogue) if step.s not in used and not late[step.s]]
+        if not found:
+            return
         if stance.over is not None:
             yield from sorted(found, key=lambda step: (len(step.said), step.s))
             return
@@ -174,69 +189,46 @@ class Walk:
         yield from (first[k] for k in np.argsort(-np.array(worth), kind="stable"))
         yield from (found[k] for k in order[_LOOKED_AT:])
 
+    def _late(self, number: int, stances: tuple[Stance, ...]) -> Array:
+        """Return which postures (S,) in place ``number`` cannot be undone before the feet must change."""
+        catalogue = self.reach.catalogue(stances[number])
+        left = next((k for k, one in enumerate(stances[number:]) if feet_key(one) != feet_key(stances[number])), 0)
+        if not left or np.isinf(self.work.plan.instructions):
+            return np.zeros(len(catalogue.index), dtype=bool)
+        return np.asarray(self.reach.steps_to(catalogue, self.reach.catalogue(stances[number + left])) > left)
+
     def _seconds(self, steps: list[DanceStep]) -> Array:
         """Return what each step costs, s."""
         plan = self.work.plan
         return np.array([plan.move + plan.hold + _INSTRUCTION * plan.simplicity * len(step.said) for step in steps])
 
-    def _reach(self, last: DanceStep | None, catalogue: Catalogue) -> Iterator[DanceStep]:
-        """Yield all postures of a catalogue that can be reached from the last one within the instructions."""
-        body, most = self.work.chain.body, self.work.plan.instructions
-        if np.isinf(most):
-            yield from (DanceStep(catalogue, s, ()) for s in range(len(catalogue.index)))
-            return
-        zero = np.zeros(self.work.chain.size)
-        mirror = catalogue.mirrored[last.s] if last is not None and last.catalogue is catalogue else -1
-        for s in self._near(last, catalogue):
-            before, feet = (zero, None) if last is None else (last.x, last.catalogue.stance)
-            said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
-            if s == mirror:
-                yield DanceStep(catalogue, s, MIRROR_CALL, mirror=True)
-            elif len(said) <= most:
-                yield DanceStep(catalogue, s, said)
+    def _kept(self, step: DanceStep) -> tuple[float, str]:
+        """Return by how many deviations imprecise people keep a posture, and the limit that they break, "" if none."""
+        if step.key not in self._held:
+            found, limit = step.catalogue.keeps(step.s, self.work.plan.limits)
+            self._held[step.key] = found, limit if found < ENOUGH else ""
+        return self._held[step.key]
 
-    def _near(self, last: DanceStep | None, catalogue: Catalogue) -> list[int]:
-        """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
-        was = {part: word.key for part, word in last.words.items()} if last is not None else {}
-        off = np.zeros(len(catalogue.index), dtype=int)
-        for column, part in enumerate(catalogue.parts):
-            keys = np.array([word.key for word in catalogue.words[part]])[catalogue.index[:, column]]
-            off += keys != was.get(part, catalogue.words[part][0].key)
-        near = np.flatnonzero(off <= _PARTS).tolist()
-        if last is not None and last.catalogue is catalogue and catalogue.mirrored[last.s] >= 0:
-            near = sorted({*near, int(catalogue.mirrored[last.s])})
-        return near
+    def _can(self, last: DanceStep, step: DanceStep) -> bool:
+        return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
 
-    def _catalogue(self, stance: Stance) -> Catalogue:
-        key = _feet(stance)
-        if key not in self._catalogues:
-            rng = np.random.default_rng([self.work.seed, 6])
-            chain, plan = self.work.chain, self.work.plan
-            self._catalogues[key] = Catalogue.of(chain, stance, words_for(chain.body, plan, stance, self.words, rng))
-        return self._catalogues[key]
+    def move(self, last: DanceStep, step: DanceStep) -> Move:
+        """Return the move from one step to the next, as `plain_move` finds it."""
+        return self._way(last, step)[0]
 
-    def key(self, step: DanceStep) -> tuple[str, int]:
-        """Return what a posture is known by in ``banned``."""
-        return _feet(step.catalogue.stance), step.s
-
-    def _wrong(self, step: DanceStep) -> str:
-        key = self.key(step)
-        if key in self.banned:
-            return self.banned[key]
-        if key not in self._broken:
-            self._broken[key] = step.catalogue.keeps(step.s, self.work.plan.limits)
-        return self._broken[key]
-
-    def _move(self, last: DanceStep, step: DanceStep) -> Move:
+    def _way(self, last: DanceStep, step: DanceStep) -> tuple[Move, float]:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
-            feet, plan = under(last.catalogue.stance, step.catalogue.stance), self.work.plan
-            stances = (last.catalogue.stance, step.catalogue.stance)
-            slow = _LIFTING if stances[0].planted != stances[1].planted else 1.0
-            ends, duration = np.array([last.x, step.x]), slow * plan.move
-            task = Task(self.work.chain, self.work.blocks, feet, ends, duration, plan.limits)
-            self._moves[key] = plain_move(task, lambda move: _lost(task, stances, move))
+            task, stances = self.task(last, step), (last.catalogue.stance, step.catalogue.stance)
+            self._moves[key] = plain_move(task, lambda move: _room(task, stances, move))
         return self._moves[key]
+
+    def task(self, last: DanceStep, step: DanceStep) -> Task:
+        """Return what a move from one step to the next must do."""
+        work, (was, now) = self.work, (last.catalogue.stance, step.catalogue.stance)
+        slow = _LIFTING if was.planted != now.planted else 1.0
+        ends, duration = np.array([last.x, step.x]), slow * work.plan.move
+        return Task(work.chain, work.blocks, under(was, now), ends, duration, work.plan.limits)
 
     def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
@@ -247,13 +239,14 @@ class Walk:
         parts = [
             part[1:-1] @ ends for part in (self.samples.position, self.samples.velocity, self.samples.acceleration)
         ]
-        W = regressor(chain.body, chain.motion(np.arange(len(parts[0])) / _RATE, *parts))
+        W = regressor(chain.body, chain.motion(np.arange(len(parts[0])) / SAMPLE_RATE, *parts))
         return np.concatenate([still, self._white(np.asarray(W).reshape(1, -1, W.shape[-1]))[0]])
 
     def _white(self, W: Array) -> Array:
         """Return regressors (G, 6 T, 10 N) per standard deviation of error and of the table, (G, 6 T, k)."""
-        error = np.tile(np.repeat([_FORCE, _MOMENT], 3), W.shape[1] // 6)
-        return np.asarray((W / error[:, None]) @ self.factor)
+        error = np.tile(SAMPLE_ERROR, W.shape[1] // 6)
+        flat = (W / error[:, None]).reshape(-1, W.shape[2]) @ self.factor  # one product: many small ones are slow
+        return np.asarray(flat.reshape(*W.shape[:2], -1))
 
     def _gains(self, belief: Array, rows: Array, cost: Array) -> Array:
         """Return what each of ``rows`` (G, m, k) tells per second."""
@@ -263,48 +256,21 @@ class Walk:
         return np.asarray(np.sum((Z @ self.scale.T) ** 2, axis=(1, 2)) / cost)
 
 
-def _feet(stance: Stance) -> str:
-    return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
-
-
-def _lost(task: Task, stances: tuple[Stance, Stance], move: Move) -> str:
-    """Return the limit of which imprecise people leave too little on the way, "" if none."""
+def _room(task: Task, stances: tuple[Stance, Stance], move: Move) -> tuple[float, str]:
+    """Return what imprecise people leave on the way, as `deviations_of_copies` does."""
     still, time = np.ones(2), np.array([move.duration])
     way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
-    return lost_by_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
+    return deviations_of_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
 
 
-def name_of(step: DanceStep) -> str:
-    """Return what a posture is called: the words of all parts that do not rest; of arms that do the same, once."""
-    words = step.words
-    out = []
-    for part, word in words.items():
-        if part.endswith("_arm") or part.endswith("_hanging"):
-            continue
-        if not word.rest or part.endswith("_lifted"):
-            out.append(word.text)
-    for kind in ("arm", "hanging"):
-        pair = [words[f"{side}_{kind}"] for side in ("right", "left") if f"{side}_{kind}" in words]
-        out += _pair_words(pair)
-    return ", ".join(out) or ("sit" if "right_hanging" in words else "stand")
-
-
-def _pair_words(pair: list[Word]) -> list[str]:
-    if not pair or all(word.rest for word in pair):
-        return []
-    if pair[0].key == pair[1].key:
-        return [pair[0].text.format("both")]
-    sides = zip(("the right", "the left"), pair, strict=True)
-    return [_one(word.text.format(side)) for side, word in sides if not word.rest]
-
-
-def _one(text: str) -> str:
-    for many, one in (
-        ("arms", "arm"),
-        ("forearms", "forearm"),
-        ("elbows", "elbow"),
-        ("legs", "leg"),
-        ("thighs", "thigh"),
-    ):
-        text = text.replace(f"{many} ", f"{one} ", 1)
-    return text
+def walked_dance(work: DesignContext, steps: list[DanceStep], moves: list[Move]) -> Dance:
+    """Return the dance of ``steps`` and the ``moves`` between them."""
+    plan, x = work.plan, np.array([step.x for step in steps])
+    stances = tuple(step.catalogue.stance for step in steps)
+    hold = np.array([plan.hold if stance.over is None else min(_SHORT, plan.hold) for stance in stances])
+    feet = tuple(under(*pair) for pair in pairwise(stances))
+    via = np.array([move.via for move in moves]).reshape(-1, 2, x.shape[1])
+    duration, names = np.array([move.duration for move in moves]), tuple(name_of(step) for step in steps)
+    dance = Dance(plan.name, work.chain.body, x, stances, hold, via, duration, feet, work.seed)
+    mirrored = tuple(p for p, step in enumerate(steps) if step.mirror)
+    return replace(dance, names=names, mirrored=mirrored)

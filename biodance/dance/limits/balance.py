@@ -9,7 +9,6 @@ import numpy as np
 from biodance.dance.limits import CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
-from biodance.motion.dynamics import zmp
 from biodance.records import Array
 
 
@@ -47,7 +46,7 @@ class Balance(Limit):
         """Return the distance (T, 1) m inside the reduced base, drawn from where the soles really are, of all feet that
         may bear all.
         """
-        point, soles = zmp(motion.wrench)[:, :2], [sole[0, :, :2] for sole in motion.soles]
+        point, soles = motion.wrench.cop()[:, :2], [sole[0, :, :2] for sole in motion.soles]
         corners = [np.concatenate([*(soles[side] for side in base), motion.stance.props]) for base in motion.bases]
         least = np.min([_inside(point, some, self.share) for some in corners], axis=0)
         return Remaining(least[:, None], (motion.stance.name,))

@@ -20,9 +20,9 @@ from biodance.identification.posterior import prior_factor
 from biodance.motion.regressor import regressor
 from biodance.records import Array
 
-_FORCE, _MOMENT = 8.0, 4.0
+SAMPLE_ERROR = np.array([8.0, 8.0, 8.0, 4.0, 4.0, 4.0])
 """N, N·m: error of one independent sample of the wrench of a person (residual of the paper: 7.8 N, 4.3 N·m)."""
-_RATE = 4.0
+SAMPLE_RATE = 4.0
 """Hz: independent samples per second of moving."""
 
 
@@ -91,7 +91,7 @@ class _Told:
 
     def __init__(self, chain: Chain, x: Array, stances: tuple[str, ...], move: float, S: Array) -> None:
         self.chain, self.x, self.stances, self.S = chain, x, stances, S
-        samples = rest_to_rest(move, via=0, rate=_RATE)
+        samples = rest_to_rest(move, via=0, rate=SAMPLE_RATE)
         self.parts = [part[1:-1] for part in (samples.position, samples.velocity, samples.acceleration)]
         self.still = self._white(x[:, None], *np.zeros((2, len(x), 1, x.shape[1])))
         self.ways: dict[int, dict[int, Array]] = {}
@@ -114,7 +114,7 @@ class _Told:
         """Return the rows (G, 6 T, k) of G stretches of T samples."""
         flat = [part.reshape(-1, x.shape[2]) for part in (x, v, a)]
         W = (
-            regressor(self.chain.body, self.chain.motion(np.arange(len(flat[0])) / _RATE, *flat))
-            / np.repeat([_FORCE, _MOMENT], 3)[:, None]
+            regressor(self.chain.body, self.chain.motion(np.arange(len(flat[0])) / SAMPLE_RATE, *flat))
+            / SAMPLE_ERROR[:, None]
         )
         return W.reshape(len(x), -1, W.shape[2]) @ self.S

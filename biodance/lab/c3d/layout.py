@@ -264,9 +264,7 @@ def _analog_transform(
         held = np.array(values[:channels], dtype=float)
         whole[: held.size] = np.where(np.isfinite(held), held, np.nan)
         filled.append(whole)
-        lacking = [str(c + 1) for c in np.flatnonzero(np.isnan(whole))] + [
-            str(c + 1) for c in range(held.size, channels)
-        ]
+        lacking = [str(c + 1) for c in (*np.flatnonzero(np.isnan(whole)), *range(held.size, channels))]
         if lacking:
             how = "have no numbers" if name == "SCALE" else "have the offset 0"
             notes.append(f"ANALOG:{name} has {held.size} values for {channels} channels: {_listed(lacking)} {how}.")

@@ -1,4 +1,4 @@
-"""The header and the parameter section of a C3D file, byte by byte: read trusting nothing, and written.
+"""The header and the parameter section of a C3D file, byte by byte, read trusting nothing.
 
 Layout: header of 512 bytes; parameter section of groups and parameters, each ``name length, group id, name, offset to
 the next record``; data section. Three byte orders: Intel (84), DEC (85) and SGI/MIPS (86). Source: C3D user guide
@@ -6,15 +6,15 @@ the next record``; data section. Three byte orders: Intel (84), DEC (85) and SGI
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from biodance.errors import BiodanceError, FileRefused
+from biodance.errors import FileRefused
 
 C3D_BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
@@ -27,11 +27,6 @@ RESAVE = "Export the trial again from the recording software, or copy the file a
 
 ParameterValue = NDArray[Any] | list[str]
 Parameters = Mapping[str, Mapping[str, ParameterValue]]
-FileValue = str | Sequence[str] | ArrayLike
-FileParameters = Mapping[str, Mapping[str, FileValue]]
-
-_MOST = 255
-"""The longest dimension of a parameter: one byte tells it."""
 
 
 @dataclass(frozen=True)
@@ -258,64 +253,3 @@ def _text(row: bytes) -> str:
         return row.decode("utf-8").strip()
     except UnicodeDecodeError:
         return row.decode("latin-1").strip()
-
-
-def parameter_section(groups: FileParameters) -> bytes:
-    """Return the section: 4 bytes of header, every group with its parameters, padded to whole blocks.
-
-    Text becomes a character array, whole numbers within 16 bits become integers, other numbers 32-bit floats; arrays
-    keep their dimensions, first one fastest. Lists of more than 255 strings or numbers continue in NAME2, NAME3 ...
-
-    Raises
-    ------
-    BiodanceError
-        A value has a form that C3D cannot store, or the section grows beyond 255 blocks.
-    """
-    records = []
-    for number, (group, values) in enumerate(groups.items(), start=1):
-        records.append(_record_bytes(group, -number, b""))
-        for name, value in values.items():
-            for part, (tail, piece) in enumerate(_pieces(value, f"{group}:{name}")):
-                records.append(_record_bytes(f"{name}{part + 1}" if part else name, number, tail + piece))
-    body = b"".join(records) + b"\0\0"
-    blocks = -(-(len(body) + 4) // C3D_BLOCK)
-    if blocks > _MOST:
-        raise BiodanceError(
-            f"The parameters need {blocks} blocks of 512 bytes, a C3D file has room for {_MOST}. Store fewer "
-            f"parameters."
-        )
-    return (bytes([1, 0x50, blocks, INTEL]) + body).ljust(blocks * C3D_BLOCK, b"\0")
-
-
-def _record_bytes(name: str, group: int, data: bytes) -> bytes:
-    """Return one record without a description; ``group`` < 0 defines a group, > 0 puts a parameter into it."""
-    raw = name.encode("ascii")
-    return bytes([len(raw), group & 0xFF]) + raw + (len(data) + 3).to_bytes(2, "little") + data + b"\0"
-
-
-def _pieces(value: FileValue, what: str) -> list[tuple[bytes, bytes]]:
-    """Return (type and dimensions, data) of a value, in pieces of at most 255 entries."""
-    if isinstance(value, str):
-        raw = value.encode()[:_MOST]
-        return [(bytes([0xFF, 1, len(raw)]), raw)]
-    if isinstance(value, Sequence) and all(isinstance(entry, str) for entry in value):
-        rows = [str(entry).encode()[:_MOST] for entry in value]
-        width = max((len(row) for row in rows), default=0)
-        parts = [rows[i : i + _MOST] for i in range(0, len(rows), _MOST)] or [[]]
-        return [(bytes([0xFF, 2, width, len(part)]), b"".join(row.ljust(width) for row in part)) for part in parts]
-    array = np.asarray(value)
-    if array.dtype.kind not in "iuf" or array.ndim > 7 or (array.ndim > 1 and max(array.shape) > _MOST):
-        raise BiodanceError(
-            f"Parameter {what} has values of type {array.dtype} and shape {array.shape}; text or numbers are legal."
-        )
-    if array.ndim <= 1:
-        flat = np.atleast_1d(array)
-        return [_number_piece(flat[i : i + _MOST]) for i in range(0, flat.size, _MOST)] or [_number_piece(flat)]
-    return [_number_piece(array)]
-
-
-def _number_piece(array: np.ndarray[Any, Any]) -> tuple[bytes, bytes]:
-    whole = array.dtype.kind in "iu" and (array.size == 0 or -32768 <= array.min() <= array.max() <= 32767)
-    shape = b"" if array.shape == (1,) else bytes(array.shape)
-    data = array.astype("<i2" if whole else "<f4").tobytes(order="F")
-    return bytes([2 if whole else 4, len(shape)]) + shape, data

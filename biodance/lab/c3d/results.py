@@ -19,9 +19,9 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.layout import texts
-from biodance.lab.c3d.parameters import FileValue
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.read import file_frame
+from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import write_new
 from biodance.records import Array, frozen_array
 

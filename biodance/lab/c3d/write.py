@@ -1,15 +1,22 @@
 """Write a recording as a C3D file: Intel byte order, floats, mm, N, N·mm, V."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d.parameters import C3D_BLOCK, FileParameters, FileValue, parameter_section
+from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
 from biodance.records import Array, Markers, frozen_array
 
+FileValue = str | Sequence[str] | ArrayLike
+FileParameters = Mapping[str, Mapping[str, FileValue]]
+
+_MOST = 255
+"""The longest dimension of a parameter: one byte tells it."""
 _MM = 1000.0
 CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
 """What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""
@@ -112,8 +119,8 @@ def write_c3d(
     }
     for group, values in (parameters or {}).items():
         groups.setdefault(group, {}).update(values)
-    groups["POINT"]["DATA_START"] = 2 + len(parameter_section(groups)) // C3D_BLOCK
-    section = parameter_section(groups)
+    groups["POINT"]["DATA_START"] = 2 + len(_parameter_section(groups)) // C3D_BLOCK
+    section = _parameter_section(groups)
     header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
     data = (
         np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1)
@@ -232,3 +239,61 @@ def _header(points: Array, analog: Array, samples: int, first_frame: int, rate: 
     head = bytes([2, 0x50]) + np.array(words, dtype="<u2").tobytes() + np.array([-0.1], dtype="<f4").tobytes()
     tail = np.array([data_block, samples], dtype="<u2").tobytes() + np.array([rate], dtype="<f4").tobytes()
     return (head + tail).ljust(C3D_BLOCK, b"\0")
+
+
+def _parameter_section(groups: FileParameters) -> bytes:
+    """Return the section: 4 bytes of header, every group with its parameters, padded to whole blocks.
+
+    Text becomes a character array, whole numbers within 16 bits become integers, other numbers 32-bit floats; arrays
+    keep their dimensions, first one fastest. Lists of more than 255 strings or numbers continue in NAME2, NAME3 ...
+
+    Raises
+    ------
+    BiodanceError
+        A value has a form that C3D cannot store, or the section grows beyond 255 blocks.
+    """
+    records = []
+    for number, (group, values) in enumerate(groups.items(), start=1):
+        records.append(_record_bytes(group, -number, b""))
+        for name, value in values.items():
+            for part, (tail, piece) in enumerate(_pieces(value, f"{group}:{name}")):
+                records.append(_record_bytes(f"{name}{part + 1}" if part else name, number, tail + piece))
+    body = b"".join(records) + b"\0\0"
+    blocks = -(-(len(body) + 4) // C3D_BLOCK)
+    if blocks > _MOST:
+        raise BiodanceError(f"The parameters need {blocks} blocks, a C3D file has room for {_MOST}. Store fewer.")
+    return (bytes([1, 0x50, blocks, INTEL]) + body).ljust(blocks * C3D_BLOCK, b"\0")
+
+
+def _record_bytes(name: str, group: int, data: bytes) -> bytes:
+    """Return one record without a description; ``group`` < 0 defines a group, > 0 puts a parameter into it."""
+    raw = name.encode("ascii")
+    return bytes([len(raw), group & 0xFF]) + raw + (len(data) + 3).to_bytes(2, "little") + data + b"\0"
+
+
+def _pieces(value: FileValue, what: str) -> list[tuple[bytes, bytes]]:
+    """Return (type and dimensions, data) of a value, in pieces of at most 255 entries."""
+    if isinstance(value, str):
+        raw = value.encode()[:_MOST]
+        return [(bytes([0xFF, 1, len(raw)]), raw)]
+    if isinstance(value, Sequence) and all(isinstance(entry, str) for entry in value):
+        rows = [str(entry).encode()[:_MOST] for entry in value]
+        width = max((len(row) for row in rows), default=0)
+        parts = [rows[i : i + _MOST] for i in range(0, len(rows), _MOST)] or [[]]
+        return [(bytes([0xFF, 2, width, len(part)]), b"".join(row.ljust(width) for row in part)) for part in parts]
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.ndim > 7 or (array.ndim > 1 and max(array.shape) > _MOST):
+        raise BiodanceError(
+            f"Parameter {what} has values of type {array.dtype} and shape {array.shape}; text or numbers are legal."
+        )
+    if array.ndim <= 1:
+        flat = np.atleast_1d(array)
+        return [_number_piece(flat[i : i + _MOST]) for i in range(0, flat.size, _MOST)] or [_number_piece(flat)]
+    return [_number_piece(array)]
+
+
+def _number_piece(array: np.ndarray[Any, Any]) -> tuple[bytes, bytes]:
+    whole = array.dtype.kind in "iu" and (array.size == 0 or -32768 <= array.min() <= array.max() <= 32767)
+    shape = b"" if array.shape == (1,) else bytes(array.shape)
+    data = array.astype("<i2" if whole else "<f4").tobytes(order="F")
+    return bytes([2 if whole else 4, len(shape)]) + shape, data

@@ -30,23 +30,32 @@ def distance_to_feet(cop: Array, time: Array, corners: Array, markers: Markers) 
         return None
     frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
     at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
+    point, xyz = cop[at], markers.xyz[frames]
     centre, reach = corners.mean(axis=0), float(np.linalg.norm(half_sides(corners))) + BESIDE
-    distances = []
-    for frame, sample in zip(frames, at, strict=True):
-        xyz = markers.xyz[frame]
-        near = (np.abs(xyz[:, 2] - centre[2]) <= LOW) & (np.linalg.norm(xyz[:, :2] - centre[:2], axis=1) <= reach)
-        if np.isfinite(cop[sample]).all() and near.sum() >= 2:
-            distances.append(_distance_between(cop[sample], xyz[near, :2]))
-    return float(np.median(distances)) if len(distances) >= min(5, markers.time.size) else None
+    low = np.abs(xyz[:, :, 2] - centre[2]) <= LOW
+    near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
+    told = np.isfinite(point).all(axis=1) & (near.sum(axis=1) >= 2)
+    if told.sum() < min(5, markers.time.size):
+        return None
+    point, near, feet = point[told], near[told], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[told]
+    first = np.argsort(~near, axis=1, kind="stable")[:, : near.sum(axis=1).max(), None]
+    return float(np.median(_distances_between(point, np.take_along_axis(feet, first, axis=1))))
 
 
-def _distance_between(point: Array, feet: Array) -> float:
-    """Return the distance of a point (2,) to the nearest segment between any two of ``feet`` (n, 2)."""
-    i, j = np.triu_indices(len(feet), 1)
-    start, along = feet[i], feet[j] - feet[i]
-    length = np.maximum((along**2).sum(axis=1), 1e-12)
-    share = np.clip(((point - start) * along).sum(axis=1) / length, 0, 1)
-    return float(np.linalg.norm(start + share[:, None] * along - point, axis=1).min())
+def _distances_between(points: Array, feet: Array) -> Array:
+    """Return the distance (F,) m of points (F, 2) to the nearest segment between any two of ``feet`` (F, n, 2) that are
+    there, infinity where they are not.
+    """
+    i, j = np.triu_indices(feet.shape[1], 1)
+    there = np.isfinite(feet[:, i, 0]) & np.isfinite(feet[:, j, 0])
+    frame, pair = np.nonzero(there)
+    (x, y), (to_x, to_y) = feet[frame, i[pair]].T, feet[frame, j[pair]].T
+    px, py = points[frame].T
+    ax, ay = to_x - x, to_y - y
+    share = np.clip(((px - x) * ax + (py - y) * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
+    found = np.full(there.shape, np.inf)
+    found[frame, pair] = np.hypot(x + share * ax - px, y + share * ay - py)
+    return found.min(axis=1)
 
 
 UNDER_THE_FOOT, NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted

@@ -2,6 +2,8 @@
 decision is a sentence.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.errors import TrialRefused
@@ -14,12 +16,14 @@ from biodance.lab.plates.signs import gravity_sign
 from biodance.lab.weight import movement, steady_mass
 from biodance.records import Array, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 AS_POUNDS = 0.03
 _STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
 
 _SAME_PLACE = 0.001
 """m: standard deviation of a centre of pressure that nobody moves."""
+_HALF_ROUND = "were turned by 180 degrees"
 ReadPlates = tuple[tuple[Plate, ...], tuple[str, ...]]
 
 
@@ -122,7 +126,7 @@ def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None
     signs = [gravity_sign(r.at_surface(a)[0], a, r.rate) for r, a in zip(readings, axes, strict=True)]
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign
     votes = [sign * np.sign(a[2, 2]) for sign, a in zip(signs, axes, strict=True)]
-    plates, warnings = [], [*_two_signs(readings, votes)]
+    plates, warnings, mended = [], [], []
     for reading, sign, a in zip(readings, signs, axes, strict=True):
         otherwise = int(np.sign(sum(votes)) * np.sign(a[2, 2])) or 1
         alone = bool(sign) and sum(map(abs, signs)) == 1
@@ -131,9 +135,30 @@ def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None
         except TrialRefused as error:
             warnings.append(_left_out(reading.plate.number, error))
             continue
+        odd = bool(sign) and any(other == -sign * np.sign(a[2, 2]) for other in votes)
+        if odd and any(_HALF_ROUND in one for one in plate.decisions):
+            plate, said = _vertical_alone(plate, said)
+            mended.append(reading)
         plates.append(plate)
         warnings += said
-    return tuple(plates), tuple(warnings)
+    doubts = () if mended else _two_signs(readings, votes)
+    return tuple(plates), (*doubts, *warnings)
+
+
+def _vertical_alone(plate: Plate, warnings: tuple[str, ...]) -> tuple[Plate, tuple[str, ...]]:
+    """Return a plate of another sign than its neighbours as one whose Fz alone has the wrong sign, where its axes were
+    turned half round, too: both together turn no channel but Fz, and Mz, which is turned back here; and warnings.
+    """
+    said = (
+        "Fz alone was turned round: its sign is another one than on the other plates, and with the other channels as "
+        "they are the load lies under the feet that the markers show."
+    )
+    mirrored = wrench_about_point(plate.wrench.value, plate.centre) * [1, 1, 1, 1, 1, -1]
+    wrench = Wrench(plate.wrench.time, wrench_about_origin(mirrored, plate.centre))
+    decisions = tuple(said if _HALF_ROUND in one else one for one in plate.decisions)
+    kept = tuple(one for one in warnings if _HALF_ROUND not in one)
+    number = plate.name.removeprefix("plate")
+    return replace(plate, wrench=wrench, decisions=decisions), (*kept, f"Plate {number}: {said} Check its cabling.")
 
 
 def _left_out(number: int, error: TrialRefused) -> str:

@@ -84,7 +84,7 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     signals = calibrated(plate, channels - offsets) * factors
     sensor, vector = sensor_wrench(plate, signals, origin), surface_vector(plate, origin)
     empty = sensor_wrench(plate, calibrated(plate, offsets[None]) * factors, origin)[0, :3]
-    vector, turned = _beside(plate, sensor, vector, corners, raw.analog_rate)
+    vector, turned = vector_under_load(plate, sensor, vector, corners, raw.analog_rate)
     sensor, sense, warnings = _moments_in_sense(
         plate, sensor, vector, corners, rate=raw.analog_rate, unsure=len(unit_said) > 1
     )
@@ -172,7 +172,7 @@ def _refuse_impossible(plate: PlateParameters, sensor: Array) -> None:
         )
 
 
-def _beside(
+def vector_under_load(
     plate: PlateParameters, sensor: Array, vector: Array, corners: Array, rate: float
 ) -> tuple[Array, tuple[str, ...]]:
     """Return the vector sensor -> surface centre with x and y turned where only that puts the load on the plate, and

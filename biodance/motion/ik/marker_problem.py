@@ -1,6 +1,7 @@
 """The markers of a whole trial, and the descent of any number of its frames from given postures."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,9 +29,14 @@ class MarkerProblem:
     weight: Array
     tolerance: float
 
+    def __post_init__(self) -> None:
+        """Keep ``xyz`` as a view that nothing writes to: one type for the compiled code, whatever was given."""
+        view = self.xyz.view()
+        view.flags.writeable = False
+        object.__setattr__(self, "xyz", view)
 
-@dataclass(frozen=True, eq=False)
-class Minimum:
+
+class Minimum(NamedTuple):
     """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, largest projected gradient; ``steps``
     (B,) steps tried.
     """
@@ -46,12 +52,8 @@ class Minimum:
 
     def put(self, frames: Index, part: "Minimum") -> None:
         """Replace some frames."""
-        self.q[frames], self.cost[frames], self.slope[frames], self.steps[frames] = (
-            part.q,
-            part.cost,
-            part.slope,
-            part.steps,
-        )
+        for mine, other in zip(self, part, strict=True):
+            mine[frames] = other
 
 
 def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: float) -> MarkerProblem:
@@ -77,11 +79,9 @@ def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, ste
     q = np.array(start, order="C")
     angles = q[:, q.shape[1] - joints :]
     np.clip(angles, problem.chain.lower, problem.chain.upper, out=angles)
-    cost, slope, taken = np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp)
-    newton.minimise_frames(
-        problem.chain, problem.xyz, problem.weight, frames, q, problem.tolerance, steps, cost, slope, taken
-    )
-    return Minimum(q, cost, slope, taken)
+    found = Minimum(q, np.zeros(count), np.full(count, np.inf), np.zeros(count, dtype=np.intp))
+    newton.minimise_frames(problem.chain, problem.xyz, problem.weight, frames, found, problem.tolerance, steps)
+    return found
 
 
 def marker_distances(problem: MarkerProblem, q: Array) -> Array:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, RED
+from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.records import Array, runs
 from biodance.report.wording import format_number
 
@@ -41,8 +41,6 @@ class Stroke:
 
 MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(BLUE, "6 3"), Stroke(RED, "2 2", 1.6)
 LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
-STROKES = (Stroke(BLUE), Stroke(RED, "5 3"), Stroke(GREEN, "2 2", 1.6), Stroke(BLACK, "7 2 2 2"), Stroke(PINK, "9 3"))
-"""Of curve after curve."""
 
 
 @dataclass(frozen=True)
@@ -71,13 +69,13 @@ class Axis:
         return [(int(self.steps(value)), text) for value, text in round_ticks(self.low, self.high, count)]
 
 
-def around(values: NDArray[Any], *, least: float = 0.0, label: str = "", share: float = 0.06) -> Axis:
-    """Return an axis that holds all finite ``values`` with ``share`` of room on each side, no shorter than ``least``;
+def around(values: NDArray[Any], *, least: float = 0.0, label: str = "") -> Axis:
+    """Return an axis that holds all finite ``values`` with a little room on each side, no shorter than ``least``;
     0 to 1 where there is none.
     """
     seen = values[np.isfinite(values)]
     low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
-    half = max((0.5 + share) * (high - low), least / 2) or 0.5
+    half = max(0.56 * (high - low), least / 2) or 0.5
     return Axis((low + high) / 2 - half, (low + high) / 2 + half, label)
 
 

@@ -18,6 +18,7 @@ from biodance.lab.c3d.vertical import turn_to_z_up
 from biodance.lab.c3d.write import PlateRecording
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters, unit_factors
+from biodance.lab.plates.signals import vector_under_load
 from biodance.lab.plates.signs import gravity_sign, sensor_below
 from biodance.records import Array, Markers
 from biodance.virtual_lab.recording.laboratory import Fault, Recording
@@ -101,9 +102,10 @@ def _plates(raw: RawC3d, axes: _Axes) -> tuple[_Stored, ...]:
         signals = raw.analog[:, columns] * (factors if plate.type == 2 else 1.0)
         matrix = None if plate.calibration is None else plate.calibration * factors[:, None]
         corners = axes.lab(plate.corners)
-        origin = sensor_below(plate.origin * axes.metres, plate_axes(corners))[0]
-        recording = PlateRecording(plate.type, corners, origin, signals, calibration=matrix)
         wrench = signals if matrix is None else signals @ matrix.T
+        vector = vector_under_load(plate, wrench, plate.origin * axes.metres, corners, raw.analog_rate)[0]
+        origin = sensor_below(vector, plate_axes(corners))[0]
+        recording = PlateRecording(plate.type, corners, origin, signals, calibration=matrix)
         sign = -1.0 if gravity_sign(wrench, plate_axes(corners), raw.analog_rate) < 0 else 1.0
         out.append(_Stored(plate, factors, sign, replace(recording, channels=sign * signals)))
     return tuple(out)

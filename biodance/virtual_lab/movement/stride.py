@@ -26,7 +26,7 @@ from biodance.virtual_lab.person.person import Person
 
 STRIDE_RATE = 200.0
 """Hz of the nodes of a stride."""
-_ROUNDS, _LEARNED, _EASE = 120, 30, 0.5
+_ROUNDS, _LEARNED, _EASE = 300, 30, 0.5
 """Most rounds; rounds in which forces learn to aim; share of each correction that is made."""
 _AIM = {False: 0.57, True: 0.75}
 """Of stature, height at which the ground forces aim: the centre of mass in walking, above it in running (Maus et al.

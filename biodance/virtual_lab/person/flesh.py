@@ -8,9 +8,9 @@ rounded midpoint of Dumas & Wojtusch 2018 and de Leva 1996, so that neither tabl
 
 import numpy as np
 
-from biodance.records import Array, Sip
+from biodance.records import Array, Sip, Subject
 from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
-from biodance.virtual_lab.tolerances import stream
+from biodance.virtual_lab.tolerances import LabTolerances, stream
 
 PopulationRow = tuple[float, float, float, float, float, float, float]
 _FEMALE: dict[str, PopulationRow] = {
@@ -101,27 +101,18 @@ def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: floa
 
 
 def draw_sip(
-    size: Proportions,
-    mass: float,
-    sex: str,
-    seed: int,
-    *,
-    mass_sd: float,
-    side_sd: float,
-    shape_sd: float,
-    com_sd: float,
-    population: int | None = None,
+    size: Proportions, subject: Subject, seed: int, *, tolerances: LabTolerances, population: int | None = None
 ) -> Sip:
-    """Draw the true parameters of the 16 segments; their masses add up to ``mass`` kg exactly.
+    """Draw the true parameters of the 16 segments; their masses add up to the subject's exactly.
 
     All persons of one ``population`` differ from the midpoint of the tables alike (`_POPULATION`), None = not at all.
-    ``mass_sd`` is the relative sd of a kind of segment, common to both sides; ``side_sd`` that between right and left;
-    ``shape_sd`` that of the linear map of the shape; ``com_sd`` the sd of the CoM shift in units of the body's own
-    spread along each axis.
+    Of the ``tolerances``: ``segment_mass`` is the relative sd of a kind of segment, common to both sides; ``side_mass``
+    that between right and left; ``segment_shape`` that of the linear map of the shape; ``com`` the sd of the CoM shift
+    in units of the body's own spread along each axis.
     """
-    table = _FEMALE if sex == "F" else _MALE
+    table = _FEMALE if subject.sex == "F" else _MALE
     rng = stream(seed, "flesh")
-    factor = {kind: np.exp(mass_sd * rng.normal()) for kind in table}
+    factor = {kind: np.exp(tolerances.segment_mass * rng.normal()) for kind in table}
     if population is not None:
         common = stream(population, "population")
         factor = {kind: own * np.exp(_POPULATION * common.normal()) for kind, own in factor.items()}
@@ -132,8 +123,9 @@ def draw_sip(
         place = size[kind] * np.array(rest)
         if segment.startswith("left"):
             place[2] = -place[2]
-        heavy = percent * factor[kind] * np.exp(side_sd * rng.normal() if kind != segment else 0.0)
-        bodies.append(_stretched(true_pseudo_inertia(heavy, place[:3], place[3:]), rng, shape_sd, com_sd))
+        side = np.exp(tolerances.side_mass * rng.normal() if kind != segment else 0.0)
+        inertia = true_pseudo_inertia(percent * factor[kind] * side, place[:3], place[3:])
+        bodies.append(_stretched(inertia, rng, tolerances.segment_shape, tolerances.com))
     total = sum(J[3, 3] for J in bodies)
-    phi = np.concatenate([parameters_of_inertia(J * mass / total) for J in bodies])
+    phi = np.concatenate([parameters_of_inertia(J * subject.mass / total) for J in bodies])
     return Sip(TRUE_SEGMENTS, phi, np.zeros((phi.size, phi.size)))

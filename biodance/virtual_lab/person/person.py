@@ -121,17 +121,7 @@ def make_person(
     t = tolerances
     size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
     size = _with_joints_moved(size, joint_shifts)
-    sip = draw_sip(
-        size,
-        subject.mass,
-        subject.sex,
-        seed,
-        mass_sd=t.segment_mass,
-        side_sd=t.side_mass,
-        shape_sd=t.segment_shape,
-        com_sd=t.com,
-        population=population,
-    )
+    sip = draw_sip(size, subject, seed, tolerances=t, population=population)
     joints = build_joints(size)
     lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
     limits = JointLimits(

@@ -139,15 +139,17 @@ def centred_squares(chain, xyz, weight):
 
 
 @compiled
-def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope, taken):
-    """Move the postures q (B, nq) to minima for the markers xyz (T, K, 3) m, of ``weight`` (T, K), in ``frames`` (B,);
-    at most ``steps``.
+def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
+    """Move the postures ``found.q`` (B, nq) to minima for the markers xyz (T, K, 3) m, of ``weight`` (T, K), in
+    ``frames`` (B,), in at most ``steps``, and fill the rest of ``found``: ``cost`` (B,) m², ``slope`` (B,) m, ``steps``
+    (B,) taken.
 
-    Fills ``cost`` (B,) m², ``slope`` (B,) m and ``taken`` (B,) steps. The slope is the largest gradient over the
+    The slope is the largest gradient over the
     coordinates that no limit holds, divided by the marker weight that the coordinate moves and its lever (1, or LENGTH
     for an angle): a mean marker displacement that could still be gained; a frame stops where it falls under
     ``tolerance``.
     """
+    q, cost, slope = found.q, found.cost, found.slope
     at, nv, nq = sums_of(chain), chain.depth.shape[0], q.shape[1]
     g, x, held, new = np.empty(nv), np.empty(nv), np.zeros(nv, dtype=np.bool_), np.empty(nq)
     groups = chain.ball.shape[0]
@@ -162,7 +164,7 @@ def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope
             gradient(chain, at, g)
             held_at(chain, now, at, g, held)
             turn_balls(chain, at, g, held, cardan, turning)
-            slope[f], taken[f] = largest_slope(chain, at, g, held), step
+            slope[f], found.steps[f] = largest_slope(chain, at, g, held), step
             if slope[f] <= tolerance or step == steps:
                 break
             newton = slope[f] < _NEAR and not bent
@@ -170,7 +172,7 @@ def minimise_frames(chain, xyz, weight, frames, q, tolerance, steps, cost, slope
                 hessian(chain, at, at.below[:, 4:7], at.below[:, 7:])
             else:
                 add_up_model(chain, w, at)
-                hessian(chain, at, at.below[:, 1:4], at.model)
+                hessian(chain, at, at.below[:, 1:4], at.model[:, 0:9])  # sliced: the same type as above
             convex = factorise(chain, at, held, damping)
             x[:] = 0.0
             if convex:

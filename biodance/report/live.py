@@ -1,4 +1,6 @@
-"""The page that an operator watches while a session runs: served to this machine alone, over its loopback."""
+"""A session while it runs: the page that an operator watches, served to this machine alone, over its loopback; what is
+printed, and the document for programs.
+"""
 
 import json
 from collections.abc import Mapping
@@ -8,9 +10,94 @@ from threading import Event, Lock, Thread
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
 from biodance.diagnosis.watch import LiveWarning
 from biodance.errors import BiodanceError
-from biodance.pipeline.live import LiveState
+from biodance.pipeline.live import LiveResult, LiveState
+from biodance.report.documents.identification import ASKED
+from biodance.report.wording import format_number
+
+
+def live_document(found: LiveResult) -> dict[str, Any]:
+    """Return the content of ``biodance live --json``: times a frame in ms (processor time of the one core that is used;
+    ``wall`` by the clock, which other programs lengthen), what is known, and what was warned of.
+    """
+    one = found.identification
+    rows = [known for known in one.known if known.quantity in ASKED] if one else []
+    return {
+        "frames": found.frame_s.size,
+        "frames_used": int(found.fit.use.sum()) if found.fit else 0,
+        "frame_ms": _spread(found.frame_s) | {"wall": _spread(found.wall_s)},
+        "known": [
+            {
+                "segment": known.segment,
+                "quantity": known.quantity,
+                "unit": known.unit,
+                "value": known.value,
+                "sd": known.sd,
+                "low": known.interval[0],
+                "high": known.interval[1],
+                "verdict": known.verdict,
+            }
+            for known in rows
+        ],
+        "warnings": [_warning(said) for said in found.warnings],
+        "next": found.state.advice,
+        "cause": found.cause,
+    }
+
+
+def _spread(seconds: np.ndarray) -> dict[str, float]:
+    milliseconds = 1000 * seconds
+    return {
+        "median": float(np.median(milliseconds)),
+        "p99": float(np.percentile(milliseconds, 99)),
+        "longest": float(milliseconds.max()),
+    }
+
+
+def _warning(said: LiveWarning) -> dict[str, Any]:
+    return {"time_s": said.time_s, "effect": said.effect, "target": said.target, "text": said.text}
+
+
+def state_line(state: LiveState) -> str:
+    """Return what an operator must see now, in one line."""
+    sure = [name.replace("_", " ") for name, verdict in state.verdicts.items() if verdict == "known"]
+    known = f"known: {', '.join(sure)}" if sure else "no mass is known yet"
+    suspect = f"; SUSPECT: {' '.join(state.suspect)}" if state.suspect else ""
+    return f"{state.time:.0f} s, {known}{suspect}; next: {state.advice}"
+
+
+def warning_line(said: LiveWarning) -> str:
+    """Return a warning as one line."""
+    return f"{said.time_s:.2f} s, {said.effect} {said.target}: {said.text}"
+
+
+def print_live(found: LiveResult, document: dict[str, Any], console: Console) -> None:
+    """Print what is known of every segment, what is suspect, and what to do next."""
+    if found.identification is not None and found.identification.known:
+        table = Table("segment", "mass (kg)", "95 % interval", "verdict", box=None)
+        for row in document["known"]:
+            if row["quantity"] == "mass":
+                low, high = format_number(row["low"], 2), format_number(row["high"], 2)
+                name = row["segment"].replace("_", " ")
+                table.add_row(name, format_number(row["value"], 2), f"{low} to {high}", row["verdict"])
+        console.print(table)
+    for said in found.warnings:
+        console.print(escape(f"look: {warning_line(said)}"))
+    if found.cause:
+        console.print(escape(found.cause))
+    time = document["frame_ms"]
+    console.print(
+        f"{document['frames_used']} of {document['frames']} frames used; {time['median']:.1f} ms a frame of one core, "
+        f"99 % within {time['p99']:.1f} ms."
+    )
+    console.print(f"next: {escape(found.state.advice)}")
+
 
 _LOOPBACK = "127.0.0.1"
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'"

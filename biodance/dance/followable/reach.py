@@ -1,0 +1,135 @@
+"""Which known posture may follow on which: by what must be called, and by where the dance must go next.
+
+From the last posture others are within reach if at most so many instructions lead there and one or two parts of the
+body change, or if it is the mirror image. Whoever must change feet in so many steps (`steps_to`) is only asked for what
+can be undone until then: a trunk that is twisted and a heel that is up behind need one posture more before the foot
+is put down.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.dance.cues import MIRROR_CALL, instructions
+from biodance.dance.followable.catalogue import Catalogue
+from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.problem.stance import Stance
+from biodance.dance.transitions.context import DesignContext
+from biodance.records import Array
+
+_PARTS = 2
+"""Parts of the body that change at a time."""
+UNREACHABLE = 99
+"""Steps to feet that cannot be reached."""
+
+
+@dataclass(frozen=True, eq=False)
+class DanceStep:
+    """Posture ``s`` of a ``catalogue``, what is ``said`` on the way to it; ``mirror`` True for the last one's image."""
+
+    catalogue: Catalogue
+    s: int
+    said: tuple[str, ...]
+    mirror: bool = False
+
+    @property
+    def x(self) -> Array:
+        """(n,) coordinates."""
+        return np.asarray(self.catalogue.x[self.s])
+
+    @property
+    def words(self) -> dict[str, Word]:
+        """The word of every part."""
+        return self.catalogue.chosen(self.s)
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """What the posture is known by, on whatever way somebody came to it."""
+        return feet_key(self.catalogue.stance), self.s
+
+
+@dataclass(eq=False)
+class Reach:
+    """The postures of one design and what follows on what, worked out once; ``can`` says whether this body can go from
+    one step to another.
+    """
+
+    work: DesignContext
+    can: Callable[[DanceStep, DanceStep], bool]
+    _catalogues: dict[str, Catalogue] = field(default_factory=dict)
+    _steps: dict[tuple[str, str], NDArray[np.intp]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.words = read_vocabulary()
+
+    def catalogue(self, stance: Stance) -> Catalogue:
+        """Return all postures on the feet ``stance``."""
+        key = feet_key(stance)
+        if key not in self._catalogues:
+            rng = np.random.default_rng([self.work.seed, 6])
+            chain, plan = self.work.chain, self.work.plan
+            self._catalogues[key] = Catalogue.of(chain, stance, words_for(chain.body, plan, stance, self.words, rng))
+        return self._catalogues[key]
+
+    def after(self, last: DanceStep | None, catalogue: Catalogue) -> Iterator[DanceStep]:
+        """Yield all postures of a catalogue that may follow on the last one."""
+        if np.isinf(self.work.plan.instructions):
+            yield from (DanceStep(catalogue, s, ()) for s in range(len(catalogue.index)))
+            return
+        for s in _near(last, catalogue):
+            step = self._called(last, catalogue, s)
+            if step is not None:
+                yield step
+
+    def link(self, last: DanceStep, catalogue: Catalogue, s: int) -> DanceStep | None:
+        """Return posture ``s`` as it follows on the last one, None if it may not."""
+        return self._called(last, catalogue, s) if s in _near(last, catalogue) else None
+
+    def _called(self, last: DanceStep | None, catalogue: Catalogue, s: int) -> DanceStep | None:
+        body, most = self.work.chain.body, self.work.plan.instructions
+        if last is not None and last.catalogue is catalogue and s == catalogue.mirrored[last.s]:
+            return DanceStep(catalogue, s, MIRROR_CALL, mirror=True)
+        before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.catalogue.stance)
+        said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
+        return DanceStep(catalogue, s, said) if len(said) <= most else None
+
+    def steps_to(self, catalogue: Catalogue, goal: Catalogue) -> NDArray[np.intp]:
+        """Return how many steps (S,) lead from each posture of a catalogue to one of ``goal``, the arms at rest;
+        `UNREACHABLE` where none do.
+        """
+        key = feet_key(catalogue.stance), feet_key(goal.stance)
+        if key not in self._steps:
+            still, steps = catalogue.arms_at_rest, dict[int, int]()
+            rows = np.unique(still)
+            reached = [s for s in rows if self._follows(s, catalogue, goal, np.unique(goal.arms_at_rest))]
+            while reached:
+                steps |= dict.fromkeys(reached, 1 + max(steps.values(), default=0))
+                some = np.array([s for s in rows if s in reached])
+                reached = [s for s in rows if s not in steps and self._follows(s, catalogue, catalogue, some)]
+            self._steps[key] = np.array([steps.get(s, UNREACHABLE) for s in still])
+        return self._steps[key]
+
+    def _follows(self, s: int, catalogue: Catalogue, goal: Catalogue, some: NDArray[np.intp]) -> bool:
+        last = DanceStep(catalogue, s, ())
+        steps = (self._called(last, goal, t) for t in np.intersect1d(_near(last, goal), some))
+        return any(step is not None and (goal is catalogue or self.can(last, step)) for step in steps)
+
+
+def _near(last: DanceStep | None, catalogue: Catalogue) -> list[int]:
+    """Return the postures that differ in few parts of the body from the last one, and its mirror image."""
+    was = {part: word.key for part, word in last.words.items()} if last is not None else {}
+    off = np.zeros(len(catalogue.index), dtype=int)
+    for column, part in enumerate(catalogue.parts):
+        keys = np.array([word.key for word in catalogue.words[part]])[catalogue.index[:, column]]
+        off += keys != was.get(part, catalogue.words[part][0].key)
+    near = np.flatnonzero(off <= _PARTS).tolist()
+    if last is not None and last.catalogue is catalogue and catalogue.mirrored[last.s] >= 0:
+        near = sorted({*near, int(catalogue.mirrored[last.s])})
+    return near
+
+
+def feet_key(stance: Stance) -> str:
+    """Return what a foot configuration is known by."""
+    return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"

@@ -1,0 +1,129 @@
+"""Real sessions through the whole pipeline, each examined once: what is known of them is found, and no fault where
+there is none.
+"""
+
+import os
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from biodance.diagnosis.diagnosis import ABOUT
+from biodance.lab.session.read import read_session
+from biodance.pipeline.attention import is_well
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.front_movement import describe_movement
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import examine
+
+RATE = 100.0
+
+
+@cache
+def examined(folder: Path) -> SessionResult:
+    return examine(read_session(folder))
+
+
+def recording(name: str) -> SessionResult:
+    """Return the result of a real session, or skip where the recordings are not on this machine."""
+    folder = os.environ.get("BIODANCE_DATA")
+    if not folder:
+        pytest.skip("BIODANCE_DATA does not name the folder of real recordings")
+    return examined(Path(folder) / name)
+
+
+def examined_well(name: str) -> SessionResult:
+    """Return the result of a real session in which no step failed."""
+    result = recording(name)
+    assert [step.text for trial in result.trials for step in trial.steps if step.status == "failed"] == []
+    return result
+
+
+@pytest.mark.parametrize(("name", "declared"), [("HC030A", 45.80), ("HC032A", 60.30), ("HC038A", 56.80)])
+def test_the_weight_of_real_statics_is_the_declared_one(name, declared):
+    result = examined_well(f"biomechzoo/{name}")
+    assert result.subject.mass == pytest.approx(declared, abs=0.01)
+    assert abs(result.mass_difference) < 0.3
+    static, walk, *_ = result.trials
+    assert static.trial.role == "static"
+    assert static.fit.total_rms < 0.002
+    assert 0.3 < walk.comparison.used.sum() / RATE < 1.5
+    assert walk.comparison.correlation[3] > 0.5
+    near_what_vicon_says(describe_movement(result)[walk.name])
+
+
+def near_what_vicon_says(moved):
+    """Events and joint angles of a real walk lie where the software of its laboratory puts them."""
+    for one in moved.file_events:
+        assert one.missed <= 1
+        assert abs(one.late) < 0.025
+    limits = {"hip_flexion": (8.0, 0.95), "knee_flexion": (6.0, 0.97), "ankle_dorsiflexion": (5.0, 0.95)}
+    found = {one.joint.partition("_")[2]: one for one in moved.file_angles}
+    for joint, (offset, correlation) in limits.items():
+        assert abs(found[joint].offset) < offset, joint
+        assert found[joint].correlation > correlation, joint
+
+
+def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared():
+    result = examined_well("pycgm")
+    static, stairs = result.trials
+    assert "nobody stands on the plates" in static.reason
+    assert static.fit is not None
+    assert result.standing is None
+    assert stairs.comparison.used.sum() > 150
+    assert stairs.comparison.correlation[2] > 0.9
+
+
+def test_a_static_of_one_frame_scales_the_body():
+    result = examined_well("adl_gait")
+    assert "static trial 2014001_ST" in result.body_source
+    walk = result.trials[1]
+    assert walk.fit.total_rms < 0.025
+    assert walk.comparison.correlation.min() > 0.8
+
+
+def test_plates_alone_are_weighed():
+    result = examined_well("biomdp")
+    weights = {trial.trial.name: trial.standing.mass for trial in result.trials}
+    assert weights["kistler_COP"] == pytest.approx(666 / 9.80665, abs=0.5)
+    assert all("no markers" in trial.reason for trial in result.trials)
+
+
+def test_labels_of_no_known_set_are_guessed_and_legs_and_trunk_followed():
+    result = examined_well("c3d_parser")
+    assert {trial.trial.worn for trial in result.trials} == {"guessed"}
+    assert all(trial.fit.total_rms < 0.02 for trial in result.trials)
+    assert "the map was guessed from names and posture: " in " ".join(result.session.notes)
+    assert "carry no markers that place elbow and wrist" in " ".join(result.body.notes)
+    assert result.session.subject.mass == pytest.approx(36.3, abs=0.1)
+
+
+def test_a_real_walk_is_followed_closer_and_the_page_says_what_the_forces_make_of_it() -> None:
+    result = recording("adl_gait")
+    (walk,) = (one for one in result.trials if one.trial.role == "fit")
+    assert "forearms" in result.shown_joints.taken
+    assert walk.fit is not None
+    assert walk.fit.total_rms < 0.012  # 18.9 mm with 23 axes
+    assert result.body is not None
+    assert "vertical force" in result.body.notes[-1]
+    assert len(result.identification.identification.sip.segments) == 12  # type: ignore[union-attr]
+
+
+EXCHANGED = {
+    "HC038A": ("LWRA/LWRB", "RWRA/RWRB"),
+    "HC050A": ("LWRA/LWRB",),
+    "HC055A": ("LBHD/RBHD", "LFHD/RFHD"),
+}
+"""Truly exchanged in one walk each: finger markers on the palm, distances to elbow and within the head say so, too."""
+CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
+
+
+@pytest.mark.parametrize("name", [*(f"biomechzoo/{child}" for child in CHILDREN), "adl_gait", "pycgm"])
+def test_a_real_recording_without_fault_gets_no_name(name: str) -> None:
+    found = diagnose_session(recording(name)).diagnosis
+    said = next(one for one in found.attention if one.about == ABOUT)
+    named = {(one.effect, one.target) for one in found.findings}
+    assert named == {("labels_swapped", pair) for pair in EXCHANGED.get(name.removeprefix("biomechzoo/"), ())}
+    assert named or "what could be judged" in said.text or said.text.startswith("Cannot tell")
+    assert not is_well(found)
+    assert any(row.missed for row in found.judged) or found.doubt
