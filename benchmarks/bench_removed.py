@@ -47,10 +47,10 @@ FOREIGN = (
     ("lab_tilt", "lab_tilt", "3", "x"), ("plate_drift", "plate_drift", "15", "Mx"),
     ("external_contact", "external_contact", "30", "R"), ("body_weight_support", "body_weight_support", "", ""),
     ("clock_drift", "clock_drift", "0.03", ""), ("sloshing_load", "sloshing_load", "", ""),
-    ("head_joint", "head_joint", "15", ""), ("marker_misplaced", "marker_misplaced", "0.06", "RKNE:x"),
-    ("plate_hysteresis", "plate_hysteresis", "", ""), ("wobbling_mass", "wobbling_mass", "", ""),
+    ("head_joint", "head_joint", "15", ""), ("marker_misplaced", "marker_misplaced", "0.12", "RKNE:x"),
+    (UNKNOWN, "plate_hysteresis", "", ""), ("wobbling_mass", "wobbling_mass", "", ""),
     ("filter_mismatch", "force_filter", "3", ""), ("trunk_joint", "trunk_joint", "10", ""),
-    ("joint_centre", "joint_centre", "0.06", "hipR:x"), ("segment_length", "segment_length", "0.05", "kneeL"),
+    ("joint_centre", "joint_centre", "0.06", "hipR:x"), ("segment_length", "segment_length", "0.1", "kneeL"),
     ("marker_misplaced", "marker_moved", "0.06", "RKNE:x"), ("labels_swapped", "marker_swap", "", ""),
     ("clipping", "clipping", "", ""), (UNKNOWN, "creep", "", ""),
 )  # fmt: skip

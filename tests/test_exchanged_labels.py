@@ -12,6 +12,7 @@ from c3d_files import File, text
 from lab_sessions import person
 
 from biodance.effects import Recorded
+from biodance.effects._base.wrists import back_of_hand
 from biodance.effects.labels_swapped import exchanges, renamed
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import read_raw
@@ -21,6 +22,7 @@ from biodance.records import Markers, Session, Source, Subject, Trial
 
 HEAD = (("LFHD", "RFHD"), ("LBHD", "RBHD"))
 REAL = os.environ.get("BIODANCE_DATA")
+WRISTS = {side: (f"{side}WRA", f"{side}WRB") for side in "LR"}
 
 
 def visit(*, speed: float) -> tuple[Trial, Trial]:
@@ -42,6 +44,35 @@ def test_every_copy_gives_the_right_set(pairs: tuple, wrong: tuple) -> None:
     found = exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), trials, Path())))
     right = frozenset(tuple(sorted(pair)) for pair in pairs)
     assert found == dict.fromkeys(wrong, right)
+
+
+def bent(trial: Trial, degrees: float) -> Trial:
+    """Return the trial with the left finger's marker turned about the wrist, to the back of the hand or (below zero)
+    to the palm.
+    """
+    markers, angle = trial.markers, -np.radians(degrees)
+    along = markers["LFIN"] - (markers["LWRA"] + markers["LWRB"]) / 2
+    across = np.cross(along, markers["LWRA"] - markers["LWRB"])
+    across *= np.linalg.norm(along, axis=1, keepdims=True) / np.linalg.norm(across, axis=1, keepdims=True)
+    xyz = markers.xyz.copy()
+    xyz[:, markers.names.index("LFIN")] += (np.cos(angle) - 1) * along + np.sin(angle) * across
+    return replace(trial, markers=Markers(markers.names, markers.time, xyz))
+
+
+@pytest.mark.parametrize("wrong", [False, True])
+def test_a_wrist_exchanged_where_the_arms_do_anything_mirrors_the_static_trial(wrong: bool) -> None:
+    static, dance = (bent(one, 30.0) for one in visit(speed=0.0))
+    assert back_of_hand(static.markers, "L") > 0.4
+    dance = renamed(dance, (WRISTS["L"],)) if wrong else dance
+    found = exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), (static, dance), Path())))
+    assert found == ({"fit": frozenset({WRISTS["L"]})} if wrong else {})
+
+
+def test_a_hand_that_is_bent_to_the_palm_is_no_mirror_image() -> None:
+    static, dance = visit(speed=0.0)
+    static, dance = bent(static, 30.0), bent(dance, -70.0)
+    assert back_of_hand(dance.markers, "L") < -0.8
+    assert exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), (static, dance), Path()))) == {}
 
 
 def test_a_trial_that_is_mended_has_nothing_exchanged() -> None:
@@ -86,7 +117,6 @@ def test_real_exchanges_are_found_and_no_others(child: str, truth: dict) -> None
     assert found == truth
 
 
-WRISTS = {side: (f"{side}WRA", f"{side}WRB") for side in "LR"}
 FRONT = (("LBHD", "LFHD"), ("RBHD", "RFHD"))
 
 

@@ -190,6 +190,9 @@ def test_a_marker_that_moved_since_the_static_trial_does_not_pull_the_joints_alo
     pulled = functional_joints(scaling(), (replace(markers, xyz=xyz),))
     assert pulled.notes[-1].startswith("Warning: the marker RKNE does not count")
     assert "right knee would lie" in pulled.notes[-1]
+    knee = next(one for one in pulled.scaling.body()[0].joint_errors if one.joint == "right_knee")
+    assert knee.spared == "RKNE"
+    assert f"{1e3 * knee.moved:.0f} mm" in pulled.notes[-1]
     for joint in ("right_hip", "right_knee"):
         assert abs(pulled.moved[joint] - clean.moved[joint]) < 0.008
     assert not any("does not count" in note for note in clean.notes)

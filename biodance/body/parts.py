@@ -83,7 +83,8 @@ class JointError(NamedTuple):
     """How far the anatomical ``joint`` of a body may be from the person's, standard deviations: ``centre`` m per axis,
     ``axis`` rad of a hinge's flexion axis (0 for other joints); ``contradicted`` where the movement contradicts the
     place that the static trial gave the joint, which was ``moved`` so many m from there; ``spared`` the marker beside
-    it that has moved since the static trial and did not count in placing it, "" for none.
+    it that seems to have moved since the static trial and did not count in placing it (``moved`` is then how far the
+    joint would lie with it), "" for none.
     """
 
     joint: str

@@ -20,10 +20,10 @@ OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""
 PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
-_DRAWN, _SIGMAS = 96, 3.2
-"""Imprecise copies of an instant that are looked at, and how many deviations towards the limit, root mean square, it
-must bear.
-"""
+_DRAWN = 96
+"""Imprecise copies of an instant that are looked at."""
+_STILL = 1e-4
+"""Least deviation, in the limit's unit."""
 
 
 @dataclass(frozen=True)
@@ -123,22 +123,23 @@ def _part(posture: NDArray[np.intp], only: tuple[int, ...]) -> slice:
     return slice(max(0, inside[0] - 2), inside[-1] + 3)
 
 
-def room_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> tuple[float, str]:
-    """Return what people leave beyond the demand, in scales of the limit of which they leave least, and its name, who
-    stop at one of the instants ``when`` s of a ``dance`` and are off as performers are; infinite and "" if nothing is
-    demanded there.
+def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> tuple[float, str]:
+    """Return by how many deviations people who stop at one of the instants ``when`` s of a ``dance``, and are off as
+    performers are, stay within what is demanded, and the limit of which that is least; infinite and "" if nothing is
+    demanded there. Deviations are those towards the limit: an arm beside the head errs farther towards it than away.
     """
     plan = PlannedDance(dance)
     when = when[~plan.stepping[plan.phase_at(when)]]
     if not when.size:
         return np.inf, ""
-    copy, rooms = plan.held_by(_DRAWN, when), [(np.inf, "")]
+    copy, found = plan.held_by(_DRAWN, when), [(np.inf, "")]
     for limit, one in for_imprecise(limits).items():
         left = one.left(copy).value.reshape(len(when), _DRAWN, -1)
-        usual = np.median(left, axis=1)  # an arm beside the head errs farther towards it than away
+        left = left[:, :, np.isfinite(left).all(axis=(0, 1))]
+        usual = np.median(left, axis=1)
         below = np.sqrt(2 * np.mean(np.minimum(left - usual[:, None], 0.0) ** 2, axis=1))
-        rooms.append((float((usual - _SIGMAS * below - one.least).min()) / limit.scale, limit.name))
-    return min(rooms)
+        found.append((float(((usual - one.least) / np.maximum(below, _STILL)).min(initial=np.inf)), limit.name))
+    return min(found)
 
 
 def perform_with(

@@ -15,6 +15,18 @@ from biodance.effects import Case, DiscreteEffect, Effect, effects
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
+_ALIKE = {
+    "hip": (("segment_length", "thigh"), ("joint_centre", "knee")),
+    "knee": (("segment_length", "thigh"), ("segment_length", "shank"), ("joint_centre", "hip"), ("joint_centre", "ankle")),
+    "ankle": (("segment_length", "shank"), ("joint_centre", "knee")),
+    "shoulder": (("segment_length", "upper_arm"), ("joint_centre", "elbow")),
+    "elbow": (("segment_length", "upper_arm"), ("joint_centre", "shoulder")),
+}  # fmt: skip
+"""What else looks like a joint that lies elsewhere."""
+
+_EXPLAINS = 0.5
+"""Share of the way that a joint seemed to have gone by which a marker beside it must have moved, to explain it."""
+
 
 def with_repairs(
     diagnosis: Diagnosis, cases: tuple[Case, ...], known: Tolerances, chosen: Chosen[Effect | DiscreteEffect] = None
@@ -37,27 +49,34 @@ def repairs(cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Eff
     """
     for error in cases[0].body.joint_errors:
         if error.spared and "marker_misplaced" in family:
-            yield from _marker(family["marker_misplaced"], error.spared, cases, known)
+            yield from _marker(family["marker_misplaced"], error, cases, known)
         elif error.contradicted and "joint_centre" in family:
             yield _joint(family["joint_centre"], error)
 
 
-def _marker(effect: Effect, label: str, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
-    """Yield a marker that has moved, if it still lies where that matters."""
-    if label not in effect.targets(cases[0]):
+def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
+    """Yield a marker that has moved, if it lies so far from its place in the static trial that this explains where the
+    joint seemed to be; one that was wrong in the static trial, too, is a joint elsewhere.
+    """
+    if error.spared not in effect.targets(cases[0]):
         return
-    own = replace(effect, target=label)
+    own = replace(effect, target=error.spared)
     shift = own.measured(np.zeros(3), *cases)
-    alike = max(known.size(f"shown {own.name}"), known.size(key_of(own.name, label)))
+    alike = max(known.size(f"shown {own.name}"), known.size(key_of(own.name, error.spared)))
     sd = np.hypot(alike, known.unlike(own.name) * np.linalg.norm(shift))
-    if matters(own, shift):
+    if matters(own, shift) and np.linalg.norm(shift) >= _EXPLAINS * error.moved:
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
 
 
 def _joint(effect: Effect, error: JointError) -> Finding:
-    """Return a joint that lies elsewhere: no surer than static trials place joints and than the movement shows it."""
+    """Return a joint that lies elsewhere: no surer than static trials place joints and than the movement shows it. A
+    bone of another length and its other joint look the same.
+    """
     sd = float(np.hypot(centre_sd(error.joint), error.centre))
-    return _named(replace(effect, target=error.joint), [("shift", error.moved)], sd)
+    found = _named(replace(effect, target=error.joint), [("shift", error.moved)], sd)
+    side, _, joint = error.joint.partition("_")
+    alike = [Alias(kind, f"{side}_{name}", float("inf")) for kind, name in _ALIKE.get(joint, ())]
+    return replace(found, set=(*found.set, *alike))
 
 
 def _named(effect: Effect, sizes: list[tuple[str, float]], sd: float) -> Finding:

@@ -7,6 +7,7 @@ twenty is odd. The evidence of a cause is the integral over all of them by Lapla
 Signs of channels have no size: they are undone in the recording, and the witnesses are asked again.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from biodance.effects import Effect, causes
 from biodance.records import Array
 
 THRESHOLD = 2.0
-"""Natural logarithm of the evidence, less that of the number of targets, from which a cause is named."""
+"""Natural logarithm of the evidence, less that of the number of targets that are seen, from which a cause is named."""
 _TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
 _RARE = 3.0
@@ -139,16 +140,14 @@ def weigh(testimony: Testimony) -> Verdicts:
 def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], *, signs: bool) -> list[Hypothesis]:
     """Return every cause beside the named ones with its evidence, most probable first."""
     before = _explained(heard, value, named)
-    count: dict[str, int] = {}
-    for effect, _ in heard.causes:
-        count[effect] = count.get(effect, 0) + 1
+    count = Counter(names[0] for names in heard.causes if heard.seen_by(names))  # who is not seen is not mistaken
     found = []
     for names in heard.causes:
         if names in named or not np.abs(heard.traces[names]).any():
             continue
         one = _explained(heard, value, (*named, names))
         bayes = one.log_evidence - before.log_evidence
-        score = bayes - float(np.log(count[names[0]])) - _RARER.get(names[0], 0.0)
+        score = bayes - float(np.log(max(1, count[names[0]]))) - _RARER.get(names[0], 0.0)
         found.append(Hypothesis(names, bayes, score, one))
     for names, turned in heard.turned.items() if signs else ():
         known = np.isfinite(turned)

@@ -17,7 +17,7 @@ from biodance.body.body import Body
 from biodance.effects._base.case import Case
 from biodance.effects._base.exchanged_labels import Pair, arms_hang, exchanged_pairs
 from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
-from biodance.effects._base.wrists import mirrors, partner
+from biodance.effects._base.wrists import partner
 from biodance.errors import BiodanceError
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.records import Array, Markers, Session, Trial
@@ -68,10 +68,8 @@ def exchanges(recorded: Recorded) -> dict[str, frozenset[Pair]]:
     without plates, else by the exchange that makes the body fit.
     """
     known, found = _exchanges(recorded.session)
-    static = _static(recorded.session)
     for case in recorded.cases:
         more = {pair for pair in known if _is_open(case.trial, pair) and not fits_better(case, pair)}
-        more |= _turned_since(case.trial, static) - known
         if more:
             found[case.trial.name] = found.get(case.trial.name, frozenset()) | more
     if not known:
@@ -84,26 +82,11 @@ def _exchanges(session: Session) -> tuple[frozenset[Pair], dict[str, frozenset[P
     """Return the pairs of labels that carry each other's names in the static trial, and those by trial, as the markers
     alone show them; with and without plates.
     """
-    static = _static(session)
+    static = next((trial for trial in session.trials if trial.role == "static" and trial.markers is not None), None)
     hang = [trial.markers for trial in session.trials if trial.markers is not None and arms_hang(trial)]
     known = exchanged_pairs(static, None, frozenset(), hang) if static else frozenset()
     found = {trial.name: exchanged_pairs(trial, static, known, hang) for trial in session.trials}
     return known, {name: pairs for name, pairs in found.items() if pairs}
-
-
-def _static(session: Session) -> Trial | None:
-    """Return the first static trial with markers; None without one."""
-    return next((trial for trial in session.trials if trial.role == "static" and trial.markers is not None), None)
-
-
-def _turned_since(trial: Trial, static: Trial | None) -> set[Pair]:
-    """Return the wrists whose finger's marker lies on the palm's side in a trial in which the arms do anything, as far
-    as it lies on the back of the hand in the static trial: a mirror image is no bent hand. (The body does not tell: its
-    joints were placed by this very movement.)
-    """
-    if trial.markers is None or static is None or static.markers is None or arms_hang(trial):
-        return set()
-    return {(f"{side}WRA", f"{side}WRB") for side in "LR" if mirrors(trial.markers, static.markers, side)}
 
 
 def _is_open(trial: Trial, pair: Pair) -> bool:

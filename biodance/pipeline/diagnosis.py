@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
+from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
@@ -40,6 +41,8 @@ _FAR = "its markers move more on the body than where tolerances were learned"
 """Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
 _MORE_JOINTS = "its body moves at joints ({}) that the tolerances were not learned with"
 """Why what is left of a body with optional joints may be theirs."""
+_FEWER_JOINTS = "no marker shows what moves at {}, and the plates measure it all the same"
+"""Why what is left of a part of a body may be the forces of the other part."""
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
@@ -200,12 +203,21 @@ def _diagnosed(
     if not own.believed:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
-    joints = [one.name for one in result.shown_joints.gains if one.taken]
-    if joints and examined.diagnosis.verdict == "unexplained" and not examined.diagnosis.doubt:
-        doubt = _MORE_JOINTS.format(", ".join(joints))
+    doubt = _other_body(result.body, tuple(one.name for one in result.shown_joints.gains if one.taken))
+    if doubt and examined.diagnosis.verdict == "unexplained" and not examined.diagnosis.doubt:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=doubt))
     tell("measuring what the findings change")
     return _with_gains(result, examined)
+
+
+def _other_body(body: Body, joints: tuple[str, ...]) -> str:
+    """Return why what is left may be that of a body that moves otherwise than where tolerances were learned: at more
+    ``joints``, or at joints that no marker shows; "" where it does not.
+    """
+    hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
+    if hidden:
+        return _FEWER_JOINTS.format(", ".join(name.replace("_", " ") for name in hidden))
+    return _MORE_JOINTS.format(", ".join(joints)) if joints else ""
 
 
 def standing_notes(result: SessionResult) -> tuple[str, ...]:

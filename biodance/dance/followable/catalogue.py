@@ -15,7 +15,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.imprecision import mass_centre
 from biodance.dance.limits import Limit
-from biodance.dance.performers import room_of_copies
+from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
@@ -85,18 +85,17 @@ class Catalogue:
         motion = self.chain.motion(np.arange(len(self.x), dtype=float), self.x, *np.zeros((2, *self.x.shape)))
         return np.asarray(regressor(self.chain.body, motion)).reshape(len(self.x), 6, -1)
 
-    def keeps(self, s: int, limits: tuple[Limit, ...]) -> str:
-        """Return the limit that posture ``s`` breaks with the reserve for moves and for imprecise people, "" if
-        none.
+    def keeps(self, s: int, limits: tuple[Limit, ...]) -> tuple[float, str]:
+        """Return by how many deviations of imprecise people posture ``s`` keeps the limits and the one of which that is
+        least; minus infinity where itself it breaks one or leaves too little for moves.
         """
         state = State(self.chain, self.stance, self.x[s : s + 1], *np.zeros((2, 1, self.chain.size)))
         for limit in (limit for limit in limits if limit.at_rest):
             if (limit.margins(state).value < limit.straight_reserve(self.stance) * limit.scale).any():
-                return limit.name
+                return -np.inf, limit.name
         no_way = np.empty((0, 2, self.chain.size))
         held = Dance("", self.chain.body, state.x, (self.stance,), np.ones(1), no_way, np.empty(0), (), 0)
-        room, limit = room_of_copies(held, limits, np.zeros(1))
-        return limit if room < 0 else ""
+        return deviations_of_copies(held, limits, np.zeros(1))
 
 
 def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:

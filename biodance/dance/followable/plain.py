@@ -13,8 +13,8 @@ from biodance.records import Array
 
 _SLOWER = (1.0, 1.4, 1.8)
 """Factors on the duration of a straight move, one after the other."""
-_AMPLE = 0.1
-"""Scales of room for imprecise people with which no other way is looked for."""
+ENOUGH, SURE = 3.2, 4.0
+"""Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _ITERATIONS = (12, 8)
 _STOP = 0.08
 """rad that a lifted leg keeps from the stops of its joints."""
@@ -22,20 +22,21 @@ _STEPS = ((0.5, -0.1, 0.0, 0.55, 0.0, 0.0), (0.5, -0.2, 0.0, 0.55, 0.0, 0.0), (0
 """rad by which hip, knee and ankle of a leg bend on the way of a lifted foot, and it goes away from the other one."""
 
 
-def plain_move(task: Task, room: Callable[[Move], tuple[float, str]]) -> Move:
-    """Return the move of ``task`` in which nothing goes out of its way that need not, and which leaves imprecise people
-    ``room`` (in scales, of which limit); if none keeps all limits, the one that violates least.
+def plain_move(task: Task, room: Callable[[Move], tuple[float, str]]) -> tuple[Move, float]:
+    """Return the move of ``task`` in which nothing goes out of its way that need not, and by how many deviations
+    imprecise people keep its limits (``room``, and of which limit); if none keeps all limits, the one that violates
+    least.
     """
     tried, eased = [], {limit.name for limit in task.limits if limit.mended_by_slowness}
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
         tried.append(_roomiest((evaluate_move(slow, way)[0] for way in _shapes(slow)), room))
-        if tried[-1].violation == 0 or tried[-1].limit not in eased:
+        if tried[-1][0].violation == 0 or tried[-1][0].limit not in eased:
             break
-    best = min(tried, key=_badness)
-    if best.violation == 0 or task.stance.seat:
+    best = min(tried, key=lambda one: one[0].violation)
+    if best[0].violation == 0 or task.stance.seat:
         return best
-    return _roomiest([_round(replace(task, duration=best.duration), best)], room)
+    return _roomiest([_round(replace(task, duration=best[0].duration), best[0])], room)
 
 
 def other_ways(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
@@ -56,24 +57,21 @@ def _shapes(task: Task) -> list[Array]:
     return [task.straight(), *(_stepping(task, step) for step in steps)]
 
 
-def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) -> Move:
-    """Return the first move that keeps all limits and leaves imprecise people ample room, or else the one that leaves
-    most, with the limit of which it is too little; if none keeps all limits, the one that violates least.
+def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) -> tuple[Move, float]:
+    """Return the first move that keeps all limits and that imprecise people `SURE`ly keep, too, or else the one that
+    leaves them most, with the limit of which it is too little, and by how many deviations; if none keeps all limits,
+    the one that violates least.
     """
-    tried, most = list[Move](), -np.inf
+    tried, best, most = list[Move](), None, -np.inf
     for move in moves:
         tried.append(move)
         if not move.limit:
-            left, limit = room(move)
-            if left > most:
-                best, most = replace(move, limit=limit if left < 0 else ""), left
-            if left > _AMPLE:
+            found, limit = room(move)
+            if best is None or found > most:
+                best, most = replace(move, limit=limit if found < ENOUGH else ""), found
+            if found > SURE:
                 break
-    return best if most > -np.inf else min(tried, key=_badness)
-
-
-def _badness(move: Move) -> tuple[float, bool]:
-    return move.violation, bool(move.limit)
+    return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)
 
 
 def _stepping(task: Task, step: tuple[float, ...]) -> Array:

@@ -15,9 +15,9 @@ import numpy as np
 
 from biodance.dance.dance import Dance
 from biodance.dance.followable.naming import name_of
-from biodance.dance.followable.plain import plain_move
-from biodance.dance.followable.reach import FAR, DanceStep, Reach, feet_key
-from biodance.dance.performers import room_of_copies
+from biodance.dance.followable.plain import ENOUGH, SURE, plain_move
+from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
+from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
@@ -34,6 +34,8 @@ _TRIES = 200
 """Postures that are taken or given up before a walk is."""
 _WAYS_ON = 5
 """Postures that are tried after another one before that one is given up."""
+_AT_ONCE = 12
+"""Postures of which one that imprecise people surely can is taken before others that tell more."""
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of a move at which imprecise people must have room, too."""
 _LIFTING = 1.4
@@ -68,12 +70,12 @@ class Walk:
     """The search for one dance; what was worked out is kept, so that another look costs little."""
 
     work: DesignContext
-    _broken: dict[tuple[str, int], str] = field(default_factory=dict)
-    _moves: dict[tuple[bytes, bytes], Move] = field(default_factory=dict)
+    _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
+    _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         chain, plan = self.work.chain, self.work.plan
-        self.reach = Reach(self.work, lambda last, step: not (self._wrong(last) or self.move(last, step).limit))
+        self.reach = Reach(self.work, self._can)
         self.factor = prior_factor(chain.body.sip)
         before = np.sum(self.factor**2, axis=1)
         weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
@@ -115,15 +117,15 @@ class Walk:
             if feet_key(pair[0]) == feet_key(pair[1]):
                 continue
             was, now = (self.reach.catalogue(stance) for stance in pair)
-            if self.reach.steps_to(was, now).min() >= FAR:
-                limits = [move.limit for move in self._moves.values() if move.limit]
+            if self.reach.steps_to(was, now).min() >= UNREACHABLE:
+                limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
     def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
         """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
         steps, belief = list[DanceStep](), np.eye(self.factor.shape[1])
         for number, stance in enumerate(stances):
-            step = next((one for one in self._ranked(steps, stances, belief) if not self._wrong(one)), None)
+            step = next((one for one in self._ranked(steps, stances, belief) if not self._kept(one)[1]), None)
             if step is None:
                 raise NoWay(self._stuck(stance, number, {}), stances, number)
             belief = self.belief_after(belief, steps, step)
@@ -138,17 +140,24 @@ class Walk:
     def possible(
         self, steps: list[DanceStep], stances: tuple[Stance, ...], belief: Array, why: dict[str, int]
     ) -> Iterator[tuple[DanceStep, Move | None]]:
-        """Yield the postures that follow with the move to them, the best first; ``why`` counts the limits that others
-        break.
+        """Yield the postures that follow with the move to them, the best first, of a handful those first that imprecise
+        people surely can; ``why`` counts the limits that others break.
         """
-        last = steps[-1] if steps else None
-        for step in self._ranked(steps, stances, belief):
-            move = None if last is None or self._wrong(step) else self.move(last, step)
-            broken = self._wrong(step) or (move.limit if move is not None else "")
-            if not broken:
-                yield step, move
-            else:
-                why[broken] = why.get(broken, 0) + 1
+        last, ranked = steps[-1] if steps else None, self._ranked(steps, stances, belief)
+        while some := list(islice(ranked, _AT_ONCE)):
+            doubtful = list[tuple[float, DanceStep, Move | None]]()
+            for step in some:
+                room, broken, move = *self._kept(step), None
+                if last is not None and not broken:
+                    move, least = self._way(last, step)
+                    room, broken = min(room, least), move.limit
+                if broken:
+                    why[broken] = why.get(broken, 0) + 1
+                elif room >= SURE:
+                    yield step, move
+                else:
+                    doubtful.append((room, step, move))
+            yield from ((step, move) for _, step, move in sorted(doubtful, key=lambda one: -one[0]))
 
     def _stuck(self, stance: Stance, number: int, why: dict[str, int]) -> str:
         most = max(why, key=lambda name: why[name]).replace("_", " ") if why else "number of instructions"
@@ -193,13 +202,21 @@ class Walk:
         plan = self.work.plan
         return np.array([plan.move + plan.hold + _INSTRUCTION * plan.simplicity * len(step.said) for step in steps])
 
-    def _wrong(self, step: DanceStep) -> str:
-        if step.key not in self._broken:
-            self._broken[step.key] = step.catalogue.keeps(step.s, self.work.plan.limits)
-        return self._broken[step.key]
+    def _kept(self, step: DanceStep) -> tuple[float, str]:
+        """Return by how many deviations imprecise people keep a posture, and the limit that they break, "" if none."""
+        if step.key not in self._held:
+            found, limit = step.catalogue.keeps(step.s, self.work.plan.limits)
+            self._held[step.key] = found, limit if found < ENOUGH else ""
+        return self._held[step.key]
+
+    def _can(self, last: DanceStep, step: DanceStep) -> bool:
+        return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
 
     def move(self, last: DanceStep, step: DanceStep) -> Move:
         """Return the move from one step to the next, as `plain_move` finds it."""
+        return self._way(last, step)[0]
+
+    def _way(self, last: DanceStep, step: DanceStep) -> tuple[Move, float]:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
             task, stances = self.task(last, step), (last.catalogue.stance, step.catalogue.stance)
@@ -240,10 +257,10 @@ class Walk:
 
 
 def _room(task: Task, stances: tuple[Stance, Stance], move: Move) -> tuple[float, str]:
-    """Return what imprecise people leave on the way, as `room_of_copies` does."""
+    """Return what imprecise people leave on the way, as `deviations_of_copies` does."""
     still, time = np.ones(2), np.array([move.duration])
     way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
-    return room_of_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
+    return deviations_of_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
 
 
 def walked_dance(work: DesignContext, steps: list[DanceStep], moves: list[Move]) -> Dance:

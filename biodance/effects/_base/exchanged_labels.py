@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from biodance.effects._base.wrists import middle, rightwards, shows_palm, sides, travels, turned_wrists
+from biodance.effects._base.wrists import middle, mirrors, rightwards, shows_palm, sides, travels, turned_wrists
 from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import Array, Markers, Trial
 
@@ -42,7 +42,11 @@ def exchanged_pairs(
     alone = {*crossed_sides(markers), *crossed_ends(markers)}
     if arms_hang(trial):
         alone |= {*turned_wrists(markers, others)}
-    if static is None or static.markers is None or static is trial or not trial.marker_set:
+    if static is None or static.markers is None or static is trial:
+        return frozenset(alone)
+    if not arms_hang(trial):
+        alone |= {(f"{side}WRA", f"{side}WRB") for side in "LR" if mirrors(markers, static.markers, side)}
+    if not trial.marker_set:
         return frozenset(alone)
     alone = {pair for pair in alone if pair in known or not _farther(markers, static.markers, pair)}
     marker_set = read_marker_set(trial.marker_set)

@@ -114,7 +114,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
         f"would lie "
         f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
-    errors = tuple(one._replace(spared=left_out) if one.joint == joint else one for one in better.errors)
+    errors = tuple(
+        one._replace(spared=left_out, moved=placed.moved[joint]) if one.joint == joint else one for one in better.errors
+    )
     without = replace(
         better.scaling,
         notes=(*better.scaling.notes, note),

@@ -1,0 +1,54 @@
+"""What was put right in the body before any force was looked at is named: a joint elsewhere, a marker that has moved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from human_cases import human_case
+
+from biodance.body.changes import move_marker
+from biodance.body.parts import JointError
+from biodance.diagnosis.diagnosis import Diagnosis
+from biodance.diagnosis.repairs import with_repairs
+from biodance.uncertainty.tolerances import shipped
+
+CLEAN = Diagnosis("nothing wrong", ())
+HIP = JointError("right_hip", 0.012, 0.0, contradicted=True, moved=0.066)
+
+
+def named(error: JointError, diagnosis: Diagnosis = CLEAN, chosen: tuple[str, ...] | None = None) -> Diagnosis:
+    """Return the diagnosis of a body with one joint that was put right; RKNE lies 50 mm ahead of its place in it."""
+    case = human_case(200)
+    body = move_marker(case.body, "RKNE", np.array([-0.05, 0.0, 0.0]))
+    return with_repairs(diagnosis, (replace(case, body=replace(body, joint_errors=(error,))),), shipped(), chosen)
+
+
+def test_a_joint_that_the_movement_puts_elsewhere_is_named_with_its_look_alikes() -> None:
+    found = named(HIP)
+    (one,) = found.findings
+    low, high = one.parameters[0].interval
+    assert (found.verdict, one.effect, one.target) == ("named, complete", "joint_centre", "right_hip")
+    assert low < 0.06 < 0.066 < high
+    assert low > 0.01
+    assert ("segment_length", "right_thigh") in {(other.effect, other.target) for other in one.set}
+
+
+def test_a_marker_that_moved_is_named_with_how_far() -> None:
+    (one,) = named(JointError("right_knee", 0.007, 0.1, moved=0.04, spared="RKNE")).findings
+    shift = np.array([p.value for p in one.parameters])
+    assert (one.effect, one.target) == ("marker_misplaced", "RKNE")
+    np.testing.assert_allclose(shift, [0.05, 0.0, 0.0], atol=0.012)
+
+
+@pytest.mark.parametrize(
+    ("error", "diagnosis", "chosen"),
+    [
+        (JointError("right_knee", 0.007, 0.1, moved=0.15, spared="RKNE"), CLEAN, None),
+        (JointError("right_hip", 0.012, 0.0, moved=0.02), CLEAN, None),
+        (HIP, replace(CLEAN, verdict="unexplained"), None),
+        (HIP, CLEAN, ("plate_gain", "marker_misplaced")),
+    ],
+    ids=["wrong in the static trial, too", "within what the static trial knows", "more is wrong", "not asked for"],
+)
+def test_nothing_is_named_that_does_not_explain_it(error, diagnosis, chosen) -> None:
+    assert named(error, diagnosis, chosen) == diagnosis
