@@ -158,7 +158,8 @@ def test_diagnosis_asks_the_body_whether_its_joints_were_calibrated() -> None:
     assert put.groups.count("tilt knee" + BEFORE) == 4
     assert there.groups.count("tilt knee") == 4
     for one, expected in ((put, {BEFORE}), (there, {""})):
-        _, keys, means = nuisances(one, candidates(one, ("plate_gain",)))
+        found = nuisances(one, candidates(one, ("plate_gain",)))
+        keys, means = found.keys, found.means
         assert {key.removeprefix("tilt knee") for key in keys if key.startswith("tilt knee")} == expected
         assert {key for key in keys if key.startswith("plate")} == {
             key_of("plate_gain", c) for c in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

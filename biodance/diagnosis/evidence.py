@@ -12,7 +12,8 @@ G.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor
+from scipy.linalg.lapack import dpotrs
 
 from biodance.records import Array
 
@@ -38,16 +39,21 @@ class Belief:
     @classmethod
     def known(cls, X: Array, factor: tuple[Array, bool], y: Array) -> "Belief":
         """Return the belief of another target ``y`` (r,) under the same columns."""
-        return cls(X, y, factor, np.asarray(cho_solve(factor, X.T @ y)))
+        return cls(X, y, factor, _solved(factor, X.T @ y))
 
     def covariance(self, rows: Array) -> Array:
         """Return the posterior covariance of ``rows`` (q, K) @ coefficients."""
-        return np.asarray(rows @ cho_solve(self.factor, rows.T))
+        return np.asarray(rows @ _solved(self.factor, rows.T))
 
     def score(self, Z: Array) -> tuple[Array, Array]:
         """Return s (k,) and G (k, k) of whitened columns ``Z`` (r, k)."""
         cross = self.X.T @ Z
-        return Z.T @ self.y - cross.T @ self.mean, Z.T @ Z - cross.T @ cho_solve(self.factor, cross)
+        return Z.T @ self.y - cross.T @ self.mean, Z.T @ Z - cross.T @ _solved(self.factor, cross)
+
+
+def _solved(factor: tuple[Array, bool], b: Array) -> Array:
+    """Return A^-1 b (K, ...) from the Cholesky factor of A; LAPACK at once, for it is asked a thousand times."""
+    return np.asarray(dpotrs(factor[0], b, lower=factor[1])[0]) if len(b) else b
 
 
 def believe(X: Array, y: Array) -> Belief:

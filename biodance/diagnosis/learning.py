@@ -38,11 +38,14 @@ class Null:
 
 def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
     """Return a session without fault as `learn` wants it; ``causes`` all of the family."""
-    columns, keys, mean_keys = nuisances(problem, causes)
+    known = nuisances(problem, causes)
     own = ("",) * problem.sip.shape[1]
     mass = float(problem.cases[0].body.sip.mass.sum())
+    columns = np.concatenate(known.parts, axis=1) * known.scale
     every: Array = np.concatenate([problem.sip, columns], axis=1).astype(np.float32)  # type: ignore[assignment]
-    return Null(problem.target, every, own + keys, problem.spectrum.band, marker_keys(problem), mass, own + mean_keys)
+    return Null(
+        problem.target, every, own + known.keys, problem.spectrum.band, marker_keys(problem), mass, own + known.means
+    )
 
 
 def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10, worth: float = 0.0) -> Tolerances:

@@ -82,26 +82,39 @@ def marker_keys(problem: Problem) -> tuple[str, ...]:
     return keys + tuple(f"shown {name}" for name, _ in problem.shown)
 
 
-def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return columns (r, K) per unit of all that may be no fault, the keys of their sizes and of their means ("" for
-    those that have none: the signs of slides and tilts are mirrored between sides and persons).
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """All that may be no fault: ``parts`` (r, k) of the columns (r, K), which times ``scale`` (K,) are per unit; the
+    ``keys`` (K) of their sizes and ``means`` (K) of their means ("" for those that have none: the signs of slides and
+    tilts are mirrored between sides and persons).
     """
+
+    parts: tuple[Array, ...]
+    scale: Array
+    keys: tuple[str, ...]
+    means: tuple[str, ...]
+
+
+def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
+    """Return the kinematic errors of a problem and the ``causes`` that are tolerances."""
     body = problem.cases[0].body
     joints = {joint_of(body, chain) for chain in chains(body)}
-    parts, keys = [problem.kinematics], list(problem.groups)
+    parts, keys, scale = [problem.kinematics], list(problem.groups), [1.0] * problem.kinematics.shape[1]
     means = [group if group.startswith("sag ") else "" for group in problem.groups]
     for one in causes:
-        parts.append(one.basis / (SCALE * one.effect.typical[0]))
+        parts.append(one.basis)
         key, width = key_of(*one.names), one.basis.shape[1]
+        scale += [1 / (SCALE * one.effect.typical[0])] * width
         own = in_state(key, one.effect.target if one.effect.target in joints else "", body)
         loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
         keys += [own] * width
         means += [mean_key(*one.names, name) if own == key else "" for name in loud] + [""] * (width - len(loud))
         if one.names in problem.shown:
-            parts.append(_where_not_shown(problem, parts[-1]))
+            parts.append(_where_not_shown(problem, one.basis))
+            scale += scale[-width:]
             keys += [HABIT + key] * width
             means += [""] * width
-    return np.concatenate(parts, axis=1), tuple(keys), tuple(means)
+    return Nuisances(tuple(parts), np.array(scale), tuple(keys), tuple(means))
 
 
 def _where_not_shown(problem: Problem, columns: Array) -> Array:
@@ -125,12 +138,12 @@ def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
 
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
     """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
-    columns, keys, mean_keys = nuisances(
-        problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
-    )
-    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in mean_keys]), marker_keys(problem))
-    columns *= np.array([tolerances.size(key) for key in keys])
-    both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
-    del columns  # the largest arrays of a diagnosis are not kept twice
+    known = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
+    both = np.concatenate([problem.sip, *known.parts, problem.target[:, None]], axis=1)  # the largest array, made once
+    columns = both[:, problem.sip.shape[1] : -1]
+    columns *= known.scale
+    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), marker_keys(problem))
+    columns *= np.array([tolerances.size(key) for key in known.keys])
+    both[:, -1] -= expected
     both = white(problem, tolerances, both, out=both)
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)

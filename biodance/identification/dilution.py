@@ -48,7 +48,9 @@ def undiluted(total: Statistics, phi: Array, segments: tuple[str, ...]) -> Stati
             for channel in range(6):
                 gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
                 scale[band, channel, :-1] = np.where(parts.any(axis=0), gain @ parts, 1.0)
-    return Statistics(total.gram * scale[..., None, None] * scale[:, None, None], total.count, total.layout)
+    gram = total.gram * scale[..., None, None]
+    gram *= scale[:, None, None]
+    return Statistics(gram, total.count, total.layout)
 
 
 def carried_away(before: Posterior, after: Posterior) -> bool:

@@ -24,7 +24,7 @@ from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, mis
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
-from biodance.identification.statistics import Fit, Statistics, believable, empty, layout_for, statistics
+from biodance.identification.statistics import Fit, Statistics, believable, layout_for, statistics_together
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.caution import from_true_centres, widened
@@ -211,10 +211,7 @@ def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None
         There is no trial, or none has a usable frame.
     """
     used, about, notes = usable(body, fits)
-    layout = layout_for(about)
-    total: Statistics = empty(10 * len(body.segments), layout)
-    for fit in used:
-        total = total + statistics(body, fit, layout)
+    total = statistics_together(body, used, layout_for(about))
     noise, _ = learn_noise(total, may_carry(body, prior or widened(body.sip, body.joint_errors)))
     found = conclude(
         body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior

@@ -16,7 +16,7 @@ from biodance.identification.identification import Identification, conclude, usa
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
 from biodance.identification.robot_errors import THINNED, place_changes, places_of, some_frames, zero_changes
-from biodance.identification.statistics import Fit, empty, layout_for, statistics
+from biodance.identification.statistics import Fit, layout_for, statistics_together
 from biodance.motion.grounded import Grounded
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Wrench
@@ -77,9 +77,7 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
     """
     fits, about, notes = usable(body, tuple(one.fit for one in trials))
     layout = layout_for(about, _BANDS)
-    total = empty(10 * len(body.segments), layout)
-    for fit in fits:
-        total = total + statistics(body, fit, layout)
+    total = statistics_together(body, fits, layout)
     noise, _ = learn_noise(total, body.sip, start=_start(body))
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
@@ -92,9 +90,7 @@ def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BasePar
     sigma from what the fit itself leaves of every channel and (W' W)^-1.
     """
     layout = layout_for(about, WHITE)
-    total = empty(10 * len(body.segments), layout)
-    for fit in fits:
-        total = total + statistics(body, fit, layout)
+    total = statistics_together(body, fits, layout)
     noise, phi = replace(layout, covariance=_start(body)[None]), np.zeros(10 * len(body.segments))
     for _ in range(_ROUNDS):
         found = estimate_base(total.information(noise), base)

@@ -5,7 +5,7 @@ weight lost).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from biodance.errors import BiodanceError, NotSolved
 from biodance.identification.added_mass import added_mass
@@ -86,7 +86,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
         sd = np.sqrt(np.maximum(np.diag(slope @ spread[cut, cut] @ slope.T), 0.0))
         for k, (quantity, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True)):
             value = float(after[0][k] - before[0][k])
-            p = float(2 * norm.sf(abs(value) / sd[k])) if sd[k] > 0 else 1.0
+            p = float(2 * ndtr(-abs(value) / sd[k])) if sd[k] > 0 else 1.0
             informed = any(one.known[10 * i + k].verdict != "cannot be known" for one in (earlier, later))
             rows.append(Difference(segment, quantity, unit, value, float(sd[k]), p, informed))
     return tuple(rows)

@@ -2,6 +2,7 @@
 memory.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,20 +105,32 @@ def empty(parameters: int, layout: Noise) -> Statistics:
 
 
 def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
-    """Return the statistics of one trial; memory does not grow with its length. Of standing only the posture counts
-    (``STILL``).
+    """Return the statistics of one trial, see `statistics_together`."""
+    return statistics_together(body, (fit,), layout)
+
+
+def statistics_together(body: Body, fits: Iterable[Fit], layout: Noise) -> Statistics:
+    """Return the statistics of some trials; memory does not grow with their number or length. Of standing only the
+    posture counts (``STILL``).
 
     Raises
     ------
     TrialRefused
-        No frame of the trial may be used.
+        No frame of a trial may be used.
     """
+    total = empty(10 * len(body.segments), layout)
+    for fit in fits:
+        _add(body, fit, total)
+    return total
+
+
+def _add(body: Body, fit: Fit, total: Statistics) -> None:
+    """Add what a trial tells to the arrays of ``total``."""
     if not fit.use.any():
         raise TrialRefused(
             f"Trial {fit.name}: no frame may be used (ground contact not measured, or markers hidden in all frames)."
         )
-    total = empty(10 * len(body.segments), layout)
-    gram, count = total.gram.copy(), total.count.copy()
+    gram, count, layout = total.gram, total.count, total.layout
     size = gram.shape[2]
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
         part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
@@ -131,7 +144,6 @@ def statistics(body: Body, fit: Fit, layout: Noise) -> Statistics:
             flat = X[band == b].reshape(-1, 6 * size)
             gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
             count[b] += len(flat)
-    return Statistics(gram, count, layout)
 
 
 def _is_standing(position: Array) -> bool:

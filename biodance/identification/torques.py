@@ -72,38 +72,37 @@ def torque_bands(
 
 def _beyond_joints(body: Body, motion: Motion) -> Iterator[tuple[NDArray[np.intp], Array]]:
     """Yield for each joint the parameters of the links beyond it and what these need about its axis (T, k)."""
-    W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
-    axis, arm = _axes(body, motion)
+    Y = _about_axes(_axes(body, motion), regressor_of(segment_motion(body, motion), gravity=body.gravity))
     for j, hangs in enumerate(below(body)):
         beyond = np.flatnonzero(np.repeat(hangs, 10))
-        some = W[:, :, beyond]
-        yield beyond, np.einsum("tc,tck->tk", axis[:, j], some[:, 3:]) - np.einsum("tc,tck->tk", arm[:, j], some[:, :3])
+        yield beyond, Y[:, j, beyond]
 
 
 def torque_regressor(body: Body, motion: Motion) -> Array:
     """Return Y (T, n, 10N): what each parameter needs about each joint's axis, N·m per unit."""
     W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
-    Y = _about_axes(body, motion, W) * np.repeat(below(body), 10, axis=1)
+    Y = _about_axes(_axes(body, motion), W) * np.repeat(below(body), 10, axis=1)
     return np.asarray(Y if body.sharing is None else Y @ body.sharing)
 
 
 def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> Array:
     """Return (T, n) N·m: what the ground's wrenches give about each joint's axis."""
-    total = np.zeros((motion.time.size, len(body.joints)))
+    total, axes = np.zeros((motion.time.size, len(body.joints))), _axes(body, motion)
     for segment, wrench in ground.items():
         beyond = below(body)[:, body.segment_index(segment)]
-        total += beyond * _about_axes(body, motion, wrench.value[..., None])[..., 0]
+        total += beyond * _about_axes(axes, wrench.value[..., None])[..., 0]
     return total
 
 
-def _about_axes(body: Body, motion: Motion, wrench: Array) -> Array:
+def _about_axes(axes: tuple[Array, Array], wrench: Array) -> Array:
     """Return the moments (T, n, k) about the joint axes of wrenches (T, 6, k) about the lab origin: a . (M - o x F)."""
-    axis, arm = _axes(body, motion)
+    axis, arm = axes
     return np.asarray(axis @ wrench[:, 3:] - arm @ wrench[:, :3])
 
 
 def _axes(body: Body, motion: Motion) -> tuple[Array, Array]:
     """Return the joints' axes a (T, n, 3) and a x o (T, n, 3) m, o a point on the axis, lab frame."""
     pose = poses(body, motion.q)
-    axis = np.stack([pose.joint_rotation[:, j] @ joint.axis for j, joint in enumerate(body.joints)], axis=1)
+    own = np.array([joint.axis for joint in body.joints]).reshape(-1, 3)
+    axis = np.einsum("tjab,jb->tja", pose.joint_rotation, own)
     return axis, cross(axis, pose.joint_position)

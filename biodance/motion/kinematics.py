@@ -1,6 +1,8 @@
 """Forward kinematics of a Body for all frames at once, and exact first derivatives of points on its segments."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -42,10 +44,8 @@ def poses(body: Body, q: Array) -> Poses:
     parent, turn, translation, _ = _tree(body)
     angles = np.array(q[:, body.nq - n :])
     place_joints(parent, turn, translation, root_rotation, root_position, angles, rotation, position)
-    carrier = body.segment_joint
-    seg_r = np.stack([root_rotation if j < 0 else rotation[:, j] for j in carrier], axis=1)
-    seg_p = np.stack([root_position if j < 0 else position[:, j] for j in carrier], axis=1)
-    return Poses(rotation, position, seg_r, seg_p, root_rotation, root_position)
+    segments = _of_segments(body, root_rotation, rotation), _of_segments(body, root_position, position)
+    return Poses(rotation, position, *segments, root_rotation, root_position)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +78,20 @@ def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
     parent, _, _, axis = _tree(body)
     omega, alpha, acc = moved = np.empty((3, frames, n, 3))
     move_joints(parent, axis, pose.joint_rotation, pose.joint_position, root, rate, rate2, moved)
-    pick = body.segment_joint
+    pairs = (w_root, omega), (dw_root, alpha), (acc_root, acc)
+    return SegmentMotion(pose.rotation, pose.position, *(_of_segments(body, *pair) for pair in pairs))
 
-    def gather(root: Array, joints: Array) -> Array:
-        return np.stack([root if j < 0 else joints[:, j] for j in pick], axis=1)
 
-    return SegmentMotion(
-        pose.rotation, pose.position, gather(w_root, omega), gather(dw_root, alpha), gather(acc_root, acc)
-    )
+def _of_segments(body: Body, root: Array, joints: Array) -> Array:
+    """Return (T, N + P, ...) what the segments, and the body's parts behind them, have of ``root`` (T, ...) and
+    ``joints`` (T, n, ...).
+    """
+    carrier = np.array(body.segment_joint)
+    if not body.joints:
+        return np.repeat(root[:, None], carrier.size, axis=1)
+    found = joints.take(np.maximum(carrier, 0), axis=1)
+    found[:, carrier < 0] = root[:, None]
+    return found
 
 
 def centre_of_mass(body: Body, motion: Motion) -> Array:
@@ -97,6 +103,7 @@ def centre_of_mass(body: Body, motion: Motion) -> Array:
     return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
 
 
+@lru_cache(maxsize=8)
 def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
     """Return the joint before each (n,), the parts (n, 3, 3, 3) of its rotation (see `place_joints`), its translation
     (n, 3) m and axis (n, 3).
@@ -109,16 +116,19 @@ def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
     return np.array([joint.parent for joint in body.joints], dtype=np.intp), turn, translation, axis
 
 
+@lru_cache(maxsize=8)
 def below(body: Body) -> Array:
-    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint."""
+    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint; read-only."""
     table = np.zeros((len(body.joints), len(body.segment_joint)))
     for s, j in enumerate(body.segment_joint):
         while j >= 0:
             table[j, s] = 1.0
             j = body.joints[j].parent
+    table.setflags(write=False)
     return table
 
 
+@lru_cache(maxsize=8)
 def chains(body: Body) -> tuple[tuple[int, ...], ...]:
     """Return the axes of every anatomical joint, first to last."""
     found = []
@@ -138,16 +148,26 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
     """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root
     place, root turn, angles].
     """
-    frames, count = points.shape[:2]
-    place, turn = np.zeros((2, frames, count, 3, body.nv))
+    turn = np.zeros((*points.shape, body.nv))
+    if body.n_root:
+        turn[..., 3:6] = np.eye(3)
+    for j, on, axis in _axes_before(body, pose, segment):
+        turn[..., body.n_root + j][:, on] = axis
+    return place_jacobian(body, pose, segment, points), turn.reshape(len(turn), -1, body.nv)
+
+
+def place_jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> Array:
+    """Return (T, 3S, nv) of points (T, S, 3) on segments, the first of `jacobian`."""
+    place = np.zeros((*points.shape, body.nv))
     if body.n_root:
         place[..., :3] = np.eye(3)
-        turn[..., 3:6] = np.eye(3)
         place[..., 3:6] = -skew(points - pose.root_position[:, None])
-    hangs = below(body)[:, segment]
-    for j, joint in enumerate(body.joints):
-        on = np.flatnonzero(hangs[j])
-        axis = (pose.joint_rotation[:, j] @ joint.axis)[:, None]
+    for j, on, axis in _axes_before(body, pose, segment):
         place[..., body.n_root + j][:, on] = cross(axis, points[:, on] - pose.joint_position[:, j, None])
-        turn[..., body.n_root + j][:, on] = axis
-    return place.reshape(frames, 3 * count, body.nv), turn.reshape(frames, 3 * count, body.nv)
+    return place.reshape(len(place), -1, body.nv)
+
+
+def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:
+    """Yield every joint, which of the segments hang on it, and its axis (T, 1, 3) in the lab."""
+    for j, hangs in enumerate(below(body)[:, segment]):
+        yield j, np.flatnonzero(hangs), (pose.joint_rotation[:, j] @ body.joints[j].axis)[:, None]

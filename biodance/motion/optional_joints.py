@@ -16,7 +16,7 @@ from biodance.body.human.optional_joints import OPTIONAL_JOINTS, with_optional
 from biodance.body.human.skeleton import kind_of
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.kinematics import jacobian, poses
+from biodance.motion.kinematics import place_jacobian, poses
 from biodance.motion.track import hold_open
 from biodance.records import Array, Index, Markers
 
@@ -138,7 +138,7 @@ def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
     """
     rows = [body.markers.names.index(name) for name in names]
     segment, pose = [body.markers.segment[k] for k in rows], poses(body, q)
-    J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position[rows]))
+    J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[rows]))
     J = J[:, :, np.concatenate([np.ones(body.n_root, dtype=bool), body.free])]
     weighted = np.swapaxes(J, 1, 2) * np.repeat(body.markers.weight[rows], 3)
     normal = weighted @ J

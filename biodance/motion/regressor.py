@@ -15,12 +15,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.ik.compiled.tree import fill_regressor
+from biodance.motion.ik.compiled.tree import fill_regressor, fill_wrench
 from biodance.motion.kinematics import SegmentMotion, segment_motion
 from biodance.records import Array, Motion, Wrench
 
 _BLOCK = 512
-"""Frames worked on at once where only a sum over the columns is kept: 3 MB, whatever the recording's length."""
+"""Frames worked on at once where only a sum over the segments is kept: little memory, whatever the length."""
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
@@ -72,10 +72,20 @@ def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wren
     >>> round(float(needed.force[:, 2].mean()), -1)
     610.0
     """
-    value, known = np.empty((motion.time.size, 6)), body.sip.phi if phi is None else phi
+    known, value = body.sip.phi if phi is None else phi, np.empty((motion.time.size, 6))
     for part, frames in in_blocks(motion):
-        value[part] = regressor(body, frames) @ known
+        value[part] = wrench_of_segments(body, segment_motion(body, frames), known)
     return Wrench(motion.time, value)
+
+
+def wrench_of_segments(body: Body, move: SegmentMotion, phi: Array) -> Array:
+    """Return the wrench (T, 6) about the lab origin that segments which ``move`` need with the parameters ``phi``
+    (10N,): the regressor times phi, without the regressor.
+    """
+    links = np.array(phi if body.sharing is None else body.sharing @ phi, dtype=float).reshape(-1, 10)
+    value, drive = np.zeros((len(move.position), 6)), move.acceleration - body.gravity
+    fill_wrench(move.rotation, move.position, move.angular_velocity, move.angular_acceleration, drive, links, value)
+    return value
 
 
 def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:

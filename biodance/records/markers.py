@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,10 +67,13 @@ class Markers:
         """Sampling rate, Hz; NaN for fewer than two frames."""
         return rate_of(self.time)
 
-    @property
+    @cached_property
     def seen(self) -> NDArray[np.bool_]:
-        """Where a marker was seen, (T, K) bool."""
-        return np.logical_not(np.isnan(self.xyz).any(axis=2))
+        """Where a marker was seen, (T, K) bool; read-only."""
+        lost = np.isnan(self.xyz)
+        found = np.logical_not(lost[..., 0] | lost[..., 1] | lost[..., 2])
+        found.setflags(write=False)
+        return found
 
     def __contains__(self, name: str) -> bool:
         return name in self.names

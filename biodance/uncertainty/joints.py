@@ -9,8 +9,8 @@ from biodance.body.human.skeleton import kind_of
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array, Index
 from biodance.spatial import skew
-from biodance.uncertainty.response import Pull, Response, centres_of_mass
-from biodance.uncertainty.source import Effects, ErrorSource, mean_local, mean_squares
+from biodance.uncertainty.response import Response, centres_of_mass
+from biodance.uncertainty.source import ErrorSource, mean_local, mean_squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,32 +31,29 @@ class Centre(ErrorSource):
         """Every anatomical joint three times."""
         return tuple(joint_of(self.body, chain) for chain in chains(self.body) for _ in range(3))
 
-    def forward(self, trial: Response) -> Effects:
-        """Return what displaced centres do to what hangs on them."""
-        value, left = self._followed(trial)
+    def functional(self, trial: Response) -> Array:
+        """Return the functionals of what hangs on displaced centres, and of its markers that are carried along."""
+        value = trial.of_markers(self._moved(trial))
         for k, (on, drift) in enumerate(self._drifts(trial)):
             value[:, :, 3 * k : 3 * k + 3] += trial.place[:, on].sum(axis=1) @ drift
-        return value, mean_local(trial, left, np.ones((len(left), 1)))
+        return value
 
-    def transpose(self, trial: Response, pull: Pull) -> Array:
-        """Return the weights on a drift of whole segments with their markers."""
-        worn, found = np.array(self.body.markers.segment), [np.empty((0, pull.place.shape[3]))]
-        for on, drift in self._drifts(trial):
-            total = pull.place[:, on].sum(axis=1) + pull.marker[:, np.isin(worn, on)].sum(axis=1)
-            found.append(np.einsum("fij,fip->jp", drift, total, optimize=True))
-        return np.concatenate(found)
+    def residual(self, trial: Response) -> Array:
+        """Return the residuals of the markers that are carried along."""
+        left = trial.left(self._moved(trial))
+        return mean_local(trial, left, np.ones((len(left), 1)))
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of the markers that are carried along."""
-        return mean_squares(self._followed(trial)[1])
+        return mean_squares(trial.left(self._moved(trial)))
 
-    def _followed(self, trial: Response) -> tuple[Array, Array]:
-        """Return functionals (F, 18, K) and residuals (F, 3M, K) of the markers that are carried along."""
+    def _moved(self, trial: Response) -> Array:
+        """Return the displacements (F, 3M, K) m of the markers that are carried along."""
         worn = np.array(self.body.markers.segment)
         moved = np.zeros((len(trial.J), worn.size, 3, len(self.groups)))
         for k, (on, drift) in enumerate(self._drifts(trial)):
             moved[:, np.isin(worn, on), :, 3 * k : 3 * k + 3] = drift[:, None]
-        return trial.of_markers(moved.reshape(len(moved), 3 * worn.size, -1))
+        return moved.reshape(len(moved), 3 * worn.size, -1)
 
     def _drifts(self, trial: Response) -> list[tuple[Index, Array]]:
         """Return for every anatomical joint the segments on it and (F, 3, 3) m of their drift, lab, per metre along
@@ -85,42 +82,34 @@ class Tilt(ErrorSource):
         """Every hinge twice."""
         return tuple(joint_of(self.body, chain) for chain in chains(self.body) if len(chain) == 1 for _ in range(2))
 
-    def forward(self, trial: Response) -> Effects:
-        """Return what hangs on a hinge turned and displaced by the angle times the tilt."""
-        value, left = self._followed(trial)
-        com = centres_of_mass(self.body, trial.pose)
+    def functional(self, trial: Response) -> Array:
+        """Return the functionals of what hangs on a hinge, turned and displaced by the angle times the tilt."""
+        value, com = trial.of_markers(self._moved(trial)), centres_of_mass(self.body, trial.pose)
         for k, (joint, on, rho) in enumerate(self._turns(trial)):
             origin = trial.pose.joint_position[:, joint]
             for s in on:
                 arm = skew(com[:, s] - origin)
                 value[:, :, 2 * k : 2 * k + 2] += trial.turn[:, s] @ rho - trial.place[:, s] @ (arm @ rho)
-        return value, mean_local(trial, left, np.ones((len(left), 1)))
+        return value
+
+    def residual(self, trial: Response) -> Array:
+        """Return the residuals of the markers that are turned along."""
+        left = trial.left(self._moved(trial))
+        return mean_local(trial, left, np.ones((len(left), 1)))
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of the markers that are turned along."""
-        return mean_squares(self._followed(trial)[1])
+        return mean_squares(trial.left(self._moved(trial)))
 
-    def _followed(self, trial: Response) -> tuple[Array, Array]:
-        """Return functionals (F, 18, K) and residuals (F, 3M, K) of the markers that are turned along."""
+    def _moved(self, trial: Response) -> Array:
+        """Return the displacements (F, 3M, K) m of the markers that are turned along."""
         worn = np.array(self.body.markers.segment)
         marker = trial.pose.points(list(worn), self.body.markers.position)
         moved = np.zeros((len(marker), worn.size, 3, len(self.groups)))
         for k, (joint, on, rho) in enumerate(self._turns(trial)):
             carried, origin = np.flatnonzero(np.isin(worn, on)), trial.pose.joint_position[:, joint, None]
             moved[:, carried, :, 2 * k : 2 * k + 2] = -skew(marker[:, carried] - origin) @ rho[:, None]
-        return trial.of_markers(moved.reshape(len(marker), 3 * worn.size, -1))
-
-    def transpose(self, trial: Response, pull: Pull) -> Array:
-        """Return the weights on turns and displacements of what hangs on a hinge, along the tilt times the angle."""
-        worn = np.array(self.body.markers.segment)
-        com, marker = centres_of_mass(self.body, trial.pose), trial.pose.points(list(worn), self.body.markers.position)
-        found = [np.empty((0, pull.place.shape[3]))]
-        for joint, on, rho in self._turns(trial):
-            origin, carried = trial.pose.joint_position[:, joint, None], np.flatnonzero(np.isin(worn, on))
-            total = pull.turn[:, on].sum(axis=1) + (skew(com[:, on] - origin) @ pull.place[:, on]).sum(axis=1)
-            total += (skew(marker[:, carried] - origin) @ pull.marker[:, carried]).sum(axis=1)
-            found.append(np.einsum("fit,fip->tp", rho, total))
-        return np.concatenate(found)
+        return moved.reshape(len(marker), 3 * worn.size, -1)
 
     def _turns(self, trial: Response) -> list[tuple[int, Index, Array]]:
         """Return for every hinge its joint, the segments on it, and (F, 3, 2) rad of their turn, lab, per radian of

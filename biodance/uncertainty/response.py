@@ -8,7 +8,7 @@ the wrench that the motion needs by
     d2/dt2 (F2 y) + d/dt (F1 y) + F0 y,    y = (u, r),
 
 from the rate of momentum and angular momentum (docs/derivations.md, section 16). All of it is linear:
-`Response.wrench` goes forward, `Response.pull` is its exact transpose.
+`Response.wrench` goes forward, `Response.back` is its exact transpose.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, SegmentMotion, jacobian, poses, segment_motion
+from biodance.motion.kinematics import Poses, SegmentMotion, jacobian, place_jacobian, poses, segment_motion
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -34,23 +34,11 @@ _NOTHING = 1e-17
 
 
 @dataclass(frozen=True, eq=False)
-class Pull:
-    """Weights of p equations on displacements: ``place``, ``turn`` (F, N, 3, p) of the segments' centres of mass and
-    of the segments, ``marker`` (F, M, 3, p) of the model's markers at unchanged coordinates.
-    """
-
-    place: Array
-    turn: Array
-    marker: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Response:
     """How ``body`` in ``motion`` (F frames at an even rate) with its ``pose`` answers.
 
     ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned;
-    ``tangent`` (F, 18, nv) the same of the coordinates; ``follow`` (F, nv, 3M) coordinates per marker displacement;
-    ``J`` (F, 3M, nv) markers per coordinate.
+    ``tangent`` (F, 18, nv) the same of the coordinates; ``J`` (F, 3M, nv) markers per coordinate.
     """
 
     body: Body
@@ -59,7 +47,6 @@ class Response:
     place: Array
     turn: Array
     tangent: Array
-    follow: Array
     J: Array
 
     @classmethod
@@ -67,7 +54,7 @@ class Response:
         """Return the response of ``body`` in ``motion``."""
         pose, frames = poses(body, motion.q), motion.time.size
         every, segment = list(range(len(body.segments))), list(body.markers.segment)
-        J, _ = jacobian(body, pose, segment, pose.points(segment, body.markers.position))
+        J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position))
         moved, turned = (
             part.reshape(frames, len(every), 3, body.nv)
             for part in jacobian(body, pose, every, centres_of_mass(body, pose))
@@ -76,7 +63,26 @@ class Response:
         tangent = np.zeros((frames, 18, body.nv))
         for s in every:
             tangent += place[:, s] @ moved[:, s] + turn[:, s] @ turned[:, s]
-        return cls(body, motion, pose, place, turn, tangent, -tracking(body, J), J)
+        return cls(body, motion, pose, place, turn, tangent, J)
+
+    @cached_property
+    def follow(self) -> Array:
+        """(F, nv, 3M): coordinates per marker displacement, least squares weighted by the body's marker weights."""
+        return np.asarray(-np.linalg.solve(*self._tracking))
+
+    @cached_property
+    def answer(self) -> Array:
+        """(F, 18, 3M): functionals per marker displacement, ``tangent @ follow`` without `follow`."""
+        normal, weighted = self._tracking
+        return -np.swapaxes(np.linalg.solve(normal, np.swapaxes(self.tangent, 1, 2)), 1, 2) @ weighted
+
+    @cached_property
+    def _tracking(self) -> tuple[Array, Array]:
+        """Return the normal matrices (F, nv, nv) of the tracking, with a ridge, and J' D (F, nv, 3M)."""
+        weighted = np.swapaxes(np.repeat(self.body.markers.weight, 3)[:, None] * self.J, 1, 2)
+        normal, nv = weighted @ self.J, self.body.nv
+        ridge = TRACKING_RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / nv
+        return normal + ridge * np.eye(nv), weighted
 
     @cached_property
     def segments(self) -> SegmentMotion:
@@ -88,14 +94,15 @@ class Response:
         """(F, n) rad, of the joints."""
         return self.motion.q[:, self.body.nq - len(self.body.joints) :]
 
-    def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> tuple[Array, Array]:
-        """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m, and what is left of
-        all (F, 3M, K) m.
-        """
-        change = self.follow[:, :, rows] @ moved
-        left = self.J @ change
+    def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
+        """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m."""
+        return np.asarray(self.answer[:, :, rows] @ moved)
+
+    def left(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
+        """Return what is left of all markers (F, 3M, K) m where model markers ``rows`` ``moved`` (F, R, K) m."""
+        left = self.J @ (self.follow[:, :, rows] @ moved)
         left[:, rows] += moved
-        return self.tangent @ change, left
+        return np.asarray(left)
 
     def wrench(self, functional: Array) -> Array:
         """Return the wrench (F, 6, K) about the lab origin from functionals (F, 18, K)."""
@@ -105,17 +112,15 @@ class Response:
         value = rate**2 * (second @ parts[:, 0]) + rate * (first @ parts[:, 1]) + parts[:, 2]
         return np.asarray(value).reshape(len(functional), 6, -1)
 
-    def pull(self, weight: Array) -> Pull:
-        """Return what ``weight`` (F, 6, p) on the wrench weighs on displacements: the transpose of all of the above."""
+    def back(self, weight: Array) -> Array:
+        """Return what ``weight`` (F, 6, p) on the wrench weighs on functionals (F, 18, p): the transpose of
+        `wrench`.
+        """
         second, first = derivatives(self.motion.time.size)
-        frames, rate, size = len(weight), self.motion.rate, weight.shape[2]
+        frames, rate = len(weight), self.motion.rate
         flat = weight.reshape(frames, -1)
-        back = np.stack([rate**2 * (second.T @ flat), rate * (first.T @ flat), flat], axis=1).reshape(
-            frames, 1, 18, size
-        )
-        on_place, on_turn = (np.swapaxes(part, -1, -2) @ back for part in (self.place, self.turn))
-        marker = np.swapaxes(self.follow, 1, 2) @ (np.swapaxes(self.tangent, 1, 2) @ back[:, 0])
-        return Pull(on_place, on_turn, marker.reshape(frames, -1, 3, size))
+        parts = [rate**2 * (second.T @ flat), rate * (first.T @ flat), flat]
+        return np.stack(parts, axis=1).reshape(frames, 18, -1)
 
 
 @lru_cache(maxsize=8)
@@ -148,16 +153,6 @@ def _lengthened(rows: Array, count: int) -> csr_array:
 def centres_of_mass(body: Body, pose: Poses) -> Array:
     """Return the centres of mass (F, N, 3) m of the segments, lab."""
     return pose.points(list(range(len(body.segments))), body.sip.com)
-
-
-def tracking(body: Body, J: Array) -> Array:
-    """Return (F, nv, 3M): how the coordinates follow measured markers that move, least squares weighted by the body's
-    marker weights.
-    """
-    weighted = np.swapaxes(np.repeat(body.markers.weight, 3)[:, None] * J, 1, 2)
-    normal = weighted @ J
-    ridge = TRACKING_RIDGE * np.trace(normal, axis1=1, axis2=2)[:, None, None] / body.nv * np.eye(body.nv)
-    return np.asarray(np.linalg.solve(normal + ridge, weighted))
 
 
 def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.kinematics import jacobian, poses
+from biodance.motion.kinematics import place_jacobian, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
@@ -85,7 +85,7 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     pose = poses(body, q[None])
     segment = list(body.markers.segment)
     points = pose.points(segment, body.markers.position)
-    place, _ = jacobian(body, pose, segment, points)
+    place = place_jacobian(body, pose, segment, points)
     weighted = np.repeat(np.asarray(body.markers.weight), 3)[:, None] * place[0]
     inverse = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv))
     spread = inverse @ weighted.T @ weighted @ inverse

@@ -10,11 +10,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.motion.kinematics import chains
 from biodance.records import Array
-from biodance.uncertainty.response import Pull, Response
-
-Effects = tuple[Array, Array]
-"""Functionals (F, 18, K) of the wrench, and the mean residual (M, 3, K) m of every marker, model less measured, in
-segment axes."""
+from biodance.uncertainty.response import Response
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +30,18 @@ class ErrorSource(ABC):
         return ("",) * len(self.groups)
 
     @abstractmethod
-    def forward(self, trial: Response) -> Effects:
-        """Return what every error does in a trial."""
+    def functional(self, trial: Response) -> Array:
+        """Return the functionals (F, 18, K) of the wrench of every error in a trial."""
 
     @abstractmethod
-    def transpose(self, trial: Response, pull: Pull) -> Array:
-        """Return (K, p): sum over time of the weights of p equations times what every error does to the wrench."""
+    def residual(self, trial: Response) -> Array:
+        """Return the mean residual (M, 3, K) m of every marker, model less measured, in segment axes."""
+
+    def transpose(self, trial: Response, back: Array) -> Array:
+        """Return (K, p): sum over time of what ``back`` (F, 18, p) weighs on functionals, times those of every
+        error.
+        """
+        return np.tensordot(self.functional(trial), back, axes=((0, 1), (0, 1)))
 
     @abstractmethod
     def squares(self, trial: Response) -> Array:

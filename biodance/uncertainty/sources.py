@@ -58,20 +58,19 @@ def forward(sources: tuple[ErrorSource, ...], motion: Motion) -> Errors:
     1 %).
     """
     trial = Response.of(sources[0].body, motion)
-    effects = [source.forward(trial) for source in sources]
-    wrench = np.concatenate([trial.wrench(value) for value, _ in effects], axis=2)
+    wrench = np.concatenate([trial.wrench(source.functional(trial)) for source in sources], axis=2)
     names, joints = (
         tuple(name for source in sources for name in getattr(source, which)) for which in ("groups", "joints")
     )
-    return Errors(names, joints, wrench, np.concatenate([left for _, left in effects], axis=2))
+    return Errors(names, joints, wrench, np.concatenate([source.residual(trial) for source in sources], axis=2))
 
 
 def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) -> Array:
     """Return (K, p): sum over time of ``weight`` (F, 6, p), wrench about the lab origin, times what every error adds
     to the wrench.
     """
-    pull = trial.pull(weight)
-    return np.concatenate([source.transpose(trial, pull) for source in sources])
+    back = trial.back(weight)
+    return np.concatenate([source.transpose(trial, back) for source in sources])
 
 
 def _patterns(body: Body) -> tuple[Array, ...]:

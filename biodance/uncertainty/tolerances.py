@@ -9,7 +9,7 @@ in ``anthropometry/uncertainty/null_sessions.toml``, or a laboratory's own.
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from types import MappingProxyType
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_rows, error_size
 from biodance.library import locate
-from biodance.records import Array, frozen_array
+from biodance.records import Array, Index, frozen_array
 
 REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
@@ -255,6 +255,16 @@ def mean_key(name: str, target: str, parameter: str) -> str:
     return " ".join(filter(None, (name, rest if colon and plate.startswith("plate") else target, parameter)))
 
 
+_PIECE = 128
+"""Coefficients whitened at once."""
+
+
+def _in_pieces(rows: Index) -> Iterator[Index]:
+    """Yield the indices a few at a time: what is made of them needs little memory."""
+    for start in range(0, rows.size, _PIECE):
+        yield rows[start : start + _PIECE]
+
+
 def whitened(
     rows: Array,
     band: NDArray[np.intp],
@@ -271,8 +281,8 @@ def whitened(
     out = np.empty(rows.shape, rows.dtype) if out is None else out
     wrench, white = (some[:count].reshape(band.size, 6, -1) for some in (rows, out))
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
-        chosen = band == b
-        white[chosen] = matrix @ wrench[chosen]
+        for some in _in_pieces(np.flatnonzero(band == b)):
+            white[some] = matrix @ wrench[some]
     known, cameras = [tolerances.size(key) for key in marker_keys], error_size("camera", "marker")
     sd = np.array([max(size, cameras) if size > 0 else np.inf for size in known], dtype=rows.dtype)
     out[count:] = rows[count:] / sd[:, None]

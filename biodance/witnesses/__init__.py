@@ -8,6 +8,7 @@ altered as the cause would alter it, and the witness is asked again (`traces`).
 """
 
 import inspect
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -131,7 +132,7 @@ def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Wi
 def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
     """Return all that the witnesses saw in one trial, finite values only."""
     found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
-    return tuple(one for one in found if np.isfinite([one.value, one.expected, one.sd]).all())
+    return tuple(one for one in found if all(map(math.isfinite, (one.value, one.expected, one.sd))))
 
 
 def traces(

@@ -5,6 +5,7 @@ force comes late, must not hide the very steps that show it.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,10 @@ _UNSEEN = 0.05
 """s over which a marker that was not seen is believed to go on straight."""
 
 
+_KEPT = 64
+"""Sets of times at which a foot's place is kept."""
+
+
 @dataclass(frozen=True, eq=False)
 class FootPath:
     """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
@@ -47,10 +52,19 @@ class FootPath:
     time: Array
     heel: Array
     toe: Array
+    _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, time: Array) -> tuple[Array, Array]:
-        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
-        return _between(self.time, self.heel, time), _between(self.time, self.toe, time)
+        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
+
+        It is kept: witnesses are asked for the same times again and again, of recordings whose plates were altered.
+        """
+        key = time.tobytes()
+        if key not in self._known:
+            if len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = _between(self.time, self.heel, time), _between(self.time, self.toe, time)
+        return self._known[key]
 
     def outline(self, time: Array) -> Array:
         """Return the sole (n, P, 2) m seen from above, from heel and toe marker."""
@@ -80,7 +94,7 @@ class FootPath:
         """Hz of the markers."""
         return rate_of(self.time)
 
-    @property
+    @cached_property
     def velocity(self) -> Array:
         """(T, 3) m/s of the middle between the two markers."""
         if self.time.size < 2:

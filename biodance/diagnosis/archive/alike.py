@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from biodance.records import Array
 
@@ -87,7 +87,7 @@ def likenesses(sessions: Sequence[SessionLeft]) -> tuple[AlikeSessions, ...]:
     if not pairs:
         return ()
     independent = len(cells) / _CELLS_EACH
-    needed = float(np.tanh(norm.isf(_CHANCE / len(pairs)) / np.sqrt(independent - 3)))
+    needed = float(np.tanh(-ndtri(_CHANCE / len(pairs)) / np.sqrt(independent - 3)))
     alike: dict[int, dict[int, float]] = {}
     for i, j in pairs:
         correlation = _correlation(pattern[i], pattern[j])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateVisit
 from biodance.diagnosis.archive.series import Fitted, Series, fit_series
@@ -238,7 +238,7 @@ def _change(series: Series, columns: Array, fitted: Fitted, chosen: list[_Candid
     possible = [other.at for other, gain in zip(dates, fall, strict=True) if fall.max() - gain <= _DATE]
     first, last = (series.visits[v] for v in (min(possible), max(possible)))
     free = max(1, np.unique(series.visit).size - columns.shape[1])  # visits that tell how much visits differ
-    half = float(student.ppf(0.975, free)) * error
+    half = float(stdtrit(free, 0.975)) * error
     return Change(
         one.plate,
         series.quantity,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
@@ -129,7 +129,7 @@ def wandering_findings(plate: str, level: PlateLevel, one: History) -> list[Plat
     left = (series.value - one.columns @ one.fitted.beta)[rows]
     free = left.size - np.linalg.matrix_rank(one.columns[rows])
     ratio = float(np.sum((left / series.sd[rows]) ** 2)) / max(1, free)
-    if free < 1 or fisher.sf(ratio, free, 60) > ALARM * known.share:
+    if free < 1 or fdtrc(free, 60, ratio) > ALARM * known.share:
         return []
     low, high = series.value[rows].min(), series.value[rows].max()
     text = (

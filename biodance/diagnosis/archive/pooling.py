@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from biodance.records import Array
 
@@ -51,11 +51,11 @@ def pool(value: Array, sd: Array) -> Pooled:
     k = value.size
     if k > 1:  # the scatter that is there, never less than the errors that are known
         scatter = max(1.0, float(weight @ (value - mean) ** 2) / (k - 1))
-        error, quantile = float(np.sqrt(scatter / weight.sum())), float(student.ppf(0.975, k - 1))
-        p = float(2 * student.sf(abs(mean) / error, k - 1))
+        error, quantile = float(np.sqrt(scatter / weight.sum())), float(stdtrit(k - 1, 0.975))
+        p = float(2 * stdtr(k - 1, -abs(mean) / error))
     else:
         error, quantile = float(np.sqrt(variance[0])), 1.96
-        p = float(2 * student.sf(abs(mean) / error, 1e9))
+        p = float(2 * stdtr(1e9, -abs(mean) / error))
     trust = spread2 / (spread2 + variance)
     own = mean + trust * (value - mean)
     own_sd = np.sqrt(trust * variance + (1 - trust) ** 2 * error**2)

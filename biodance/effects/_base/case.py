@@ -12,7 +12,7 @@ from biodance.effects._base.geometry import Geometry, GeometryChanges, geometry
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
-from biodance.motion.regressor import regressor_of
+from biodance.motion.regressor import regressor_of, wrench_of_segments
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
 from biodance.spatial import wrench_about_point
 
@@ -63,7 +63,7 @@ class Case:
         """(T, 6) N, N·m wrench about the lab origin that the motion needs. Candidate causes are built from this one,
         never from the measured wrench: columns of measured channels reproduce any residual exactly.
         """
-        return self.regressor @ self.phi
+        return wrench_of_segments(self.body, self.segments, self.phi)
 
     @property
     def residual(self) -> Array:

@@ -26,7 +26,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.kinematics import Poses, SegmentMotion, below, jacobian
+from biodance.motion.kinematics import Poses, SegmentMotion, below, place_jacobian
 from biodance.records import Array
 from biodance.spatial import cross, skew
 
@@ -69,7 +69,7 @@ class PostureAnswer:
     @cached_property
     def tangent(self) -> Array:
         """(F, K, 3, nv) m per unit of every coordinate, of the model markers."""
-        place, _ = jacobian(self.body, self.pose, list(self.segment), self.markers)
+        place = place_jacobian(self.body, self.pose, list(self.segment), self.markers)
         return place.reshape(*self.markers.shape, self.body.nv)
 
     @cached_property

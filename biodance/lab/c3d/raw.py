@@ -161,6 +161,10 @@ def _smells(
     return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
 
 
+_FRAMES = 4096
+"""Frames looked at at once: little memory, however long the recording."""
+
+
 def _leaps(points: Array, parameters: Parameters) -> int:
     """Return how often a marker moves by more than a metre between two frames in which it is seen; 0 if the unit is
     not known.
@@ -169,8 +173,11 @@ def _leaps(points: Array, parameters: Parameters) -> int:
         metre = 1.0 / metres_per_unit(parameters, points, where="")[0]
     except FileRefused:
         return 0
-    step = np.abs(np.diff(points, axis=0)).max(axis=2, initial=0.0)
-    return int(np.count_nonzero(step > LEAP * metre))
+    found = 0
+    for start in range(0, len(points), _FRAMES):
+        step = np.abs(np.diff(points[start : start + _FRAMES + 1], axis=0)).max(axis=2, initial=0.0)
+        found += int(np.count_nonzero(step > LEAP * metre))
+    return found
 
 
 def _fit(names: list[str], count: int) -> tuple[str, ...]:

@@ -64,12 +64,24 @@ def metres_per_unit(
     return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
 
 
+_FRAMES = 4096
+"""Frames looked at at once: little memory, however long the recording."""
+
+
+def _extents(points: Array) -> Array:
+    """Return the largest side of the box about the markers (T, K, 3) in frames that show four of them."""
+    frames = points[np.isfinite(points).all(axis=2).sum(axis=1) >= 4]
+    if not len(frames):
+        return np.empty(0)
+    return np.asarray((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1))
+
+
 def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     """Return a length in file units, what it should be in metres, and its name; NaN if the file holds none."""
-    seen = np.isfinite(points).all(axis=2)
-    frames = points[seen.sum(axis=1) >= 4]
-    if len(frames):
-        extent = float(np.median((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1)))
+    parts = [_extents(points[start : start + _FRAMES]) for start in range(0, len(points), _FRAMES)]
+    extents = np.concatenate([*parts, np.empty(0)])
+    if extents.size:
+        extent = float(np.median(extents))
         if 0 < extent < math.inf:
             return extent, PERSON, "a cloud of markers"
     corners = parameter_numbers(parameters, *_CORNERS)

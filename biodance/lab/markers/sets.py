@@ -10,7 +10,7 @@ mark which anatomical landmark.
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
 
@@ -90,14 +90,22 @@ class MarkerSet:
         folded: dict[str, list[str]] = {}
         for label in given:
             folded.setdefault(label.casefold(), []).append(label)
-        found = {}
-        for label in self.labels:
-            spellings = (label, *(alias for alias, target in self.aliases.items() if target == label))
-            exact = [spelling for spelling in spellings if spelling in given]
+        found, known = {}, set(given)
+        for label, spellings in self._spellings.items():
+            exact = [spelling for spelling in spellings if spelling in known]
             similar = [folded[s.casefold()][0] for s in spellings if len(folded.get(s.casefold(), ())) == 1]
             if exact or similar:
                 found[label] = (exact or similar)[0]
         return found
+
+    @cached_property
+    def _spellings(self) -> Mapping[str, tuple[str, ...]]:
+        """Every label with itself and its aliases, in file order."""
+        spelt = {label: [label] for label in self.labels}
+        for alias, target in self.aliases.items():
+            if target in spelt:
+                spelt[target].append(alias)
+        return {label: tuple(some) for label, some in spelt.items()}
 
 
 def read_marker_set(name_or_path: str | Path) -> MarkerSet:

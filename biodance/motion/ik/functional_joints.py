@@ -31,7 +31,7 @@ from biodance.motion.ik.joint_unknowns import (
     own_turn,
     own_unknowns,
 )
-from biodance.motion.kinematics import chains, jacobian, poses
+from biodance.motion.kinematics import chains, place_jacobian, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
 
@@ -208,7 +208,7 @@ def evaluate_joints(
     weight = np.sqrt(body.markers.weight)[:, None] * seen / noise
     rows = weight.reshape(len(q), -1)
     residual = rows * np.where(seen, apart, 0.0).reshape(len(q), -1)
-    coordinates = rows[..., None] * jacobian(body, pose, segment, points)[0] * _free(body, q)[:, None]
+    coordinates = rows[..., None] * place_jacobian(body, pose, segment, points) * _free(body, q)[:, None]
     free = _left_open(coordinates, rows[..., None] * unknowns.slope(body, stand, pose, points, theta))
     prior, prior_slope = unknowns.prior(theta)
     gradient = np.einsum("trp,tr->p", free, residual) + prior_slope.T @ prior

@@ -1,6 +1,7 @@
 """results.json: what the pipeline found, under keys whose unit is their suffix. NaN becomes null."""
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,8 @@ def plain_values(value: object) -> Any:
     """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes
     None.
     """
+    if isinstance(value, float) and not isinstance(value, np.generic):
+        return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
         return {str(key): plain_values(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -26,8 +29,6 @@ def plain_values(value: object) -> Any:
         return [plain_values(item) for item in value]
     if isinstance(value, np.generic):
         return plain_values(value.item())
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
     return value if value is None or isinstance(value, str | int | bool) else str(value)
 
 

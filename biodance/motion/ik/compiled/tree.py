@@ -125,6 +125,46 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
 
 
 @compiled
+def fill_wrench(rotation, position, omega, alpha, drive, phi, wrench):
+    """Fill wrench (T, 6) with what links with the parameters ``phi`` (N, 10) need: `fill_regressor` times phi; it holds
+    zeros.
+    """
+    w, dw, h, spin, force, moment = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    first, about = np.empty(3), np.empty(3)
+    for t in range(position.shape[0]):
+        for s in range(position.shape[1]):
+            R, f, m, own = rotation[t, s], drive[t, s], phi[s, 0], phi[s]
+            _apply_transposed(R, omega[t, s], w)
+            _apply_transposed(R, alpha[t, s], dw)
+            _apply(R, own[1:4], h)
+            _turn_inertia(own, w, spin)
+            _turn_inertia(own, dw, moment)
+            _add_product(w, spin, moment)
+            first[:] = 0.0
+            _add_product(w, own[1:4], first)
+            force[:] = 0.0
+            _add_product(w, first, force)
+            _add_product(dw, own[1:4], force)
+            _apply(R, force, first)
+            _apply(R, moment, about)
+            _add_product(h, f, about)
+            for c in range(3):
+                force[c] = m * f[c] + first[c]
+            _add_product(position[t, s], force, about)
+            for c in range(3):
+                wrench[t, c] += force[c]
+                wrench[t, 3 + c] += about[c]
+
+
+@compiled
+def _turn_inertia(own, v, out):
+    """Fill out (3,) with I v, of the parameters own (10,)."""
+    out[0] = own[4] * v[0] + own[5] * v[1] + own[7] * v[2]
+    out[1] = own[5] * v[0] + own[6] * v[1] + own[8] * v[2]
+    out[2] = own[7] * v[0] + own[8] * v[1] + own[9] * v[2]
+
+
+@compiled
 def _inertia_columns(v, L):
     """Fill L (3, 6) with L [Ixx Ixy Iyy Ixz Iyz Izz] = I v."""
     x, y, z = v
