@@ -152,7 +152,9 @@ def test_real_standing_is_not_accused_of_a_plate_fault(
 def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
     name: str, text: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Standing shows nothing but weights: a wrong mass, a gain or an offset, and which of them it cannot tell."""
+    """Standing shows nothing but weights: a wrong mass, a gain or an offset, all with their right size, and it cannot
+    tell which of them.
+    """
     diagnosis = found(standing(data, tmp_path / "faulty", name, text), monkeypatch, without=("labels_swapped",))
     assert diagnosis.verdict == "named, incomplete"
     (finding,) = diagnosis.findings
@@ -160,7 +162,8 @@ def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
     assert {"body_mass", "plate_gain"} <= names <= {"body_mass", "plate_gain", "plate_offset"}
     static = read_session(data / "biomechzoo" / name)
     weight = {"plate_gain": 0.08 * static.subject.mass, "plate_offset": 30 / 9.81}[text.partition(":")[0]]
-    assert finding.parameters[0].value == pytest.approx(weight, abs=2.5 * finding.parameters[0].sd)
+    size = {"body_mass": weight, "plate_gain": weight / static.subject.mass, "plate_offset": 9.81 * weight}
+    assert finding.parameters[0].value == pytest.approx(size[finding.effect], abs=2.5 * finding.parameters[0].sd)
     assert diagnosis.doubt == "standing alone tells no cause"
 
 
