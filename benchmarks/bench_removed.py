@@ -5,8 +5,9 @@
 
 One clear fault a session: the causes of tests/test_hidden_causes.py in the own laboratory (three trials), and their
 likes in an independent one (four trials, real rooms: ``--noise 0.6 --camera 0.3``). Each session is diagnosed without
-the culprit's effect and with the whole family (``--whole``: only that). Answers are kept per ``--run`` (`hidden_sessions.CACHE`), so that a run
-that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed from all of them.
+the culprit's effect and with the whole family (``--whole``: only that). Answers are kept per ``--run``
+(`hidden_sessions.CACHE`), so that a run that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed
+from all of them.
 """
 
 import argparse
