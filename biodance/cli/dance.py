@@ -120,7 +120,7 @@ def play_command(
     """
     from biodance.dance.dance import Dance
     from biodance.dance.rehearsal import rehearse
-    from biodance.report.dance_write import playback_document
+    from biodance.report.documents.dance import playback_document
     from biodance.report.figures.film import film_path, write_film
 
     place, one = film_path(out, force=force), Dance.load(dance)

@@ -24,7 +24,7 @@ OTHER_SIDE = 0.2
 """Share of its squares that a touch may lie on the other side."""
 _BESIDE = 0.1
 """m, standard deviation before the data of the place of a touch from the far end of its segment: a hand's length."""
-_STEPS = 3
+_STEPS = 2
 """Gauss-Newton steps of a place and the course of the force together."""
 
 
@@ -69,7 +69,7 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
         return None
     suspects = tuple(_suspect(one, score) for one in order)
-    best = _loose(base, _placed(base, order[0]))
+    best = _placed(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
     course = belief.mean[-best.white.shape[1] :]
     if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
@@ -130,29 +130,28 @@ def _placed(base: Model, one: _Passing) -> _Passing:
     """Return the cause at the place of its segment where it explains most: a hand's length off, the moment of a touch
     is several newton metres off. Gauss-Newton steps of the place and the course of the force together.
     """
-    place, start = np.zeros(3), base.belief.mean.size
-    if one.effect.beside(place) is None:
-        return one
-    for step in range(_STEPS):
-        loose = _loose(base, one)
-        end, white = start + one.white.shape[1], loose.size * one.white
-        if step == 0:
-            belief = believe(np.concatenate([base.belief.X, white], axis=1), base.belief.y)
-        slopes = _slopes(base, one.effect, place, loose.size * belief.mean[start:end])
-        belief = believe(
-            np.concatenate([base.belief.X, white, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place
-        )
-        place = _BESIDE * belief.mean[end:]
-        one = _passing(base, one.effect.beside(place, fine=True))
-    return one
+    place, start, loose = np.zeros(3), base.belief.mean.size, _loose(base, one)
+    for _ in range(_STEPS):
+        both = np.concatenate([base.belief.X, loose.size * loose.white], axis=1)
+        course = loose.size * believe(both, base.belief.y).mean[start:]
+        slopes = _slopes(base, loose.effect, place, course)
+        if slopes is None:
+            return loose
+        belief = believe(np.concatenate([both, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place)
+        place = _BESIDE * belief.mean[both.shape[1] :]
+        there = loose.effect.finer().beside(place)
+        moved = None if there is None else _passing(base, there)
+        loose = loose if moved is None else _loose(base, moved)
+    return loose
 
 
-def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array:
+def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
     """Return the whitened columns (r, 3) of what a metre of each axis of the ``place`` changes in a touch of
-    ``course`` (k,): the wrench of a force is linear in its place.
+    ``course`` (k,): the wrench of a force is linear in its place; None for a cause that acts at no point.
     """
-    here, *there = (_touch(base, effect.beside(place + step), course) for step in np.eye(4, 3, -1))
-    return base.white(np.stack([one - here for one in there], axis=1))
+    spots = [effect.beside(place + step) for step in np.eye(4, 3, -1)]
+    here, *there = (_touch(base, spot, course) for spot in spots if spot is not None)
+    return base.white(np.stack([one - here for one in there], axis=1)) if there else None
 
 
 def _touch(base: Model, effect: Effect, course: Array) -> Array:
@@ -160,8 +159,9 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     samples, put = [], base.problem
     for case in put.cases:
         columns = effect.local(case)
-        samples.append((columns @ course[: columns.shape[2]])[:, :, None])
-        course = course[columns.shape[2] :]
+        width = 0 if columns is None else columns.shape[2]
+        samples.append(np.zeros((case.motion.time.size, 6, 1)) if columns is None else columns @ course[:width, None])
+        course = course[width:]
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 

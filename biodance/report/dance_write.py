@@ -12,13 +12,13 @@ import numpy as np
 from biodance.dance.cues import cue_sheet, dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
-from biodance.dance.rehearsal import Rehearsal
 from biodance.dance.verify import Margin
 from biodance.lab.c3d.write import FileValue, write_c3d
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.still import posture_still
 from biodance.records import SIDES, Array, Markers
+from biodance.report.documents.dance import dance_document
 from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png
@@ -62,101 +62,6 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
             (folder / "postures_3d.png").write_bytes(picture)
     (folder / "results.json").write_text(to_text(found), encoding="utf-8", newline="\n")
     return found
-
-
-def dance_document(result: DanceResult) -> dict[str, Any]:
-    """Return what `biodance dance` promises as results.json (see docs/guide/dance.md); SI units by suffix."""
-    dance, account, expectation = result.dance, result.account, result.expectation
-    limits = [
-        {"limit": m.limit, "worst": m.worst, "where_s": m.where_s, "unit": m.unit, "what": m.what}
-        for m in result.margins
-    ]
-    criterion = None
-    if account is not None:
-        criterion = {
-            "static": account.static,
-            "static_bound": account.static_bound,
-            "dynamic": account.dynamic,
-            "dynamic_bound": account.dynamic_bound,
-            "hardly_excited": account.hardly,
-        }
-    rows = []
-    if expectation is not None:
-        for i, name in enumerate(expectation.segments):
-            ends = {"mass_kg": expectation.mass, "com_m": expectation.com, "inertia_kgm2": expectation.inertia}
-            now = {key: values[-1, i] for key, values in ends.items()}
-            before = {key.replace("_", "_table_", 1): values[0, i] for key, values in ends.items()}
-            rows.append({"segment": name, **now, **before, "information": expectation.share[-1, i]})
-    return {
-        "protocol": result.plan.name,
-        "postures": int(dance.counted.sum()) if dance else 0,
-        "transitions": len(dance.move) if dance else 0,
-        "duration_s": dance.duration if dance else 0.0,
-        "criterion": criterion,
-        "margins": limits,
-        "feasible": result.feasible,
-        "reason": result.reason,
-        "expected_sd": rows,
-        "expected_curve": _curve(result),
-        "for": result.plan.whom,
-        "instructions": _counted(dance),
-        "performers": result.performers,
-        "simplicity_price": _price(result),
-        "warnings": result.warnings,
-        "notes": (*result.notes, *(dance.notes if dance else ())),
-        "seed": dance.seed if dance else None,
-        "compute_s": result.seconds,
-    }
-
-
-def _price(result: DanceResult) -> dict[str, Any] | None:
-    """Return the expected standard deviations (root mean square over the segments) with the dance as it is, and if the
-    same postures were chosen freely.
-    """
-    if result.expectation is None or result.freely is None:
-        return None
-    both = {"with": result.expectation, "without": result.freely}
-    return {
-        f"{key}_{unit}": {name: float(np.sqrt(np.mean(getattr(one, key)[-1] ** 2))) for name, one in both.items()}
-        for key, unit in (("mass", "kg"), ("com", "m"))
-    } | {"sentence": result.price}
-
-
-def _counted(dance: Dance | None) -> dict[str, float] | None:
-    """Return how many things are called at once, on average and at most."""
-    if dance is None:
-        return None
-    counts = [len(said) for said in dance_instructions(dance)]
-    return {"mean": float(np.mean(counts)), "max": max(counts)}
-
-
-def playback_document(found: Rehearsal, film: Path) -> dict[str, Any]:
-    """Return what became of a dance that was played: until when it stands, and how far it is from its plan."""
-    p = found.playback
-    return {
-        "film": str(film),
-        "stays_up": p.stays_up,
-        "fell_s": p.fell,
-        "played_s": float(p.time[-1]),
-        "angle_rms_rad": float(np.sqrt(np.mean(p.angle_error**2))),
-        "tilt_worst_rad": float(p.tilt_error.max()),
-        "pelvis_worst_m": float(p.root_error.max()),
-        "cop_rms_m": float(np.sqrt(np.nanmean(p.zmp_error**2))),
-        "cop_inside_least_m": float(np.nanmin(found.inside)),
-    }
-
-
-def _curve(result: DanceResult) -> dict[str, Any] | None:
-    if result.expectation is None:
-        return None
-    e = result.expectation
-    return {
-        "segments": e.segments,
-        "duration_s": e.duration,
-        "mass_kg": e.mass,
-        "com_m": e.com,
-        "inertia_kgm2": e.inertia,
-    }
 
 
 def _held(dance: Dance, chosen: Sequence[int]) -> tuple[Any, Any, Any]:
