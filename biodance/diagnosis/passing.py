@@ -68,15 +68,15 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     score = float(np.log(len(found)))
     if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
         return None
-    suspects = tuple(_suspect(one, score) for one in order)
+    seen, suspects = order[0].found, tuple(_suspect(one, score) for one in order)
+    if seen.log_bayes_factor - score < needed(base, seen.visible):
+        return None
+    if not one_sided(seen.mean.reshape(-1, len(order[0].effect.parameters))):
+        return None
     best = _loose(base, _placed(base, order[0]))
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
-    course = belief.mean[-best.white.shape[1] :]
-    if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
-        return None
-    touch = _named(base, best, course, order[0])
-    seen = order[0].found
-    if seen.log_bayes_factor - score < needed(base, seen.visible) or not stands(base, touch):
+    touch = _named(base, best, belief.mean[-best.white.shape[1] :], order[0])
+    if not stands(base, touch):
         return None
     named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)
