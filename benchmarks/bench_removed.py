@@ -1,12 +1,13 @@
 """Take one effect out of the family: how often is an innocent named when the culprit is not among the candidates.
 
     BIODANCE_FOREIGN_LAB=folder PYTHONPATH=tests python benchmarks/bench_removed.py --run NAME [--only own foreign]
-        [--match TEXT]
+        [--match TEXT] [--whole]
 
 One clear fault a session: the causes of tests/test_hidden_causes.py in the own laboratory (three trials), and their
 likes in an independent one (four trials, real rooms: ``--noise 0.6 --camera 0.3``). Each session is diagnosed without
-the culprit's effect and with the whole family. Answers are kept per ``--run`` (`hidden_sessions.CACHE`), so that a run
-that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed from all of them.
+the culprit's effect and with the whole family (``--whole``: only that). Answers are kept per ``--run``
+(`hidden_sessions.CACHE`), so that a run that was stopped goes on; the table in docs/benchmarks/diagnosis.md is printed
+from all of them.
 """
 
 import argparse
@@ -172,7 +173,7 @@ def per_cause(found: list[Answer], column: str) -> None:
     without = {one.hidden: one for one in found if one.without and one.column == column}
     for one in (one for one in found if not one.without and one.column == column):
         size = f"{truth(one):.3g}: {one.size[0]:.3g} ± {one.size[1]:.2g}" if one.size else ""
-        other = without[one.hidden]
+        other = without.get(one.hidden, one)
         print("", one.hidden, one.verdict, ", ".join(one.named), size, ", ".join(one.resembled),
               f"{other.verdict} {', '.join(other.named)}".strip(), "", sep=" | ")  # fmt: skip
     sized = [one for one in found if not one.without and one.column == column and one.size and truth(one) == truth(one)]
@@ -186,6 +187,7 @@ def main() -> None:
     parser.add_argument("--run", required=True)
     parser.add_argument("--only", nargs="+", default=["own", "foreign"])
     parser.add_argument("--match", default="")
+    parser.add_argument("--whole", action="store_true")
     asked = parser.parse_args()
     kept, found = CACHE / f"removed-{asked.run}.jsonl", []
     kept.parent.mkdir(parents=True, exist_ok=True)
@@ -196,7 +198,8 @@ def main() -> None:
         if column not in asked.only or asked.match not in said or (column, said) in known:
             continue
         result = _kept(f"{column}-{said}", session)
-        both = [answered(column, effect, said, result, without=without) for without in (True, False)]
+        ways = (False,) if asked.whole else (True, False)
+        both = [answered(column, effect, said, result, without=without) for without in ways]
         with kept.open("a") as stream:
             stream.writelines(json.dumps(asdict(one)) + "\n" for one in both)
         found += both

@@ -1,6 +1,7 @@
 """A dance that people follow: few instructions, one or two parts at a time, room for imprecise people, pictures."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,15 +9,18 @@ import pytest
 from small_dances import BODY, small_dance
 
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
+from biodance.dance.followable import mending
 from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.vocabulary import read_vocabulary, words_for
-from biodance.dance.followable.walk import Walk, walked_dance
+from biodance.dance.followable.reach import FAR, Reach
+from biodance.dance.followable.vocabulary import read_vocabulary, words_for, words_left_out
+from biodance.dance.followable.walk import NoWay, Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, mass_centre
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import perform_with, rehearse_imprecisely
+from biodance.dance.performers import Rehearsed, Room, perform_with, rehearse_imprecisely
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
+from biodance.dance.problem.person import PersonLimits, limit_body
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.transitions.context import Checkpoint, DesignContext
 from biodance.dance.verify import broken, verify
@@ -33,12 +37,14 @@ def walked():
         work = DesignContext(
             CHAIN, excitation_blocks(BODY), PLAN, 0, Checkpoint(None, BODY, PLAN, 0), pool, lambda *_: None
         )
-        steps, moves = Walk(work).take(support_sequence(BODY, PLAN))
-        return steps, walked_dance(work, steps, moves)
+        walk = Walk(work)
+        steps, moves = walk.take(support_sequence(BODY, PLAN))
+        return walk, steps, moves
 
 
 def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
-    steps, dance = walked
+    walk, steps, moves = walked
+    dance = walked_dance(walk.work, steps, moves)
     for before, after in pairwise(steps):
         changed = [part for part, word in after.words.items() if word.key != before.words[part].key]
         assert after.mirror or 1 <= len(changed) <= 2
@@ -47,6 +53,54 @@ def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
     assert all((p in dance.mirrored) == (what == MIRROR_CALL) for p, what in enumerate(said))
     assert not broken(verify(BODY, dance, PLAN.limits))
     assert len({step.s for step in steps}) == len(steps)
+
+
+def test_where_a_performer_has_too_little_room_another_posture_is_danced(walked, monkeypatch) -> None:
+    walk, steps, moves = walked
+
+    def performed(_workers, dance, _limits, *, who=range(200), only=()):
+        bad = bool((dance.postures == steps[2].x).all(axis=1).any()) and (not only or 2 in only)
+        room = Room("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
+        return Rehearsed(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
+
+    monkeypatch.setattr(mending, "perform_with", performed)
+    dance, found = mending.mended_dance(walk, steps, moves, walk.work.workers)
+    assert found.safe
+    assert not dance.notes
+    changed = np.flatnonzero((dance.postures != np.array([step.x for step in steps])).any(axis=1))
+    np.testing.assert_array_equal(changed, [2])
+    assert max(map(len, dance_instructions(dance))) <= 3
+    assert not broken(verify(BODY, dance, PLAN.limits))
+
+
+def test_whoever_must_shift_weight_next_can_undo_what_was_called(walked) -> None:
+    walk, *_ = walked
+    both, over, *_ = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1))))
+    stand, shift = (walk.reach.catalogue(feet) for feet in (both, over))
+    work = replace(walk.work, plan=replace(PLAN, instructions=2.0))
+    left = Reach(work, lambda *_: True).steps_to(stand, shift)
+    words = [stand.chosen(s) for s in range(len(left))]
+    assert {n for n, word in zip(left, words, strict=True) if word["trunk"].rest and word["legs"].rest} == {1}
+    assert {n for n, word in zip(left, words, strict=True) if not word["trunk"].rest and not word["legs"].rest} == {2}
+    assert set(Reach(work, lambda *_: False).steps_to(stand, shift)) == {FAR}
+
+
+def test_feet_that_cannot_be_reached_are_named() -> None:
+    stances = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1), ("single_left", 1))))
+    on = [(one.name, one.over) for one in stances]
+    lift, down = on.index(("single_right", None)), on.index(("single_right", None)) + 1
+    assert NoWay("", stances, lift - 1).stance == NoWay("", stances, lift).stance == "single_right"
+    assert NoWay("", stances, down).stance == "single_right"
+    assert NoWay("", stances, down + 1).stance == NoWay("", stances, down + 2).stance == "single_left"
+
+
+def test_what_a_stiff_arm_cannot_do_is_said() -> None:
+    (stance, *_), words = support_sequence(BODY, PLAN), read_vocabulary()
+    assert words_left_out(BODY, PLAN, (stance,), words) == ()
+    stiff = replace(BODY, limits=limit_body(BODY, PersonLimits(range_shares=(("left_shoulder", 0.3),))))
+    (said,) = words_left_out(stiff, PLAN, (stance,), words)
+    assert said.startswith("Left out for the left arm: the left arm out to the side (a T)")
+    assert "left shoulder adduction" in said
 
 
 def test_a_catalogue_stands_balanced_on_its_feet() -> None:

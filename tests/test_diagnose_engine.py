@@ -149,10 +149,10 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
     one = body()
     index = one.segment_index("left_forearm_hand")
     low, high = one.boxes[index]
-    tip = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    palm = np.array([(low[0] + high[0]) / 2, low[1] + 0.08, (low[2] + high[2]) / 2])
 
     def touched(wrench, session, moving):
-        point = poses(one, moving.q).points([index], tip[None])[:, 0]
+        point = poses(one, moving.q).points([index], palm[None])[:, 0]
         strength = 15.0 * (np.clip(1 - np.abs(moving.time - 5.0), 0, 1) + np.clip(1 - np.abs(moving.time - 9.0), 0, 1))
         force = strength[:, None] * np.array([0.0, 0.3, 1.0])
         return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
@@ -165,6 +165,7 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
         1 / 3
     )  # of a force that rises and falls in proportion to time, half of the squares lie above this share of its peak
     np.testing.assert_allclose(size, middle * np.array([0.0, 4.5, 15.0]), atol=1.5)
+    np.testing.assert_allclose(examined.named[0].effect.place, [0.0, 0.08, 0.0], atol=0.03)
     look = looks(1, hidden=touched)[0]
     case = Case(one, look.trial, look.motion, one.sip.phi, np.linspace(0, 0.25, look.motion.time.size))
     added = accept(case, examined.named).trial.wrench.value - look.trial.wrench.value

@@ -1,4 +1,4 @@
-"""What was put right in the body before any force was looked at is named: a joint elsewhere, a marker that has moved."""
+"""What was put right in the body before any force was looked at is named: a joint elsewhere, a marker that moved."""
 
 from dataclasses import replace
 

@@ -32,6 +32,8 @@ CAUSES = (
     "lab_tilt:target=x,angle=-0.05",
     "time_delay:delay=-0.02",
     "clock_drift:stretch=0.03",
+    "filter_mismatch:cutoff=3",
+    "external_contact:target=right_forearm_hand,force=15",
     "body_weight_support:target=pelvis,force=25,stiffness=25",
     "sloshing_load:target=trunk_head,mass=6,sloshing=4.5",
     "wobbling_mass:target=trunk_head,mass=8",
@@ -46,8 +48,6 @@ CAUSES = (
 )
 UNTOLD = (
     "head_joint:angle=0.25",  # the body has a neck where its markers show one, so that no joint is missing
-    "filter_mismatch:cutoff=3",
-    "external_contact:target=right_forearm_hand,force=15",
     "sloshing_load:target=trunk_head,mass=6,sloshing=4.5",
     "joint_centre:target=right_shoulder,shift=0;0;0.07",
     "shoulder_girdle:angle=0.25",

@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biodance.diagnosis.adequacy import strides_alike
+from biodance.diagnosis.heard import hear
+from biodance.diagnosis.testimony import weigh
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
@@ -137,6 +140,23 @@ def test_what_is_expected_of_walking_feet_is_not_asked_of_running_ones(recorded:
     said = {name: [observe(recording(one.trial), feet) for one in recorded[name].trials[1:]] for name in recorded}
     assert all(said["treadmill"])
     assert not any(said["run"])
+
+
+def test_the_heel_strikes_when_the_force_comes_and_equal_strides_tell_no_fault(recorded: dict) -> None:
+    heard = hear(recorded["treadmill"].session, ("time_delay", "body_mass", "plate_position"))
+    onset = [one.value for one in heard.observations if one.witness == "force_onset"]
+    assert len(onset) > 5
+    assert np.abs(np.median(onset)) < 0.006
+    assert weigh(heard).findings == ()
+    strides = [one for one in heard.observations if one.stride in one.norms]
+    assert len(strides) > 20
+    assert all(one.norms[one.stride] == pytest.approx(one.sd) for one in strides)
+
+
+def test_equal_strides_are_counted_once(recorded: dict) -> None:
+    walked = recorded["treadmill"].trials[1].motion
+    assert strides_alike(walked) == pytest.approx((walked.time[-1] - walked.time[0]) / 1.18, rel=0.1)
+    assert strides_alike(recorded["treadmill"].trials[0].motion) == 1
 
 
 @pytest.mark.parametrize("text", ['gait = "hop"', 'gait = "run"\nspeed = 9.0', 'gait = "run"\nseconds = 1.0'])

@@ -122,3 +122,12 @@ def test_real_recordings_of_four_laboratories_take_faults(name: str, data: Path,
         )  # the empty plate's mean moves a little
     raw = read_raw(path), read_raw(tmp_path / "late.c3d")
     np.testing.assert_array_equal(raw[0].points, raw[1].points)
+
+
+def test_a_wrong_sign_of_fz_on_a_belt_is_turned_back_by_the_reader(data: Path, tmp_path: Path) -> None:
+    path = data / "gaitalytics" / "treadmill_no_events.c3d"
+    copy, before = written(path, tmp_path / "c.c3d", "axis_error:target=plate2:Fz"), read_trial(path)
+    assert any("Fz alone was turned round" in one for one in copy.plates[1].decisions)
+    assert not any("Two signs" in one for one in copy.warnings)
+    for one, other in zip(copy.plates, before.plates, strict=True):
+        np.testing.assert_allclose(one.wrench.value, other.wrench.value, atol=0.1)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -133,7 +134,8 @@ def _figure(table: "pd.DataFrame") -> "Figure | None":
             what, unit, factor = _KEY[name]
             axes.hist(found.to_numpy() * factor, bins=min(30, max(5, len(found) // 2)), color=BLUE)
             axes.axvline(float(np.median(found)) * factor, color=RED, linewidth=1)
-            axes.set(xlabel=f"{what}, {unit}", ylabel="sessions")
+            axes.set(xlabel=fill(f"{what}, {unit}", 26), ylabel="sessions")
+            axes.yaxis.get_major_locator().set_params(integer=True)
     return drawn
 
 

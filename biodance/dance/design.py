@@ -16,6 +16,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.followable.mending import mended_dance
+from biodance.dance.followable.vocabulary import words_left_out
 from biodance.dance.followable.walk import NoWay, Walk
 from biodance.dance.limits import Limit
 from biodance.dance.postures.ordering import order_postures, support_sequence
@@ -101,7 +102,8 @@ def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
             notes.append(f"Left out: all postures {way.stance.replace('_', ' ')}. {way}")
             plan = replace(plan, blocks=blocks)
     dance, found = mended_dance(walk, steps, moves, work.workers)
-    return replace(dance, notes=(*notes, *dance.notes)), found.margins(dance)
+    lacking = words_left_out(work.chain.body, plan, tuple(step.catalogue.stance for step in steps), walk.reach.words)
+    return replace(dance, notes=(*notes, *lacking, *dance.notes)), found.margins(dance)
 
 
 def _postures(work: DesignContext) -> Course:

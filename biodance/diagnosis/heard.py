@@ -134,7 +134,7 @@ def hear(
     asked = causes(chosen)
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
     seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    found, single = [observe(one) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
+    found, single = [_alike(observe(one)) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     parts = {name: [np.zeros(len(some)) for some in found] for name in known}
     plainly, found = found, [tuple(_by_norm(o, norms) for o in some) for some in found]

@@ -24,7 +24,7 @@ OTHER_SIDE = 0.2
 """Share of its squares that a touch may lie on the other side."""
 _BESIDE = 0.1
 """m, standard deviation before the data of the place of a touch from the far end of its segment: a hand's length."""
-_STEPS = 3
+_STEPS = 2
 """Gauss-Newton steps of a place and the course of the force together."""
 
 
@@ -73,7 +73,7 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
         return None
     if not one_sided(seen.mean.reshape(-1, len(order[0].effect.parameters))):
         return None
-    best = _loose(base, _placed(base, order[0]))
+    best = _placed(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
     touch = _named(base, best, belief.mean[-best.white.shape[1] :], order[0])
     if not stands(base, touch):
@@ -130,29 +130,38 @@ def _placed(base: Model, one: _Passing) -> _Passing:
     """Return the cause at the place of its segment where it explains most: a hand's length off, the moment of a touch
     is several newton metres off. Gauss-Newton steps of the place and the course of the force together.
     """
-    place, start = np.zeros(3), base.belief.mean.size
-    if one.effect.beside(place) is None:
-        return one
-    for step in range(_STEPS):
-        loose = _loose(base, one)
-        end, white = start + one.white.shape[1], loose.size * one.white
-        if step == 0:
-            belief = believe(np.concatenate([base.belief.X, white], axis=1), base.belief.y)
-        slopes = _slopes(base, one.effect, place, loose.size * belief.mean[start:end])
-        belief = believe(
-            np.concatenate([base.belief.X, white, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place
+    place = np.zeros(3)
+    for _ in range(_STEPS):
+        wide = SIZES[-1] * one.white
+        slopes = _slopes(base, one.effect, place, SIZES[-1] * _believed(base, wide, np.zeros(wide.shape[1])))
+        if slopes is None:
+            break
+        found = _believed(
+            base, np.concatenate([wide, _BESIDE * slopes], axis=1), np.append(0 * wide[0], place / _BESIDE)
         )
-        place = _BESIDE * belief.mean[end:]
-        one = _passing(base, one.effect.beside(place, fine=True))
-    return one
+        place = _BESIDE * found[-3:]
+        there = one.effect.finer().beside(place)
+        columns = None if there is None else local_basis(base.problem, there)
+        if there is not None and columns is not None:
+            one = replace(one, effect=there, white=base.white(columns))
+    return _loose(base, one)
 
 
-def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array:
-    """Return the whitened columns (r, 3) of what a metre of each axis of the ``place`` changes in a touch of
-    ``course`` (k,): the wrench of a force is linear in its place.
+def _believed(base: Model, Z: Array, there: Array) -> Array:
+    """Return the coefficients (k,) of further columns ``Z`` (r, k) of unit standard deviation, whose part ``there``
+    (k,) the target lacks: as `believe` with all columns would, from the score alone.
     """
-    here, *there = (_touch(base, effect.beside(place + step), course) for step in np.eye(4, 3, -1))
-    return base.white(np.stack([one - here for one in there], axis=1))
+    s, G = base.belief.score(Z)
+    return np.asarray(np.linalg.solve(np.eye(len(s)) + G, s + G @ there))
+
+
+def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
+    """Return the whitened columns (r, 3) of what a metre of each axis of the ``place`` changes in a touch of
+    ``course`` (k,): the wrench of a force is linear in its place; None for a cause that acts at no point.
+    """
+    spots = [effect.beside(place + step) for step in np.eye(4, 3, -1)]
+    here, *there = (_touch(base, spot, course) for spot in spots if spot is not None)
+    return base.white(np.stack([one - here for one in there], axis=1)) if there else None
 
 
 def _touch(base: Model, effect: Effect, course: Array) -> Array:
@@ -160,8 +169,9 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     samples, put = [], base.problem
     for case in put.cases:
         columns = effect.local(case)
-        samples.append((columns @ course[: columns.shape[2]])[:, :, None])
-        course = course[columns.shape[2] :]
+        width = 0 if columns is None else columns.shape[2]
+        samples.append(np.zeros((case.motion.time.size, 6, 1)) if columns is None else columns @ course[:width, None])
+        course = course[width:]
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 

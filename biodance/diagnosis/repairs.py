@@ -17,7 +17,7 @@ from biodance.uncertainty.tolerances import Tolerances, key_of
 
 _ALIKE = {
     "hip": (("segment_length", "thigh"), ("joint_centre", "knee")),
-    "knee": (("segment_length", "thigh"), ("segment_length", "shank"), ("joint_centre", "hip"), ("joint_centre", "ankle")),
+    "knee": (("segment_length", "thigh"), ("segment_length", "shank"), ("joint_centre", "hip")),
     "ankle": (("segment_length", "shank"), ("joint_centre", "knee")),
     "shoulder": (("segment_length", "upper_arm"), ("joint_centre", "elbow")),
     "elbow": (("segment_length", "upper_arm"), ("joint_centre", "shoulder")),

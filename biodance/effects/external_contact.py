@@ -16,7 +16,9 @@ from biodance.records import Array
 from biodance.spatial import wrench_of_force
 
 _STEP, _FINE = 0.4, 0.15
-"""s between the knots of its course: a hand comes and goes within about a second, and takes hold within half of one."""
+"""s between the values of its course, to look for it and to size it: a hand comes and goes within about a second, and
+takes hold within half of one.
+"""
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ class ExternalContact(Effect):
         return -np.stack([wrench_of_force(axis, point) for axis in np.eye(3)], axis=2)
 
     def local(self, case: Case) -> Array | None:
-        """Return the contact as a force that comes and goes: cubic splines through values every ``step`` s; None for the
-        root, which hands and feet are not: its forces would explain anything that hangs on the middle of the body.
+        """Return the contact as a force that comes and goes: cubic splines through values every ``step`` s; None for
+        the root, which hands and feet are not: its forces would explain anything that hangs on the middle of the body.
         """
         if case.body.segment_index(self.target) == 0:
             return None
@@ -64,10 +66,14 @@ class ExternalContact(Effect):
         course = CubicSpline(knots, np.eye(knots.size))(time)
         return (self.columns(case)[:, :, None, :] * course[:, None, :, None]).reshape(time.size, 6, -1)
 
-    def beside(self, place: Array, *, fine: bool = False) -> "ExternalContact":
+    def beside(self, place: Array) -> "ExternalContact":
         """Return the contact ``place`` (3,) m from the far end of its segment, in the segment's axes."""
         x, y, z = map(float, place)
-        return replace(self, place=(x, y, z), step=_FINE if fine else _STEP)
+        return replace(self, place=(x, y, z))
+
+    def finer(self) -> "ExternalContact":
+        """Return the contact with a value of its course every `_FINE` s."""
+        return replace(self, step=_FINE)
 
 
 EFFECT = ExternalContact

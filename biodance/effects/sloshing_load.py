@@ -71,7 +71,7 @@ class SloshingLoad(Effect):
     def _parts(self, case: Case, frequency: float, high: float) -> tuple[Array, Array]:
         """Return the wrenches (T, 6) per kilogram carried and per kilogram that sloshes."""
         index = case.body.segment_index(self.target)
-        local = carried_at(case, index) + [0.0, high, 0.0]
+        local = carried_at(case, index) + high * np.eye(3)[1]
         rigid = case.regressor[:, :, 10 * index : 10 * index + 10] @ point_mass(1.0, local)
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)

@@ -148,7 +148,7 @@ class DanceResult:
         else:
             out.append("Nobody imprecise was tried on this dance: it is for trained people only.")
         out += [self.price] if self.price else []
-        return (*out, *self.notes, *self.warnings)
+        return (*out, *self.notes, *(self.dance.notes if self.dance else ()), *self.warnings)
 
     @property
     def complete(self) -> bool:

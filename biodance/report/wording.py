@@ -13,9 +13,9 @@ def format_number(value: float | None, digits: int = 1) -> str:
     return text.replace("-", "−") if float(text) else text.lstrip("-")
 
 
-def millimetres(value: float | None) -> str:
-    """Return metres as text in millimetres."""
-    return format_number(None if value is None else 1000 * value, 1)
+def millimetres(value: float | None, digits: int = 1) -> str:
+    """Return metres as text in millimetres; templates choose the ``digits``: ``value|mm(0)``."""
+    return format_number(None if value is None else 1000 * value, digits)
 
 
 def trial_and_subject(one: Attention) -> str:

@@ -37,19 +37,23 @@ class StepCourse:
         return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
 
 
-@lru_cache(maxsize=16)
+def walks(seen: SeenTrial, step: FootStep) -> bool:
+    """Return whether a foot is down for as long as in walking."""
+    part, time = seen.stance(step), seen.plate(step.plate).wrench.time
+    return part is not None and bool(time[part.stop - 1] - time[part.start] >= _WALKS)
+
+
+@lru_cache(maxsize=128)
 def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
     """Return one step sample by sample; None where its plate's force does not show it or the foot runs. Of the last
     steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
-    if part is None:
+    if part is None or not walks(seen, step):
         return None
     wrench = seen.under(step)
     time, force = wrench.time[part], np.array(wrench.force[part])
     cop = np.array(wrench.cop(height=seen.plate(step.plate).height)[part, :2])
-    if time[-1] - time[0] < _WALKS:
-        return None
     phase = (time - time[0]) / (time[-1] - time[0])
     if step.beside:
         cop[~seen.swings(step, time)] = np.nan  # the plates beside hold the other foot, too

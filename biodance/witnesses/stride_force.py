@@ -7,6 +7,7 @@ other. A foot that reaches over the edge of its plate does not weigh: what it tr
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import step_course
+from biodance.witnesses._stance import walks
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
@@ -44,7 +45,13 @@ class StrideForce(Witness):
     source = "21 whole steps and 40 single supports of 10 persons of 5 public laboratories"
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
-        """Return one mass for each foot alone, and one mass and two horizontal forces for each whole step."""
+        """Return one mass for each foot alone, one mass and two horizontal forces for each whole step, and one mass of
+        all strides on a belt.
+        """
+        return _weights(seen)
+
+    def weights(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return the same, weighed anew."""
         if seen.pelvis is None or not seen.mass > 0:
             return ()
         alone = [one for step in seen.steps if not step.overhang for one in self._alone(seen, step)]
@@ -63,7 +70,7 @@ class StrideForce(Witness):
 
     def _alone(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
-        if part is None or step_course(seen, step) is None:
+        if part is None or not walks(seen, step):
             return []
         wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
@@ -88,6 +95,12 @@ class StrideForce(Witness):
             value, sd = float(needed[0, axis] - seen.mass * needed[1, axis]), _HORIZONTAL * seen.mass * g
             found.append(Observation(self.name, f"{what}, mean {channel}", seen.trial.name, value, sd, 0.0, "N"))
         return found
+
+
+@lru_cache(maxsize=2)
+def _weights(seen: SeenTrial) -> tuple[Observation, ...]:
+    """Return what a trial weighs; of the last ones it is kept: `double_support` asks, too."""
+    return StrideForce().weights(seen)
 
 
 def _weighed(

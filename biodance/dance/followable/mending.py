@@ -140,6 +140,6 @@ def _without(walk: Walk, course: Walked, p: int, found: Rehearsed) -> Walked | N
     on = walk.reach.link(steps[p - 1], steps[p + 1].catalogue, steps[p + 1].s)
     if on is None or (way := walk.move(steps[p - 1], on)).limit:
         return None
-    limit = next((limit for at, limit in found.bad if at == p), "balance").replace("_", " ")
-    words = f"Left out: {name_of(steps[p])}; whoever copies it imprecisely comes too near the limit on {limit}."
+    limits = " and ".join(limit.replace("_", " ") for at, limit in found.bad if at == p)
+    words = f"Left out: {name_of(steps[p])}; whoever copies it imprecisely comes too near the limit on {limits}."
     return Walked((*steps[:p], on, *steps[p + 2 :]), (*moves[: p - 1], way, *moves[p + 1 :]), (*course.left_out, words))

@@ -1,7 +1,7 @@
 """What a posture of known words is called."""
 
 from biodance.dance.followable.reach import DanceStep
-from biodance.dance.followable.vocabulary import Word
+from biodance.dance.followable.vocabulary import Word, singular
 
 
 def name_of(step: DanceStep) -> str:
@@ -25,16 +25,4 @@ def _pair_words(pair: list[Word]) -> list[str]:
     if pair[0].key == pair[1].key:
         return [pair[0].text.format("both")]
     sides = zip(("the right", "the left"), pair, strict=True)
-    return [_one(word.text.format(side)) for side, word in sides if not word.rest]
-
-
-def _one(text: str) -> str:
-    for many, one in (
-        ("arms", "arm"),
-        ("forearms", "forearm"),
-        ("elbows", "elbow"),
-        ("legs", "leg"),
-        ("thighs", "thigh"),
-    ):
-        text = text.replace(f"{many} ", f"{one} ", 1)
-    return text
+    return [singular(word.text.format(side)) for side, word in sides if not word.rest]

@@ -113,18 +113,42 @@ def words_for(body: Body, plan: Plan, stance: Stance, words: Vocabulary, rng: np
     """Return for every part of `groups_of` what this person may be asked on these feet, rest first; ``rng`` draws the
     free postures of the arms.
     """
-    alone = len(stance.planted) == 1
-    out: Vocabulary = {}
     free = () if plan.gentle else free_words(rng)
+    out: Vocabulary = {}
     for part, group in groups_of(stance).items():
-        kept = [
-            word
-            for word in (*words[group], *(free if group == "arm" else ()))
-            if (plan.deep or not word.deep) and (word.gentle or not plan.gentle) and not (alone and word.double)
-        ]
+        kept = _asked(plan, stance, (*words[group], *(free if group == "arm" else ())))
         fitted = [_fitted(body, part, word) for word in kept if stance.over is None or word.rest or group == "arm"]
         out[part] = tuple(word for word in fitted if word is not None)
     return out
+
+
+def _asked(plan: Plan, stance: Stance, words: tuple[Word, ...]) -> list[Word]:
+    """Return the words of a group that a plan asks for on these feet."""
+    alone = len(stance.planted) == 1
+    return [
+        word
+        for word in words
+        if (plan.deep or not word.deep) and (word.gentle or not plan.gentle) and not (alone and word.double)
+    ]
+
+
+def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: Vocabulary) -> tuple[str, ...]:
+    """Return a sentence for every part of the body that cannot do all that the plan asks of others: which words, and
+    which joint does not reach so far.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for stance in stances:
+        for part, group in groups_of(stance).items():
+            for word in _asked(plan, stance, words[group]):
+                if joint := _short_of(body, part, word):
+                    side = part.partition("_")[0]
+                    text = singular(word.text.format(f"the {side}"))
+                    found.setdefault(part, {})[text] = joint.replace("_", " ")
+    return tuple(
+        f"Left out for the {part.replace('_', ' ')}: {', '.join(texts)}; not within reach of "
+        f"{', '.join(dict.fromkeys(texts.values()))}."
+        for part, texts in found.items()
+    )
 
 
 def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
@@ -151,15 +175,38 @@ def _fitted(body: Body, part: str, word: Word) -> Word | None:
     """Return the word within the ranges of this body, None where that would leave too little of it."""
     if part == "legs":
         return word
-    names, angles = [joint.name for joint in body.joints], []
-    for joint, angle in word.angles:
-        if joint in (PELVIS_TILT, PELVIS_LEAN):
-            angles.append((joint, angle))
-            continue
-        j = names.index(own_joint(part, joint))
-        low, high = body.limits.lower[j] + _STOP, body.limits.upper[j] - _STOP
-        near = float(np.clip(angle, min(low, high), max(low, high)))
-        if abs(near - angle) > _FITS and not word.rest:
-            return None
-        angles.append((joint, near))
-    return Word(word.key, word.text, tuple(angles), word.mirror, word.rest, word.gentle, word.deep, word.double)
+    if not word.rest and _short_of(body, part, word):
+        return None
+    within = tuple((joint, _near(body, part, joint, angle)) for joint, angle in word.angles)
+    return Word(word.key, word.text, within, word.mirror, word.rest, word.gentle, word.deep, word.double)
+
+
+def _short_of(body: Body, part: str, word: Word) -> str:
+    """Return the joint whose range leaves too little of a word, "" if none does."""
+    if part == "legs" or word.rest:
+        return ""
+    short = (joint for joint, angle in word.angles if abs(_near(body, part, joint, angle) - angle) > _FITS)
+    joint = next(short, "")
+    return own_joint(part, joint) if joint else ""
+
+
+def _near(body: Body, part: str, joint: str, angle: float) -> float:
+    """Return the angle of a word within the range of this body's joint; the pelvis' own are free."""
+    if joint in (PELVIS_TILT, PELVIS_LEAN):
+        return angle
+    j = body.joint_index(own_joint(part, joint))
+    low, high = body.limits.lower[j] + _STOP, body.limits.upper[j] - _STOP
+    return float(np.clip(angle, min(low, high), max(low, high)))
+
+
+def singular(text: str) -> str:
+    """Return a word's text with the one limb that it is said of."""
+    for many, one in (
+        ("arms", "arm"),
+        ("forearms", "forearm"),
+        ("elbows", "elbow"),
+        ("legs", "leg"),
+        ("thighs", "thigh"),
+    ):
+        text = text.replace(f"{many} ", f"{one} ", 1)
+    return text

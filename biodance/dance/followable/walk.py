@@ -15,7 +15,7 @@ import numpy as np
 
 from biodance.dance.dance import Dance
 from biodance.dance.followable.naming import name_of
-from biodance.dance.followable.plain import ENOUGH, SURE, plain_move
+from biodance.dance.followable.plain import ENOUGH, FIRM, plain_move
 from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, learned
@@ -153,7 +153,7 @@ class Walk:
                     room, broken = min(room, least), move.limit
                 if broken:
                     why[broken] = why.get(broken, 0) + 1
-                elif room >= SURE:
+                elif room >= FIRM:
                     yield step, move
                 else:
                     doubtful.append((room, step, move))

@@ -112,11 +112,15 @@ class Effect:
         """
         return None
 
-    def beside(self, place: Array, *, fine: bool = False) -> "Effect | None":
-        """Return the cause that comes and goes where it acts ``place`` (3,) m from its usual point, in the axes of its
-        segment, its course (`local`) as ``fine`` as it may be; None for one that acts at no point.
+    def beside(self, place: Array) -> "Effect | None":
+        """Return the cause where it acts ``place`` (3,) m from its usual point, in the axes of its segment; None for
+        one that acts at no point.
         """
         return None
+
+    def finer(self) -> "Effect":
+        """Return the cause with a course (`local`) as fine as it may be."""
+        return self
 
     def marker_columns(self, case: Case) -> Array | None:
         """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say

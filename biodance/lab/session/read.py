@@ -206,6 +206,8 @@ def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Read
     """Return the sentence for a folder of which no recording is left: nothing there, or nothing that can be read."""
     if refused:
         name, reason = next(iter(refused.items()))
+        if len(refused) == 1:
+            return f"{folder}: its only file, {name}, cannot be read. {reason}"
         return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
     inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_below(part, readers)]
     if inside:
