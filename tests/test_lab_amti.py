@@ -274,4 +274,5 @@ def test_the_real_text(recordings, tmp_path):
 
 def test_a_table_with_unknown_numbers_is_a_recording_and_not_passed_over():
     assert sniff(b"t Fx Fy Fz Mx My Mz\n0.01 1 2 nan 4 5 6\n0.02 1 2 NaN 4 5 6\n")
+    assert sniff(b"t Fx Fy Fz Mx My Mz\n0.01 1 2 nan.06 4 5 6\n0.02 1 2 3 4 5 6\n0.03 1 2 3 4 5 6\n")
     assert not sniff(b"name Fx Fy Fz Mx My Mz\nann 1 2 3 4 5 6\n")

@@ -16,9 +16,12 @@ ROW = re.compile(rf"\s*{_CELL}(?:[\s,;]+{_CELL}){{5,}}[\s,;]*", flags=re.IGNOREC
 
 
 def sniff(head: bytes) -> bool:
-    """Return whether the rows after the first (which may be labels) hold at least six numbers (or nan) each."""
+    """Return whether the rows after the first (which may be labels) hold at least six numbers (or nan) each; of several
+    one may be damaged, which is for `read` to say.
+    """
     rows = [line for line in head_text(head).splitlines()[:4] if line.strip()]
-    return bool(rows) and all(ROW.fullmatch(line) for line in rows[1:] or rows)
+    fit = [bool(ROW.fullmatch(line)) for line in rows[1:] or rows]
+    return any(fit) and sum(fit) >= len(fit) - (len(fit) > 2)
 
 
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
