@@ -42,7 +42,7 @@ def test_a_delay_is_undone_with_what_the_prediction_lacks(name: str, size: float
     assert np.abs(predicted_only - right)[INSIDE].max() > 3 * np.abs(mended - right)[INSIDE].max()
 
 
-def test_a_lower_filter_gives_back_what_the_movement_lost_and_leaves_the_noise_as_it_is() -> None:
+def test_a_lower_filter_gives_back_what_the_movement_lost() -> None:
     """Noise comes in after the filter: undone in what was measured, it would be many times as loud."""
     case = human_case(300)
     low = butter(2, 4.0 / (case.motion.rate / 2))

@@ -48,6 +48,8 @@ def batch_command(
     if json:
         print_json(summary_of(found))
     else:
-        counts = ", ".join(f"{count} {status}" for status, count in sorted(found.counts.items()))
+        words = {"needs a person": "need a person"}
+        sorts = sorted(found.counts.items())
+        counts = ", ".join(f"{n} {words.get(sort, sort) if n > 1 else sort}" for sort, n in sorts)
         say(f"{len(found.outcomes)} sessions: {counts}; {found.fresh} of them in this run. {out / 'report.html'}")
     return NEEDS_A_PERSON if found.needs_a_person else DONE

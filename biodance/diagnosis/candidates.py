@@ -122,33 +122,36 @@ def local_basis(problem: Problem, effect: Effect) -> Array | None:
 
 def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
     """Return (r,): what the cause of size ``theta`` (p,) adds to the rows."""
-    return _in_rows(problem, effect, theta, effect.added)
+    return _in_rows(problem, effect, theta[:, None], effect.added)[:, 0]
 
 
 def removed(problem: Problem, effect: Effect, theta: Array) -> Array:
     """Return (r,): what the cause of size ``theta`` (p,) has added to the rows, as far as it can be undone in what
     was measured.
     """
-    return _in_rows(problem, effect, theta, effect.removed)
+    return _in_rows(problem, effect, theta[:, None], effect.removed)[:, 0]
 
 
-def _in_rows(problem: Problem, effect: Effect, theta: Array, wrench: Callable[[Case, Array], Array]) -> Array:
-    """Return (r,): the rows of ``wrench`` (T, 6) of every case, and of the markers."""
+def _in_rows(problem: Problem, effect: Effect, sizes: Array, wrench: Callable[[Case, Array], Array]) -> Array:
+    """Return (r, k): the rows of ``wrench`` (T, 6) of every case, and of the markers, for each of the ``sizes`` (p, k)
+    of the cause.
+    """
     if effect.linear:
-        return np.asarray(problem.unit(effect) @ theta)
-    rows = problem.spectrum.rows(tuple(wrench(case, theta)[:, :, None] for case in problem.cases))
-    return np.concatenate([rows.ravel(), problem.marker_rows(effect) @ theta])
+        return np.asarray(problem.unit(effect) @ sizes)
+    rows = problem.spectrum.rows(np.stack([wrench(case, one) for one in sizes.T], axis=2) for case in problem.cases)
+    return np.concatenate([rows.reshape(-1, sizes.shape[1]), problem.marker_rows(effect) @ sizes])
 
 
 def slopes(
-    problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Problem, Effect, Array], Array] = changes
+    problem: Problem, effect: Effect, theta: Array, *, of: Callable[[Case, Array], Array] | None = None
 ) -> Array:
-    """Return (r, p): derivative of `changes` or `removed` at ``theta``, of a cause that is not linear by central
-    differences.
+    """Return (r, p): derivative at ``theta`` of the rows of ``of``, what the cause adds (by default) or removes; of a
+    cause that is not linear by central differences.
     """
     if effect.linear:
         return problem.unit(effect)
     steps = 0.02 * np.diag(effect.typical)
-    return np.stack(
-        [(of(problem, effect, theta + s) - of(problem, effect, theta - s)) / (2 * s.max()) for s in steps], axis=1
+    up, down = np.hsplit(
+        _in_rows(problem, effect, np.concatenate([theta + steps, theta - steps]).T, of or effect.added), 2
     )
+    return np.asarray((up - down) / (2 * steps.max(axis=1)))

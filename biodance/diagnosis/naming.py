@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.diagnosis.adequacy import STRAINED, strain
-from biodance.diagnosis.candidates import SCALE, Candidate, candidates, removed, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates, slopes
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.evidence import evidence
 from biodance.diagnosis.model import Model, NamedCause, model
@@ -259,7 +259,8 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
 def taken(found: Model) -> Array:
     """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
     parts = [
-        slopes(found.problem, one.effect, one.theta, of=removed) * SCALE * one.effect.typical for one in found.named
+        slopes(found.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
+        for one in found.named
     ]
     return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
 

@@ -68,15 +68,15 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     score = float(np.log(len(found)))
     if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
         return None
-    suspects = tuple(_suspect(one, score) for one in order)
+    seen, suspects = order[0].found, tuple(_suspect(one, score) for one in order)
+    if seen.log_bayes_factor - score < needed(base, seen.visible):
+        return None
+    if not one_sided(seen.mean.reshape(-1, len(order[0].effect.parameters))):
+        return None
     best = _placed(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
-    course = belief.mean[-best.white.shape[1] :]
-    if not one_sided(order[0].found.mean.reshape(-1, len(best.effect.parameters))):
-        return None
-    touch = _named(base, best, course, order[0])
-    seen = order[0].found
-    if seen.log_bayes_factor - score < needed(base, seen.visible) or not stands(base, touch):
+    touch = _named(base, best, belief.mean[-best.white.shape[1] :], order[0])
+    if not stands(base, touch):
         return None
     named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)
@@ -130,19 +130,29 @@ def _placed(base: Model, one: _Passing) -> _Passing:
     """Return the cause at the place of its segment where it explains most: a hand's length off, the moment of a touch
     is several newton metres off. Gauss-Newton steps of the place and the course of the force together.
     """
-    place, start, loose = np.zeros(3), base.belief.mean.size, _loose(base, one)
+    place = np.zeros(3)
     for _ in range(_STEPS):
-        both = np.concatenate([base.belief.X, loose.size * loose.white], axis=1)
-        course = loose.size * believe(both, base.belief.y).mean[start:]
-        slopes = _slopes(base, loose.effect, place, course)
+        wide = SIZES[-1] * one.white
+        slopes = _slopes(base, one.effect, place, SIZES[-1] * _believed(base, wide, np.zeros(wide.shape[1])))
         if slopes is None:
-            return loose
-        belief = believe(np.concatenate([both, _BESIDE * slopes], axis=1), base.belief.y + slopes @ place)
-        place = _BESIDE * belief.mean[both.shape[1] :]
-        there = loose.effect.finer().beside(place)
-        moved = None if there is None else _passing(base, there)
-        loose = loose if moved is None else _loose(base, moved)
-    return loose
+            break
+        found = _believed(
+            base, np.concatenate([wide, _BESIDE * slopes], axis=1), np.append(0 * wide[0], place / _BESIDE)
+        )
+        place = _BESIDE * found[-3:]
+        there = one.effect.finer().beside(place)
+        columns = None if there is None else local_basis(base.problem, there)
+        if there is not None and columns is not None:
+            one = replace(one, effect=there, white=base.white(columns))
+    return _loose(base, one)
+
+
+def _believed(base: Model, Z: Array, there: Array) -> Array:
+    """Return the coefficients (k,) of further columns ``Z`` (r, k) of unit standard deviation, whose part ``there``
+    (k,) the target lacks: as `believe` with all columns would, from the score alone.
+    """
+    s, G = base.belief.score(Z)
+    return np.asarray(np.linalg.solve(np.eye(len(s)) + G, s + G @ there))
 
 
 def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
