@@ -15,8 +15,8 @@ import numpy as np
 
 from biodance.dance.dance import Dance
 from biodance.dance.followable.naming import name_of
-from biodance.dance.followable.plain import ENOUGH, SURE, plain_move
-from biodance.dance.followable.reach import FAR, DanceStep, Reach, feet_key
+from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
+from biodance.dance.followable.reach import UNREACHED, DanceStep, Reach, feet_key
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
@@ -119,7 +119,7 @@ class Walk:
             if feet_key(pair[0]) == feet_key(pair[1]):
                 continue
             was, now = (self.reach.catalogue(stance) for stance in pair)
-            if self.reach.steps_to(was, now).min() >= FAR:
+            if self.reach.steps_to(was, now).min() >= UNREACHED:
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
@@ -155,7 +155,7 @@ class Walk:
                     room, broken = min(room, least), move.limit
                 if broken:
                     why[broken] = why.get(broken, 0) + 1
-                elif room >= SURE:
+                elif room >= AMPLE:
                     yield step, move
                 else:
                     doubtful.append((room, step, move))
