@@ -11,7 +11,7 @@ from small_dances import BODY, small_dance
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.followable import mending
 from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.reach import FAR, Reach
+from biodance.dance.followable.reach import UNREACHED, Reach
 from biodance.dance.followable.vocabulary import read_vocabulary, words_for, words_left_out
 from biodance.dance.followable.walk import NoWay, Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, mass_centre
@@ -82,7 +82,7 @@ def test_whoever_must_shift_weight_next_can_undo_what_was_called(walked) -> None
     words = [stand.chosen(s) for s in range(len(left))]
     assert {n for n, word in zip(left, words, strict=True) if word["trunk"].rest and word["legs"].rest} == {1}
     assert {n for n, word in zip(left, words, strict=True) if not word["trunk"].rest and not word["legs"].rest} == {2}
-    assert set(Reach(work, lambda *_: False).steps_to(stand, shift)) == {FAR}
+    assert set(Reach(work, lambda *_: False).steps_to(stand, shift)) == {UNREACHED}
 
 
 def test_feet_that_cannot_be_reached_are_named() -> None:

@@ -13,7 +13,7 @@ from biodance.records import Array
 
 _SLOWER = (1.0, 1.4, 1.8)
 """Factors on the duration of a straight move, one after the other."""
-ENOUGH, FIRM = 3.2, 4.0
+ENOUGH, AMPLE = 3.2, 4.0
 """Deviations of imprecise people that a posture or a move must leave, and that it leaves where there is a choice."""
 _ITERATIONS = (12, 8)
 _STOP = 0.08
@@ -58,9 +58,9 @@ def _shapes(task: Task) -> list[Array]:
 
 
 def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) -> tuple[Move, float]:
-    """Return the first move that keeps all limits and that imprecise people firmly keep (`FIRM`), too, or else the one
-    that leaves them most, with the limit of which it is too little, and by how many deviations; if none keeps all
-    limits, the one that violates least.
+    """Return the first move that keeps all limits and that leaves imprecise people `AMPLE` deviations, or else the one that
+    leaves them most, with the limit of which it is too little, and by how many deviations; if none keeps all limits,
+    the one that violates least.
     """
     tried, best, most = list[Move](), None, -np.inf
     for move in moves:
@@ -69,7 +69,7 @@ def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) 
             found, limit = room(move)
             if best is None or found > most:
                 best, most = replace(move, limit=limit if found < ENOUGH else ""), found
-            if found > FIRM:
+            if found > AMPLE:
                 break
     return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)
 

@@ -21,7 +21,7 @@ from biodance.records import Array
 
 _PARTS = 2
 """Parts of the body that change at a time."""
-UNREACHABLE = 99
+UNREACHED = 99
 """Steps to feet that cannot be reached."""
 
 
@@ -97,7 +97,7 @@ class Reach:
 
     def steps_to(self, catalogue: Catalogue, goal: Catalogue) -> NDArray[np.intp]:
         """Return how many steps (S,) lead from each posture of a catalogue to one of ``goal``, the arms at rest;
-        `UNREACHABLE` where none do.
+        `UNREACHED` where none do.
         """
         key = feet_key(catalogue.stance), feet_key(goal.stance)
         if key not in self._steps:
@@ -108,7 +108,7 @@ class Reach:
                 steps |= dict.fromkeys(reached, 1 + max(steps.values(), default=0))
                 some = np.array([s for s in rows if s in reached])
                 reached = [s for s in rows if s not in steps and self._follows(s, catalogue, catalogue, some)]
-            self._steps[key] = np.array([steps.get(s, UNREACHABLE) for s in still])
+            self._steps[key] = np.array([steps.get(s, UNREACHED) for s in still])
         return self._steps[key]
 
     def _follows(self, s: int, catalogue: Catalogue, goal: Catalogue, some: NDArray[np.intp]) -> bool:

@@ -15,10 +15,10 @@ import numpy as np
 
 from biodance.dance.dance import Dance
 from biodance.dance.followable.naming import name_of
-from biodance.dance.followable.plain import ENOUGH, FIRM, plain_move
-from biodance.dance.followable.reach import UNREACHABLE, DanceStep, Reach, feet_key
+from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
+from biodance.dance.followable.reach import UNREACHED, DanceStep, Reach, feet_key
 from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, learned
+from biodance.dance.postures.selection import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
@@ -30,6 +30,8 @@ from biodance.records import Array
 
 _INSTRUCTION = 0.5
 """s that one instruction is worth at simplicity 1."""
+_FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
+"""N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
 _WAYS_ON = 5
@@ -80,7 +82,7 @@ class Walk:
         before = np.sum(self.factor**2, axis=1)
         weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
         self.scale = self.factor * np.sqrt(weight / np.where(before > 0, before, 1.0))[:, None]
-        self.samples = rest_to_rest(plan.move, via=0, rate=SAMPLE_RATE)
+        self.samples = rest_to_rest(plan.move, via=0, rate=_RATE)
 
     def take(self, stances: tuple[Stance, ...]) -> tuple[list[DanceStep], list[Move]]:
         """Return one step for each of ``stances`` and the moves between them.
@@ -117,7 +119,7 @@ class Walk:
             if feet_key(pair[0]) == feet_key(pair[1]):
                 continue
             was, now = (self.reach.catalogue(stance) for stance in pair)
-            if self.reach.steps_to(was, now).min() >= UNREACHABLE:
+            if self.reach.steps_to(was, now).min() >= UNREACHED:
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
@@ -153,7 +155,7 @@ class Walk:
                     room, broken = min(room, least), move.limit
                 if broken:
                     why[broken] = why.get(broken, 0) + 1
-                elif room >= FIRM:
+                elif room >= AMPLE:
                     yield step, move
                 else:
                     doubtful.append((room, step, move))
@@ -239,12 +241,12 @@ class Walk:
         parts = [
             part[1:-1] @ ends for part in (self.samples.position, self.samples.velocity, self.samples.acceleration)
         ]
-        W = regressor(chain.body, chain.motion(np.arange(len(parts[0])) / SAMPLE_RATE, *parts))
+        W = regressor(chain.body, chain.motion(np.arange(len(parts[0])) / _RATE, *parts))
         return np.concatenate([still, self._white(np.asarray(W).reshape(1, -1, W.shape[-1]))[0]])
 
     def _white(self, W: Array) -> Array:
         """Return regressors (G, 6 T, 10 N) per standard deviation of error and of the table, (G, 6 T, k)."""
-        error = np.tile(SAMPLE_ERROR, W.shape[1] // 6)
+        error = np.tile(np.repeat([_FORCE, _MOMENT], 3), W.shape[1] // 6)
         flat = (W / error[:, None]).reshape(-1, W.shape[2]) @ self.factor  # one product: many small ones are slow
         return np.asarray(flat.reshape(*W.shape[:2], -1))
 
