@@ -2,8 +2,8 @@
 
     python benchmarks/bench_belts.py [--seeds 0 1 2 3] [--whole] [--out FILE.md]
 
-Clean sessions are asked what the witnesses name and, with ``--whole``, what the whole diagnosis says; then 20 mm
-across, 5 % of Fz and 30 ms are written into copies, as `bench_walks` does with real recordings.
+Clean sessions are asked what witnesses name and, with ``--whole``, what the whole diagnosis says; then 20 mm across,
+5 % of Fz and 30 ms are written into copies, as `bench_walks` does with real recordings.
 """
 
 import argparse
