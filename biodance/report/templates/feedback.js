@@ -3,7 +3,7 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const by = (id) => document.getElementById(id);
 const LEAD = 5, SHARE = 0.5; // s to get ready; speed of the preview
-const COLOURS = { left: 0x0072b2, right: 0xd55e00, "": 0x8a8f94 };
+const COLOURS = { left: 0xd55e00, right: 0x0072b2, "": 0x8a8f94 };
 const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 function bytes(text) {
