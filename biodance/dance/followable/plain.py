@@ -58,9 +58,9 @@ def _shapes(task: Task) -> list[Array]:
 
 
 def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) -> tuple[Move, float]:
-    """Return the first move that keeps all limits and that leaves imprecise people `AMPLE` deviations, or else the one
-    that leaves them most, with the limit of which it is too little, and by how many deviations; if none keeps all
-    limits, the one that violates least.
+    """Return the first move that keeps all limits and leaves imprecise people `AMPLE` deviations, or else the one that
+    leaves them most, with the limit of which it is too little, and how many; if none keeps all limits, the one that
+    violates least.
     """
     tried, best, most = list[Move](), None, -np.inf
     for move in moves:
