@@ -5,6 +5,7 @@ on it, look again.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates, slopes
@@ -32,7 +33,9 @@ STALE = 0.03
 this share.
 """
 SURE = 2.0
-"""A name is taken back where its size is less than so many of its standard deviations."""
+"""A name is taken back where its size is less than so many of its standard deviations; of several parameters
+together, where chance brings them as far as often.
+"""
 SEEN, OVERWHELMING = 0.2, 3.0
 """Where less than this share of a cause is visible beside all that is no fault, its evidence must be so many times the
 threshold: it rests on the sizes of tolerances. (A gain of Fz of 5 % is visible to 2 %: the rest looks like mass. The
@@ -168,12 +171,13 @@ def needed(found: Model, visible: float) -> float:
 
 
 def stands(found: Model, one: NamedCause) -> bool:
-    """Return whether a cause is possible in this session and its size `SURE` standard deviations from none; these are
-    never less than sessions without fault are alike.
+    """Return whether a cause is possible in this session and its size further from none than chance brings it, all its
+    parameters together: as seldom as one alone is beyond `SURE` standard deviations, which are never less than
+    sessions without fault are alike.
     """
     alike = found.tolerances.size(key_of(*named_of(one))) * one.effect.typical / one.effect.typical[0]
     sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
-    sure = bool(np.max(np.abs(one.theta) / sd) >= SURE)
+    sure = bool(np.sum((one.theta / sd) ** 2) >= chdtri(sd.size, 2 * ndtr(-SURE)))
     return sure and one.effect.possible_in(found.problem.cases[0], one.theta)
 
 
