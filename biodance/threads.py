@@ -1,10 +1,12 @@
-"""How many threads does the linear algebra get? One: our matrices are small and many, and threads would only wait."""
+"""How many threads does the linear algebra get? One: our matrices are small and many, and threads would only wait.
+And what may go to another process while a thread still computes with it.
+"""
 
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -29,3 +31,13 @@ def _libraries(modules: int) -> "ThreadpoolController":
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
+
+
+class Sendable:
+    """A record that keeps what it has once computed (`functools.cached_property`) and may go to another process at any
+    time: executors pickle in a thread of their own, while the caller's thread may just compute a further value.
+    """
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of what is known now, made in one go."""
+        return dict(self.__dict__)

@@ -30,6 +30,7 @@ from biodance.body.parts import (
 from biodance.body.pinocchio_model import build
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, Sip, frozen_array
+from biodance.threads import Sendable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Body(Sendable):
     """A person or robot as a tree of rigid segments.
 
     Parameters

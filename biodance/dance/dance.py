@@ -22,6 +22,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import SIDES, Array, Motion, Subject, frozen_array
+from biodance.threads import Sendable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,7 +49,7 @@ _chain_of = lru_cache(maxsize=4)(Chain)
 
 
 @dataclass(frozen=True, eq=False)
-class Dance:
+class Dance(Sendable):
     """One continuous movement: postures held for a while, and moves between them.
 
     Parameters

@@ -20,6 +20,7 @@ from biodance.motion.ik.general_legs import GeneralLeg
 from biodance.motion.ik.legs import Leg
 from biodance.records import SIDES, Array, Motion
 from biodance.spatial import axis_rotation
+from biodance.threads import Sendable
 
 ROOT = 6
 _TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -27,7 +28,7 @@ _TURNS = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class Chain(Sendable):
     """A body with a free root and two six-joint legs, in the coordinates of this module."""
 
     body: Body
@@ -42,7 +43,7 @@ class Chain:
         """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to
         make.
         """
-        return {name: value for name, value in self.__dict__.items() if name != "_own"}
+        return {name: value for name, value in super().__getstate__().items() if name != "_own"}
 
     @property
     def size(self) -> int:

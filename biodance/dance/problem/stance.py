@@ -7,6 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.records import SIDES, Array, frozen_array
+from biodance.threads import Sendable
 
 _WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
@@ -30,7 +31,7 @@ they are set).
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class Stance(Sendable):
     """One foot configuration.
 
     ``name``; ``ankle`` (2, 3) m lab frame, right and left, where each foot stands or would stand, flat and facing lab
