@@ -43,7 +43,7 @@ def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
     usual = np.array([strained(1.0) for _ in range(200)])
     assert abs(usual.mean()) < 0.25
     assert 0.8 < usual.std() < 1.2
-    assert usual.max() < STRAINED
+    assert np.sum(usual > STRAINED) <= 1, "of 200: the largest of so many is beyond it in one of twenty draws"
     assert np.median([strained(2.0) for _ in range(20)]) > STRAINED
 
 
