@@ -8,7 +8,7 @@ from human_cases import human_case
 
 from biodance.body.changes import move_marker
 from biodance.body.parts import JointError
-from biodance.diagnosis.diagnosis import Diagnosis
+from biodance.diagnosis.diagnosis import Adequacy, Diagnosis
 from biodance.diagnosis.repairs import with_repairs
 from biodance.uncertainty.tolerances import shipped
 
@@ -31,6 +31,12 @@ def test_a_joint_that_the_movement_puts_elsewhere_is_named_with_its_look_alikes(
     assert low < 0.06 < 0.066 < high
     assert low > 0.01
     assert ("segment_length", "right_thigh") in {(other.effect, other.target) for other in one.set}
+
+
+def test_it_is_not_complete_where_a_band_is_not_normal() -> None:
+    loud = Adequacy("Fz", (0.04, 0.3), 4.9)
+    assert named(HIP, replace(CLEAN, adequacy=(loud,))).verdict == "named, incomplete"
+    assert named(HIP, replace(CLEAN, adequacy=(replace(loud, z=4.4),))).verdict == "named, complete"
 
 
 def test_a_marker_that_moved_is_named_with_how_far() -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.parts import JointError
+from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.discovery import Chosen
@@ -37,7 +38,9 @@ def with_repairs(
     found = tuple(repairs(cases, known, effects(chosen)))
     if not found or diagnosis.verdict == "unexplained":
         return diagnosis
-    told = "named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict
+    told = diagnosis.verdict
+    if told == "nothing wrong":  # what is left may be too small to matter and still no normal band
+        told = "named, complete" if all(row.z <= LIMIT for row in diagnosis.adequacy) else "named, incomplete"
     new = {(one.effect, one.target) for one in found}
     rest = tuple(one for one in diagnosis.findings if (one.effect, one.target) not in new)
     return replace(diagnosis, verdict=told, findings=(*found, *rest))
