@@ -3,12 +3,10 @@ hash.
 """
 
 import functools
-import os
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biodance.report.wording import format_number, millimetres
@@ -37,23 +35,11 @@ def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequenc
 
 @functools.cache
 def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
-    """Return a template with its filters; what jinja made of it is kept beside the templates, where one may write."""
-    from jinja2 import Environment, FileSystemBytecodeCache, FunctionLoader, StrictUndefined
+    from jinja2 import Environment, StrictUndefined
 
-    kept = Path(str(files("biodance.report") / "templates" / "__pycache__"))
-    may_keep = kept.is_dir() or os.access(kept.parent, os.W_OK)
-    if may_keep:
-        kept.mkdir(exist_ok=True)
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=FunctionLoader(template_text),
-        bytecode_cache=FileSystemBytecodeCache(str(kept)) if may_keep and os.access(kept, os.W_OK) else None,
-    )
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(number=format_number, mm=millimetres, **dict(filters))
-    return environment.get_template(name)
+    return environment.from_string(template_text(name))
 
 
 def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
