@@ -111,7 +111,7 @@ Fault = Callable[[Recording], Recording]
 
 @dataclass(frozen=True, eq=False)
 class LabVisit:
-    """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew),
+    """The day of a session: its ``number`` (another day: markers glued, postures performed, plates zeroed and cameras levelled anew; plates stay installed),
     the ``laboratory``, the ``tolerances`` of everything (None = the laboratory's), and ``faults`` that change each
     recording (markers, raw analog samples, parameters) before it is written.
 
