@@ -133,13 +133,15 @@ def _identified(place: Path) -> dict[str, Any]:
     mass, com = ("mass",), ("com x", "com y", "com z")
     rms = np.array([[v.table_agreement.rms, v.identified_agreement.rms] for v in one.validations]).mean(axis=0)
     phi = true.phi.reshape(-1, 10)
+    table = {"mass": body.sip.mass[:, None], "com": body.sip.com}
     return {
         "segments": true.segments,
         "seconds": sum(float(np.ptp(t.motion.time)) for t in result.trials if t.trial.role == "fit" and t.motion),
         "true": {"mass": phi[:, :1], "com": phi[:, 1:4] / phi[:, :1]},
+        "table": table,
         **{
             which: {"mass": column(key, mass), "com": column(key, com)}
-            for which, key in (("table", "table"), ("identified", "value"), ("sd", "sd"), ("table_sd", "table_sd"))
+            for which, key in (("identified", "value"), ("sd", "sd"), ("table_sd", "table_sd"))
         },
         "squats": [[float(np.linalg.norm(r[:3])), float(np.linalg.norm(r[3:]))] for r in rms],
         "sizes": vars(one.identification.sizes),
