@@ -110,11 +110,12 @@ def row(folder: Path, number: int, subject: Subject, motion: str, way: Way) -> d
     if not kept.exists():
         place = session(folder, number, subject, motion, way)
         kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps(_identified(place), default=np.ndarray.tolist))
+        kept.write_text(json.dumps(identified(place), default=np.ndarray.tolist))
     return dict(json.loads(kept.read_text()))
 
 
-def _identified(place: Path) -> dict[str, Any]:
+def identified(place: Path) -> dict[str, Any]:
+    """Return what `row` keeps of the session in ``place``."""
     result = examine(read_session(place))
     document = json.loads((place / "truth" / "truth.json").read_text())
     one, body = identification_of(result), result.body
