@@ -26,7 +26,7 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.ik.follow import Follower
 from biodance.motion.regressor import regressor
 from biodance.motion.smoothing import smooth
-from biodance.motion.upright import upright_trunk
+from biodance.motion.track import upright_trunk
 from biodance.pipeline.live_watch import StreamWatch
 from biodance.records import Array, Markers, Motion, Trial, Wrench
 from biodance.uncertainty.caution import widened

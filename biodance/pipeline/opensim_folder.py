@@ -14,7 +14,7 @@ from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
 from biodance.body.parts import UPRIGHT
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused
-from biodance.lab.opensim.inverse_dynamics import external_loads, ground_table, inverse_dynamics_setup
+from biodance.lab.opensim.ground_forces import external_loads, ground_table, inverse_dynamics_setup
 from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.plain_text import write_new

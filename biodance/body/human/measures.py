@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.human.standing import StaticPosture
-from biodance.body.tables.reference import proportion
+from biodance.body.tables.anthropometry import proportion
 from biodance.records import Array, Subject, Trial
 
 MARKER_DIAMETER = 0.014

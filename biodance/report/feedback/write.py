@@ -6,12 +6,109 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from biodance.body.solids import segment_solids
+from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
+from biodance.dance.problem.stance import Stance, stance_words
 from biodance.errors import BiodanceError
+from biodance.motion.kinematics import poses
+from biodance.records import SIDES
 from biodance.report.feedback.follow import follow_scene
-from biodance.report.feedback.scene import scene_of
-from biodance.report.three import three_js
+from biodance.report.pages.template import three_js
 from biodance.version import __version__
+
+_RATE = 15.0
+"""Hz of the poses; the page turns and shifts evenly between two."""
+_FACTOR = 1e4
+"""Steps a metre: positions are whole numbers of 0.1 mm."""
+
+
+def scene_of(dance: Dance) -> dict[str, Any]:
+    """Return what the page shows of a dance, as plain values.
+
+    Returns
+    -------
+    dict
+        ``name``, ``duration_s``, ``rate_hz``, ``frames``; ``segments`` with ``name``, ``side``, ``vertices`` (V, 3)
+        float32 m in the segment's frame and ``faces`` (F, 3) uint16; ``poses`` (frames, segments, 7) int16: position in
+        0.1 mm of the lab, z up, and quaternion x, y, z, w in steps of 1/32767; arrays little-endian in base64;
+        ``cues``, one a posture (`_cues`).
+
+    Raises
+    ------
+    BiodanceError
+        The dance leaves the room of 3.2 m about the lab origin that the page can show.
+    """
+    solids = segment_solids(dance.body)
+    motion = dance.motion(_RATE)
+    pose = poses(dance.body, motion.q)
+    chosen = [k for k, name in enumerate(dance.body.segments) if name in solids]
+    place = _FACTOR * pose.position[:, chosen]
+    if not np.abs(place).max() < 32767:
+        raise BiodanceError(
+            f"The dance goes {np.abs(place).max() / _FACTOR:.1f} m from the lab origin; the page shows 3.2 m about it."
+        )
+    turn = Rotation.from_matrix(pose.rotation[:, chosen].reshape(-1, 3, 3)).as_quat().reshape(*place.shape[:2], 4)
+    packed = np.round(np.concatenate([place, 32767 * turn], axis=2)).astype("<i2")
+    return {
+        "name": dance.protocol,
+        "duration_s": dance.duration,
+        "rate_hz": _RATE,
+        "frames": len(packed),
+        "segments": [
+            {
+                "name": name,
+                "side": next((side for side in SIDES if name.startswith(side)), ""),
+                "vertices": _text(np.asarray(solids[name].vertices).astype("<f4")),
+                "faces": _text(np.asarray(solids[name].faces).astype("<u2")),
+            }
+            for name in (dance.body.segments[k] for k in chosen)
+        ],
+        "poses": _text(packed),
+        "cues": _cues(dance),
+    }
+
+
+def _text(values: "np.ndarray[Any, Any]") -> str:
+    return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def _cues(dance: Dance) -> list[dict[str, Any]]:
+    """Return of every posture: ``number`` as on the cue sheet, ``move_s`` when to begin to move, ``hold_s`` from when
+    and ``end_s`` until when to stand still, ``calls`` what to do, ``stance`` in words, ``feet``
+    the outlines of the planted soles (P, 2) m.
+    """
+    said = dance_instructions(dance)
+    holds = {phase.posture: phase for phase in dance.phases if phase.kind == "hold"}
+    moves = {phase.posture: phase for phase in dance.phases if phase.kind == "move"}
+    out = []
+    for p, stance in enumerate(dance.stances):
+        start = moves[p].start if p in moves else 0.0
+        held = holds[p].start if p in holds else moves[p].end
+        out.append(
+            {
+                "number": p + 1,
+                "move_s": start,
+                "hold_s": held,
+                "end_s": holds[p].end if p in holds else held,
+                "calls": list(said[p]),
+                "stance": stance_words(stance),
+                "feet": [_outline(stance, side) for side in stance.planted],
+            }
+        )
+    return out
+
+
+def _outline(stance: Stance, side: int) -> list[list[float]]:
+    """Return the outline of a planted sole on the floor, (P, 2) m, in order about its middle."""
+    points = stance.soles[side][:, :2]
+    from_middle = points - points.mean(axis=0)
+    order = np.argsort(np.arctan2(from_middle[:, 1], from_middle[:, 0]))
+    return [[round(float(x), 4), round(float(y), 4)] for x, y in points[order]]
+
 
 _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json", "weights": "movenet.bin"}
 """What follows a person: parts of the bundle that `make bundle` writes beside this module."""
