@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.cycles.curves import CurveGroup
+from biodance.cycles.curves import CurveGroup, NormalCurve
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.normal import NormalCurve
 from biodance.cycles.steps import STRIDE_UNITS
 from biodance.display import GREY
 from biodance.identification.knowledge import SIGMAS
