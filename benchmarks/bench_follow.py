@@ -41,8 +41,7 @@ from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.smoothing import smooth
 from biodance.records import Array, Motion, Subject
-from biodance.report.feedback.follow import follow_scene
-from biodance.report.feedback.scene import scene_of
+from biodance.report.feedback.write import follow_scene, scene_of
 
 RATE, PICTURES = 25.0, 5.0
 """Hz of a motion and of the pictures of it."""

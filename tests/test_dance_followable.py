@@ -25,7 +25,7 @@ from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.transitions.context import Checkpoint, DesignContext
 from biodance.dance.verify import broken, verify
 from biodance.motion.kinematics import poses
-from biodance.report.figures.mannequin import mannequin_svg
+from biodance.report.pages.dance import mannequin_svg
 
 PLAN = Plan("x", "", (("parallel", 5),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.3, gentle=True)
 CHAIN = Chain(BODY)

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from biodance.body.human.fractions import MAN, WOMAN, published_fractions, published_people
+from biodance.body.human.girths import MAN, WOMAN, published_fractions, published_people
 from biodance.body.human.opinions import Opinion, body_opinions, primitives_of, told_by
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
+from biodance.body.tables.anthropometry import Reference, proportion
 from biodance.body.tables.choice import measured_whole, reference
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
 from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.published import regression, study_masses
-from biodance.body.tables.reference import Reference, proportion
 from biodance.records import Array, Sip, Subject
 
 _AXES = ("sagittal", "longitudinal", "transverse")

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from biodance.body.parts import Joint
-from biodance.body.tables.anthropometry import read_table, row_numbers
-from biodance.body.tables.reference import KINDS, Reference, proportion
+from biodance.body.tables.anthropometry import KINDS, Reference, proportion, read_table, row_numbers
 from biodance.records import SIDES, Array, Subject
 
 SEGMENTS = (

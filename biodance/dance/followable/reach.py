@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.followable.vocabulary import Word, read_vocabulary, singular, words_for
 from biodance.dance.problem.stance import Stance
 from biodance.dance.transitions.context import DesignContext
 from biodance.records import Array
@@ -133,3 +133,27 @@ def _near(last: DanceStep | None, catalogue: Catalogue) -> list[int]:
 def feet_key(stance: Stance) -> str:
     """Return what a foot configuration is known by."""
     return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
+
+
+def name_of(step: DanceStep) -> str:
+    """Return what a posture is called: the words of all parts that do not rest; of arms that do the same, once."""
+    words = step.words
+    out = []
+    for part, word in words.items():
+        if part.endswith("_arm") or part.endswith("_hanging"):
+            continue
+        if not word.rest or part.endswith("_lifted"):
+            out.append(word.text)
+    for kind in ("arm", "hanging"):
+        pair = [words[f"{side}_{kind}"] for side in ("right", "left") if f"{side}_{kind}" in words]
+        out += _pair_words(pair)
+    return ", ".join(out) or ("sit" if "right_hanging" in words else "stand")
+
+
+def _pair_words(pair: list[Word]) -> list[str]:
+    if not pair or all(word.rest for word in pair):
+        return []
+    if pair[0].key == pair[1].key:
+        return [pair[0].text.format("both")]
+    sides = zip(("the right", "the left"), pair, strict=True)
+    return [singular(word.text.format(side)) for side, word in sides if not word.rest]

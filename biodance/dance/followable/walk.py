@@ -14,11 +14,10 @@ from itertools import islice, pairwise
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.followable.naming import name_of
 from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
-from biodance.dance.followable.reach import UNREACHED, DanceStep, Reach, feet_key
+from biodance.dance.followable.reach import UNREACHED, DanceStep, Reach, feet_key, name_of
 from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.selection import learned
+from biodance.dance.postures.ordering import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
