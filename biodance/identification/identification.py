@@ -269,7 +269,9 @@ def conclude(
     for _ in range(_ROUNDS if found is not None and not machine else 0):
         table = more_probable_table(data, before, body)[0] if prior is None else before
         belief = posterior(data, table)
-        real = undiluted(total, belief.mean, body.segments)
+        loaded = posterior(data, may_carry(body, table))
+        moved = max(belief, loaded, key=lambda one: one.log_evidence)
+        real = undiluted(total, moved.mean, body.segments)
         noise = learn_noise(real, room, rounds=_AGAIN)[0]
         data, sizes = _discounted(real, noise, found, room)
         if carried_away(belief, posterior(data, table)):
