@@ -17,7 +17,7 @@ from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import OUTLINE
 from biodance.records import SIDES, Array, Index, Markers, Plate, Trial, Wrench, runs
 from biodance.records.arrays import rate_of
-from biodance.records.wrench import COP_FORCE
+from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
 ONSET = 20.0
