@@ -97,14 +97,19 @@ class Naming:
 
 
 def name_causes(
-    problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = _ROUNDS
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect] = None,
+    *,
+    rounds: int = _ROUNDS,
+    every: tuple[Candidate, ...] | None = None,
 ) -> Naming:
     """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family
-    (`effects`).
+    (`effects`). ``every`` cause with its columns, where they are known (`causes_of`).
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
-    first, first_causes = built(problem, tolerances, chosen)
+    first, first_causes = built(problem, tolerances, chosen, every)
     found, causes = first, first_causes
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
@@ -229,12 +234,22 @@ def stale(found: Model) -> bool:
     return bool(both[0] > STALE**2 * both[1])
 
 
-def built(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
+    """Return all causes to look for, and those that are not but keep their tolerance."""
     family = effects(chosen)
-    every = candidates(
+    return candidates(
         problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
     )
+
+
+def built(
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect],
+    every: tuple[Candidate, ...] | None = None,
+) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+    family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 
@@ -298,7 +313,7 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
     one named.
     """
-    near = _near(found, ranking)
+    near = _near(ranking)
     refined = []
     for one in near:
         start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
@@ -312,18 +327,10 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     return Round((*(one for one, _ in refined), *rest)), refined[0][1]
 
 
-def _near(found: Model, ranking: Round) -> list[ScoredCandidate]:
-    """Return the causes worth fitting: the first ones of the screening, and of each effect that is not in proportion
-    to its size the first that passes the threshold, because a screening at one size makes too little of it.
-    """
+def _near(ranking: Round) -> list[ScoredCandidate]:
+    """Return the causes worth fitting: the first ones of the screening."""
     best = ranking.suspects[0].score
-    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
-    passed = [one for one in ranking.suspects if one.score >= found.tolerances.threshold]
-    bent: dict[str, ScoredCandidate] = {}
-    for one in passed:
-        if not one.cause.effect.linear:
-            bent.setdefault(one.cause.names[0], one)
-    return near + [one for one in bent.values() if one not in near]
+    return [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
 
 
 def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:
