@@ -48,12 +48,15 @@ _KEPT = 64
 
 @dataclass(frozen=True, eq=False)
 class FootPath:
-    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
+    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen; ``centred``
+    False: its only toe marker is on one edge, and the line to it is not that of the foot.
+    """
 
     side: str
     time: Array
     heel: Array
     toe: Array
+    centred: bool = True
     _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
 
@@ -272,8 +275,17 @@ def _feet(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ..
         found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
         places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
         if len(places) == len(found):
-            return tuple(FootPath(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
+            return tuple(
+                FootPath(s, markers.time, places[s, "heel"], toe, _is_centred(markers, name, s, toe))
+                for s, toe in ((s, places[s, "toe"]) for s in SIDES)
+            )
     return ()
+
+
+def _is_centred(markers: Markers, set_name: str, side: str, toe: Array) -> bool:
+    """Return whether a toe (T, 3) m is more than the marker on one edge of the foot alone, standing in for it."""
+    edges = [_landmark(markers, set_name, f"{side}_toe_{edge}") for edge in ("medial", "lateral")]
+    return not any(edge is not None and np.array_equal(toe, edge, equal_nan=True) for edge in edges)
 
 
 def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
