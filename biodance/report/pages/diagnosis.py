@@ -15,10 +15,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNELS
 from biodance.report.figures.diagnosis import adequacy_table, left_figure, limits_figure
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.wording import format_number, trial_and_subject
-
-_SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
-"""Unit of a parameter: factor, unit and digits that are shown."""
+from biodance.report.wording import format_number, sized, trial_and_subject
 
 
 @dataclass(frozen=True)
@@ -52,14 +49,6 @@ def named(effect: str, target: str) -> str:
     """Return a cause with its place as words: ``added mass, left forearm hand``."""
     plain = effect.replace("_", " ")
     return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
-
-
-def sized(value: float, unit: str) -> str:
-    """Return a number with its unit as a person says it: 0.02 m is 20 mm."""
-    factor, name, digits = _SHOWN.get(unit, (1.0, unit, 2))
-    if value == float("inf"):
-        return "no size"
-    return f"{format_number(factor * value, digits)} {name}".strip()
 
 
 def estimated(one: Estimate) -> str:
