@@ -136,17 +136,13 @@ def _told(
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
-    errors = tuple(
-        JointError(
-            joint,
-            _centre_sd(joint, deviation),
-            axis.get(joint, 0.0),
-            joint in wrong,
-            *reversed(spared.get(joint, ("", moved.get(joint, 0.0)))),
+    placed_errors = []
+    for joint in (joint for joint in JOINTS if joint in moved or joint in spared):
+        marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
+        placed_errors.append(
+            JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far, marker)
         )
-        for joint in JOINTS
-        if joint in moved or joint in spared
-    )
+    errors = tuple(placed_errors)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
     if moved:
