@@ -1,7 +1,7 @@
 """Forward kinematics of a Body for all frames at once, and exact first derivatives of points on its segments."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
@@ -31,6 +31,10 @@ class Poses:
         """Return the lab positions (T, K, 3) m of points ``local`` (K, 3) fixed in the given segments (K)."""
         index = list(segment)
         return np.einsum("tkij,kj->tki", self.rotation[:, index], local) + self.position[:, index]
+
+    def at(self, some: slice) -> "Poses":
+        """Return the poses in some of the frames."""
+        return Poses(*(getattr(self, one.name)[some] for one in fields(self)))
 
 
 def poses(body: Body, q: Array) -> Poses:

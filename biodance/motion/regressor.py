@@ -104,4 +104,4 @@ def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:
     """Yield the motion in parts that need little memory, and the frames of each."""
     for start in range(0, motion.time.size, _BLOCK):
         part = slice(start, start + _BLOCK)
-        yield part, Motion(motion.time[part], motion.q[part], motion.v[part], motion.a[part])
+        yield part, motion.at(part)
