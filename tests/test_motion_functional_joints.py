@@ -19,7 +19,7 @@ from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
-from biodance.motion.ik.functional_joints import evaluate_joints, functional_joints, spread_postures
+from biodance.motion.ik.functional_joints import evaluate_joints, functional_joints
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.ik.joint_unknowns import (
     HINGES,
@@ -31,6 +31,7 @@ from biodance.motion.ik.joint_unknowns import (
     own_centre,
     own_turn,
     own_unknowns,
+    spread_postures,
 )
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Markers, Source, Subject, Trial

@@ -9,9 +9,8 @@ from rich.table import Table
 
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
-from biodance.pipeline.attention import without_path
 from biodance.pipeline.results import SessionResult
-from biodance.records.attention import Attention
+from biodance.records.attention import Attention, without_path
 from biodance.report.wording import format_number, millimetres, trial_and_subject
 
 

@@ -4,17 +4,12 @@ sole.
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.motion.contact.soles import Soles
 from biodance.records import SIDES, Array, Mask, Plate, Trial, runs
 from biodance.settings import COP_FORCE
-
-if TYPE_CHECKING:
-    pass
-
 
 RIM = 0.005
 """m of the outline's edge that carry nothing: a sole is rounded, and broadest above the ground."""

@@ -30,13 +30,12 @@ from biodance.motion.ik.joint_unknowns import (
     own_centre,
     own_turn,
     own_unknowns,
+    spread_postures,
 )
 from biodance.motion.kinematics import chains, place_jacobian, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
 
-_POSTURES = 150
-"""Postures taken evenly from all moving trials together."""
 _ALIKE = 8.0
 """s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike.
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
@@ -169,23 +168,6 @@ def _beside(body: Body, joint: str) -> tuple[str, ...]:
     return tuple(
         name for name, segment in zip(body.markers.names, body.markers.segment, strict=True) if segment in meet
     )
-
-
-def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:
-    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
-    marker.
-    """
-    parts = [
-        np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials
-    ]
-    xyz = np.concatenate(parts) if parts else np.empty((0, len(names), 3))
-    xyz = xyz[np.isfinite(xyz).any(axis=(1, 2))]
-    if not len(xyz):
-        raise TrialRefused(
-            "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
-        )
-    chosen = np.linspace(0, len(xyz), min(_POSTURES, len(xyz)), endpoint=False).astype(int)
-    return Markers(names, np.arange(len(chosen)) / 100.0, xyz[chosen])
 
 
 def evaluate_joints(

@@ -2,6 +2,7 @@
 turn about the bone; which of them a movement shows, and of which it contradicts the static trial's place.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,8 +12,9 @@ from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres
 from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.errors import TrialRefused
 from biodance.motion.kinematics import Poses, below, chains, poses
-from biodance.records import SIDES, Array, Index
+from biodance.records import SIDES, Array, Index, Markers
 from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
@@ -222,3 +224,24 @@ def contradicted(information: Array, gradient: Array, shown: NDArray[np.bool_]) 
         if 0.5 * float(pull @ np.linalg.solve(left, pull)) >= _MORE_PROBABLE:
             found.append(joint)
     return tuple(found)
+
+
+_POSTURES = 150
+"""Postures taken evenly from all moving trials together."""
+
+
+def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:
+    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
+    marker.
+    """
+    parts = [
+        np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials
+    ]
+    xyz = np.concatenate(parts) if parts else np.empty((0, len(names), 3))
+    xyz = xyz[np.isfinite(xyz).any(axis=(1, 2))]
+    if not len(xyz):
+        raise TrialRefused(
+            "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
+        )
+    chosen = np.linspace(0, len(xyz), min(_POSTURES, len(xyz)), endpoint=False).astype(int)
+    return Markers(names, np.arange(len(chosen)) / 100.0, xyz[chosen])
