@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import STRAINED, strain
-from biodance.diagnosis.candidates import SCALE, Candidate, candidates, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates, removed, slopes
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.evidence import evidence
 from biodance.diagnosis.model import Model, NamedCause, model
@@ -97,14 +97,19 @@ class Naming:
 
 
 def name_causes(
-    problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = _ROUNDS
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect] = None,
+    *,
+    rounds: int = _ROUNDS,
+    every: tuple[Candidate, ...] | None = None,
 ) -> Naming:
     """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family
-    (`effects`).
+    (`effects`). ``every`` cause with its columns, where they are known (`causes_of`).
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
-    first, first_causes = built(problem, tolerances, chosen)
+    first, first_causes = built(problem, tolerances, chosen, every)
     found, causes = first, first_causes
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
@@ -136,7 +141,7 @@ def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round,
     """
     while found.named:
         found = settle(found, found.named)
-        evidence_of = [_beside(found, i) for i in range(len(found.named))]
+        evidence_of = [beside(found, _without(found, i)) for i in range(len(found.named))]
         falls = [
             i
             for i, one in enumerate(accepted)
@@ -181,11 +186,14 @@ def stands(found: Model, one: NamedCause) -> bool:
     return sure and one.effect.possible_in(found.problem.cases[0], one.theta)
 
 
-def _beside(found: Model, index: int) -> float:
-    """Return the log Bayes factor of one named cause beside the others, which take up what they can without it."""
-    others = (*found.named[:index], *found.named[index + 1 :])
-    without = settle(found, others)
-    return found.log_likelihood - _penalty(found) - without.log_likelihood + _penalty(without)
+def _without(found: Model, index: int) -> Model:
+    """Return the model without one named cause; the others take up what they can."""
+    return settle(found, (*found.named[:index], *found.named[index + 1 :]))
+
+
+def beside(found: Model, other: Model) -> float:
+    """Return the log Bayes factor of the causes named in one model against those named in another."""
+    return found.log_likelihood - _penalty(found) - other.log_likelihood + _penalty(other)
 
 
 def _price(one: Round) -> float:
@@ -226,12 +234,22 @@ def stale(found: Model) -> bool:
     return bool(both[0] > STALE**2 * both[1])
 
 
-def built(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
+    """Return all causes to look for, and those that are not but keep their tolerance."""
     family = effects(chosen)
-    every = candidates(
+    return candidates(
         problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
     )
+
+
+def built(
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect],
+    every: tuple[Candidate, ...] | None = None,
+) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+    family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 
@@ -255,9 +273,23 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
         cut = slice(start, start + width)
         start += width
         here = evidence(s[cut], G[cut, cut], float(np.sum(Z[:, cut] ** 2)))
-        score = here.log_bayes_factor - float(np.log(targets[one.names[0]]))
-        suspects.append(ScoredCandidate(one, here.log_bayes_factor, score, one.start(here.mean), here.visible))
+        tried = [(here.log_bayes_factor, one.start(here.mean)), *_at_sizes(found, one.effect)]
+        value, begin = max(tried, key=lambda pair: pair[0])
+        score = value - float(np.log(targets[one.names[0]]))
+        suspects.append(ScoredCandidate(one, value, score, begin, here.visible))
     return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
+
+
+def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:
+    """Return the log Bayes factor of a cause near each of the sizes at which it is screened, with that size (1,): its
+    prior there, and the volume that the data leave of it (Laplace, the slope taken as that of the way from none).
+    """
+    out = []
+    for share in effect.screened_at:
+        s, G = found.belief.score(found.white(removed(found.problem, effect, share * effect.typical)[:, None]))
+        u = share / SCALE
+        out.append((float(s[0] - 0.5 * G[0, 0] - 0.5 * u**2 - 0.5 * np.log1p(G[0, 0] / u**2)), share * effect.typical))
+    return out
 
 
 def taken(found: Model) -> Array:
@@ -281,13 +313,12 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
     one named.
     """
-    near = _near(found, ranking)
+    near = _near(ranking)
     refined = []
-    before = found.log_likelihood - _penalty(found)
     for one in near:
         start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
         settled = settle(found, (*found.named, start))
-        gain = settled.log_likelihood - _penalty(settled) - before
+        gain = beside(settled, found)
         last = settled.named[-1]
         bayes = gain if last.effect.possible_in(found.problem.cases[0], last.theta) else -np.inf
         refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
@@ -296,18 +327,10 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     return Round((*(one for one, _ in refined), *rest)), refined[0][1]
 
 
-def _near(found: Model, ranking: Round) -> list[ScoredCandidate]:
-    """Return the causes worth fitting: the first ones of the screening, and of each effect that is not in proportion
-    to its size the first that passes the threshold, because a screening at one size makes too little of it.
-    """
+def _near(ranking: Round) -> list[ScoredCandidate]:
+    """Return the causes worth fitting: the first ones of the screening."""
     best = ranking.suspects[0].score
-    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
-    passed = [one for one in ranking.suspects if one.score >= found.tolerances.threshold]
-    bent: dict[str, ScoredCandidate] = {}
-    for one in passed:
-        if not one.cause.effect.linear:
-            bent.setdefault(one.cause.names[0], one)
-    return near + [one for one in bent.values() if one not in near]
+    return [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
 
 
 def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:

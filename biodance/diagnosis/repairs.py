@@ -24,6 +24,8 @@ _ALIKE = {
     "elbow": (("segment_length", "upper_arm"), ("joint_centre", "shoulder")),
 }  # fmt: skip
 """What else looks like a joint that lies elsewhere."""
+_PLACED_BY = {"knee": "KNE", "ankle": "ANK", "shoulder": "SHO", "elbow": "ELB"}
+"""The marker by which the static trial places a joint: wrong there and in all trials, it is that joint elsewhere."""
 
 _EXPLAINS = 0.5
 """Share of the way that a joint seemed to have gone by which a marker beside it must have moved, to explain it."""
@@ -54,7 +56,7 @@ def repairs(cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Eff
         if error.spared and "marker_misplaced" in family:
             yield from _marker(family["marker_misplaced"], error, cases, known)
         elif error.contradicted and "joint_centre" in family:
-            yield _joint(family["joint_centre"], error)
+            yield _joint(family["joint_centre"], error, cases[0].body.markers.names)
 
 
 def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
@@ -71,14 +73,16 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
 
 
-def _joint(effect: Effect, error: JointError) -> Finding:
+def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Finding:
     """Return a joint that lies elsewhere: no surer than static trials place joints and than the movement shows it. A
-    bone of another length and its other joint look the same.
+    bone of another length, its other joint and the one of the ``markers`` that places it look the same.
     """
     sd = float(np.hypot(centre_sd(error.joint), error.centre))
     found = _named(replace(effect, target=error.joint), [("shift", error.moved)], sd)
     side, _, joint = error.joint.partition("_")
     alike = [Alias(kind, f"{side}_{name}", float("inf")) for kind, name in _ALIKE.get(joint, ())]
+    own = f"{side[:1].upper()}{_PLACED_BY.get(joint, '')}"
+    alike += [Alias("marker_misplaced", name, float("inf")) for name in markers if name == own]
     return replace(found, set=(*found.set, *alike))
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.motion.ik.compiled.derivatives import fill_places, fill_tangent
 from biodance.motion.ik.compiled.tree import move_joints, place_joints
 from biodance.records import Array, Index, Motion
 from biodance.spatial import cross, quaternion_matrix, skew
@@ -159,12 +160,21 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
 def place_jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> Array:
     """Return (T, 3S, nv) of points (T, S, 3) on segments, the first of `jacobian`."""
     place = np.zeros((*points.shape, body.nv))
-    if body.n_root:
-        place[..., :3] = np.eye(3)
-        place[..., 3:6] = -skew(points - pose.root_position[:, None])
-    for j, on, axis in _axes_before(body, pose, segment):
-        place[..., body.n_root + j][:, on] = cross(axis, points[:, on] - pose.joint_position[:, j, None])
+    hangs, root = below(body)[:, segment] > 0, pose.root_position
+    axis, points = _tree(body)[3], np.ascontiguousarray(points)
+    fill_places(hangs, axis, pose.joint_rotation, pose.joint_position, root, body.n_root, points, place)
     return place.reshape(len(place), -1, body.nv)
+
+
+def tangent_of(body: Body, pose: Poses, com: Array, place: Array, turn: Array) -> Array:
+    """Return (T, L, nv): what each coordinate, as in `jacobian`, does to L functionals that are ``place`` (T, N, L, 3)
+    of the moved ``com`` (T, N, 3) m of the body's segments and ``turn`` (T, N, L, 3) of their turn.
+    """
+    tangent = np.zeros((len(com), place.shape[2], body.nv))
+    hangs = below(body)[:, : com.shape[1]] > 0
+    joints = _tree(body)[3], pose.joint_rotation, pose.joint_position, pose.root_position, body.n_root
+    fill_tangent(hangs, *joints, np.ascontiguousarray(com), place, turn, tangent)
+    return tangent
 
 
 def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:

@@ -11,6 +11,7 @@ and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc
 """
 
 from collections.abc import Iterator
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from biodance.records import Array, Motion, Wrench
 
 _BLOCK = 512
 """Frames worked on at once where only a sum over the segments is kept: little memory, whatever the length."""
+_NEEDED: WeakKeyDictionary[Motion, WeakKeyDictionary[Body, Wrench]] = WeakKeyDictionary()
+"""What motions need with a body's own parameters, kept as long as both live: many stages of a session ask for it."""
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
@@ -72,9 +75,18 @@ def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wren
     >>> round(float(needed.force[:, 2].mean()), -1)
     610.0
     """
-    known, value = body.sip.phi if phi is None else phi, np.empty((motion.time.size, 6))
+    if phi is not None:
+        return _predicted(body, motion, phi)
+    kept = _NEEDED.setdefault(motion, WeakKeyDictionary())
+    if body not in kept:
+        kept[body] = _predicted(body, motion, body.sip.phi)
+    return kept[body]
+
+
+def _predicted(body: Body, motion: Motion, phi: Array) -> Wrench:
+    value = np.empty((motion.time.size, 6))
     for part, frames in in_blocks(motion):
-        value[part] = wrench_of_segments(body, segment_motion(body, frames), known)
+        value[part] = wrench_of_segments(body, segment_motion(body, frames), phi)
     return Wrench(motion.time, value)
 
 

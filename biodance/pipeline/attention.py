@@ -12,8 +12,9 @@ from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
 from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.problem import Look
+from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.identification.added_mass import LoadSearch
-from biodance.pipeline.looked_at import reasons_left_out, seconds_of
+from biodance.pipeline.looked_at import TOO_SHORT, reasons_left_out, seconds_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, Level, strongest_first, without_path
@@ -62,7 +63,8 @@ def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged
         elif role == "static" and kept:
             rows.append(Judged(name, 0.0, _STATIC))
         else:
-            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or _NEVER, missed=True))
+            short = TOO_SHORT if one.comparison is not None and one.comparison.used.any() else _NEVER
+            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or short, missed=True))
     return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
 
 
@@ -136,7 +138,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
             "named, complete": f"{rest or 'With it accepted, '}nothing more is wrong.",
             "named, incomplete": _incomplete(one, rests_on),
         }.get(one.verdict, "")
-        text = f"Found: {names}. {more}{_sentence(beside)}"
+        text = f"Found: {names}. {_checks(one)}{more}{_sentence(beside)}"
     elif one.verdict == "nothing wrong":
         level = "warn" if beside else "note"
         text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
@@ -145,7 +147,8 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     elif one.doubt.startswith(_FITS):
         level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
     elif not (one.adequacy and rests_on):
-        level, where = "warn", f" in {rests_on}: no movement could be compared with a body" if rests_on else ""
+        whole = f" for {SHORTEST_RUN:g} s without a break" if any(TOO_SHORT in row.why_not for row in judged) else ""
+        level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
         text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt:
         level = "warn"
@@ -154,6 +157,13 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}"
         text += f" It resembles {like}, which is not enough." if like else ""
     return Attention(level, text.strip(), about=ABOUT)
+
+
+def _checks(one: Diagnosis) -> str:
+    """Return where the named causes that have no size were seen, as sentences: which labels, in which trials."""
+    bare = {(finding.effect, finding.target) for finding in one.findings if not finding.parameters}
+    said = [gate.text for gate in one.gates if not gate.ok and (gate.effect, gate.target) in bare]
+    return "".join(f"{_short(text)}. " for text in dict.fromkeys(said))
 
 
 def _doubtful(doubts: Sequence[str]) -> str:
@@ -226,7 +236,7 @@ def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     stepped_only = [row.trial for row in judged if row.missed and row.seconds > 0]
     for row in judged:
         if row.missed and not row.seconds > 0:
-            missed.setdefault(_short(row.why_not), []).append(row.trial)
+            missed.setdefault(_short(row.why_not).removeprefix(f"Trial {row.trial}: "), []).append(row.trial)
     parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
     parts += [f"; judged only by steps on plates: {_listed(stepped_only)}"] if stepped_only else []
     checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]

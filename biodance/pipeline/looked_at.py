@@ -55,6 +55,8 @@ _SOFT = (
     "shown ",
 )
 """Keys of the tolerances that grow with it."""
+TOO_SHORT = f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
+"""Why a trial with measured contact is not looked at."""
 SWAYING = 0.3
 """Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
 UNREST = 1.5
@@ -118,9 +120,7 @@ def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
         if one.trial.name not in seen:
             why[one.trial.name] = " ".join(one.reasons)
         elif seen[one.trial.name] == 0:
-            why[one.trial.name] = (
-                f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
-            )
+            why[one.trial.name] = TOO_SHORT
     return why
 
 

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, SegmentMotion, jacobian, place_jacobian, poses, segment_motion
+from biodance.motion.kinematics import Poses, SegmentMotion, place_jacobian, poses, segment_motion, tangent_of
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -55,14 +55,8 @@ class Response:
         pose, frames = poses(body, motion.q), motion.time.size
         every, segment = list(range(len(body.segments))), list(body.markers.segment)
         J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position))
-        moved, turned = (
-            part.reshape(frames, len(every), 3, body.nv)
-            for part in jacobian(body, pose, every, centres_of_mass(body, pose))
-        )
         place, turn = (part.reshape(frames, len(every), 18, 3) for part in functionals(body, motion))
-        tangent = np.zeros((frames, 18, body.nv))
-        for s in every:
-            tangent += place[:, s] @ moved[:, s] + turn[:, s] @ turned[:, s]
+        tangent = tangent_of(body, pose, centres_of_mass(body, pose), place, turn)
         return cls(body, motion, pose, place, turn, tangent, J)
 
     @cached_property

@@ -15,8 +15,10 @@ from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
 from biodance.lab.weight import is_still
 from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import OUTLINE
-from biodance.records import SIDES, Array, Markers, Plate, Trial, Wrench, runs
+from biodance.records import SIDES, Array, Index, Markers, Plate, Trial, Wrench, runs
 from biodance.records.arrays import rate_of
+from biodance.settings import COP_FORCE
+from biodance.spatial import zero_moment_point
 
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -46,13 +48,17 @@ _KEPT = 64
 
 @dataclass(frozen=True, eq=False)
 class FootPath:
-    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
+    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen; ``centred``
+    False: its only toe marker is on one edge, and the line to it is not that of the foot.
+    """
 
     side: str
     time: Array
     heel: Array
     toe: Array
+    centred: bool = True
     _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
@@ -101,10 +107,23 @@ class FootPath:
             return np.zeros((self.time.size, 3))
         return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
 
+    @cached_property
+    def pointing(self) -> Array:
+        """(3,) m from heel to toe marker, the median over the trial."""
+        return np.asarray(np.nanmedian(self.toe - self.heel, axis=0))
+
     def drift(self, time: Array) -> Array:
-        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
-        velocity = _between(self.time, self.velocity, time)
-        return np.nanmedian(velocity, axis=0) if np.isfinite(velocity).all(axis=1).any() else np.full(3, np.nan)
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none. It is
+        kept, like the places.
+        """
+        key = time.tobytes()
+        if key not in self._drifts:
+            if len(self._drifts) >= _KEPT:
+                self._drifts.pop(next(iter(self._drifts)))
+            velocity = _between(self.time, self.velocity, time)
+            known = velocity[np.isfinite(velocity).all(axis=1)]
+            self._drifts[key] = np.median(known, axis=0) if len(known) else np.full(3, np.nan)
+        return self._drifts[key]
 
 
 @dataclass(frozen=True)
@@ -170,10 +189,24 @@ class SeenTrial:
         which is the foot's alone while the other one swings.
         """
         own = self.plate(step.plate).wrench
+        if not step.beside:
+            return own
         value = np.array(own.value)
         for other in (self.plate(name).wrench for name in step.beside):
             value += np.stack([np.interp(own.time, other.time, column) for column in other.value.T], axis=1)
-        return Wrench(own.time, value) if step.beside else own
+        return Wrench(own.time, value)
+
+    def pressure(self, step: FootStep, part: slice | Index) -> Array:
+        """Return the centre of pressure (n, 2) m under the foot of a step at some of its plate's samples; NaN where
+        nearly nothing presses.
+        """
+        value, height = self.under(step).value[part], self.plate(step.plate).height
+        return zero_moment_point(value, height=height, threshold=COP_FORCE)[:, :2]
+
+    @cached_property
+    def total(self) -> Wrench:
+        """Total wrench of all plates."""
+        return self.trial.wrench
 
     def swings(self, step: FootStep, time: Array) -> NDArray[np.bool_]:
         """Return (n,) whether the other foot swings at some ``time`` (n,) s while this one stands."""
@@ -242,8 +275,17 @@ def _feet(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ..
         found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
         places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
         if len(places) == len(found):
-            return tuple(FootPath(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
+            return tuple(
+                FootPath(s, markers.time, places[s, "heel"], toe, _is_centred(markers, name, s, toe))
+                for s, toe in ((s, places[s, "toe"]) for s in SIDES)
+            )
     return ()
+
+
+def _is_centred(markers: Markers, set_name: str, side: str, toe: Array) -> bool:
+    """Return whether a toe (T, 3) m is more than the marker on one edge of the foot alone, standing in for it."""
+    edges = [_landmark(markers, set_name, f"{side}_toe_{edge}") for edge in ("medial", "lateral")]
+    return not any(edge is not None and np.array_equal(toe, edge, equal_nan=True) for edge in edges)
 
 
 def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:

@@ -24,7 +24,7 @@ class FootAcross(Witness):
 
     name = "foot_across"
     sees = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
-    needs = "A step with one whole foot on one plate; heel and toe markers."
+    needs = "A step with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
@@ -37,6 +37,7 @@ class FootAcross(Witness):
         part, found = step_course(seen, step), []
         if part is None:
             return []
+        counts = seen.foot(step.side).centred
         for phase, (start, stop, expected, sd, foot, laboratory) in ACROSS_PHASES.items():
             if phase == "early" and (step.beside or not step.heel_first):
                 continue
@@ -47,7 +48,9 @@ class FootAcross(Witness):
                 norms["laboratory toes first, across"] = _TOES_FIRST
             value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
             what = f"{step.name}, {phase}"
-            found.append(Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms))
+            found.append(
+                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, counts)
+            )
         return found
 
 

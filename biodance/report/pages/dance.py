@@ -16,8 +16,8 @@ from biodance.report.figures.style import SIDE_COLOURS
 
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Where the eye is in the horizontal plane, for a person who faces lab x."""
-_TALL, _GAP = 150.0, 12.0
-"""Height of the picture in its own units, and what is left between the views."""
+_TALL, _GAP, _LABEL = 150.0, 12.0, 70.0
+"""Height of the picture in its own units, what is left between the views, and the room that their words take."""
 _MIDDLE = "#8d99a6"
 
 
@@ -36,14 +36,15 @@ def mannequin_svg(body: Body, q: Array, title: str) -> str:
         across = np.array([-y, x, 0.0])
         flat = [(name, points @ across, points[:, 2], points @ np.array([x, y, 0.0])) for name, points in solids]
         low = min(float(u.min()) for _, u, _, _ in flat)
+        wide = scale * max(float(u.max()) - low for _, u, _, _ in flat)
+        room = max(wide, _LABEL)
         for name, u, z, _ in sorted(flat, key=lambda one: float(one[3].mean())):
-            corners = np.column_stack([left + scale * (u - low), _TALL - scale * z])
+            corners = np.column_stack([left + (room - wide) / 2 + scale * (u - low), _TALL - scale * z])
             hull = corners[ConvexHull(corners).vertices]
             path = " ".join(f"{a:.1f},{b:.1f}" for a, b in hull)
             drawn.append(f'<polygon points="{path}" fill="{_colour(name)}"/>')
-        wide = scale * max(float(u.max()) - low for _, u, _, _ in flat)
-        drawn.append(f'<text x="{left + wide / 2:.0f}" y="{_TALL + 11:.0f}">{words}</text>')
-        left += wide + _GAP
+        drawn.append(f'<text x="{left + room / 2:.0f}" y="{_TALL + 14:.0f}">{words}</text>')
+        left += room + _GAP
     return (
         f'<svg role="img" aria-label="{title}" viewBox="-3 -6 {left:.0f} {_TALL + 22:.0f}" stroke="#fff" '
         f'stroke-width="0.8">{"".join(drawn)}</svg>'

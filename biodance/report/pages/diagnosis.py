@@ -22,7 +22,7 @@ from biodance.records import CHANNEL_TITLES, CHANNELS
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.wording import format_number, trial_and_subject
+from biodance.report.wording import format_number, sized, trial_and_subject
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -98,10 +98,6 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     return panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
 
 
-_SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
-"""Unit of a parameter: factor, unit and digits that are shown."""
-
-
 @dataclass(frozen=True)
 class Words:
     """What a cause is, its signature, its look-alikes and what separates them, each a few sentences."""
@@ -133,14 +129,6 @@ def named(effect: str, target: str) -> str:
     """Return a cause with its place as words: ``added mass, left forearm hand``."""
     plain = effect.replace("_", " ")
     return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
-
-
-def sized(value: float, unit: str) -> str:
-    """Return a number with its unit as a person says it: 0.02 m is 20 mm."""
-    factor, name, digits = _SHOWN.get(unit, (1.0, unit, 2))
-    if value == float("inf"):
-        return "no size"
-    return f"{format_number(factor * value, digits)} {name}".strip()
 
 
 def estimated(one: Estimate) -> str:
