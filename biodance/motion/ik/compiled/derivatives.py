@@ -6,7 +6,7 @@ Coordinates are the root's place and turn where it moves (``roots`` 6, else 0), 
 """
 
 from biodance.motion.ik.compiled import compiled
-from biodance.motion.ik.compiled.tree import dot, product, rows, three
+from biodance.motion.ik.compiled.tree import dot, rows, three, vector_product
 
 
 @compiled
@@ -27,7 +27,7 @@ def fill_places(hangs, axis, rotation, origin, root, roots, points, J):
             for k in range(points.shape[1]):
                 if hangs[j, k]:
                     arm = points[t, k, 0] - o[0], points[t, k, 1] - o[1], points[t, k, 2] - o[2]
-                    moved = product(turn, arm)
+                    moved = vector_product(turn, arm)
                     for c in range(3):
                         J[t, k, c, roots + j] = moved[c]
 
@@ -51,13 +51,13 @@ def fill_tangent(hangs, axis, rotation, origin, root, roots, com, place, turn, t
             if roots:
                 arm = at[0] - root[t, 0], at[1] - root[t, 1], at[2] - root[t, 2]
                 for f in range(P.shape[0]):
-                    across = product(arm, three(P[f]))
+                    across = vector_product(arm, three(P[f]))
                     for c in range(3):
                         tangent[t, f, c] += P[f, c]
                         tangent[t, f, 3 + c] += D[f, c] + across[c]
             for j in range(axis.shape[0]):
                 if hangs[j, s]:
                     a, o = turned_axis(rotation[t, j], axis[j]), origin[t, j]
-                    moved = product(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
+                    moved = vector_product(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
                     for f in range(P.shape[0]):
                         tangent[t, f, roots + j] += dot(three(P[f]), moved) + dot(three(D[f]), a)

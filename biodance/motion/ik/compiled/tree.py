@@ -46,7 +46,7 @@ def three(v):
 
 
 @compiled
-def product(a, b):
+def vector_product(a, b):
     """Return the vector product a x b of three numbers each."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
@@ -100,7 +100,11 @@ def move_joints(parent, axis, rotation, position, root, rate, rate2, moved):
             (first, second, third), own, here = rows(rotation[t, j]), three(axis[j]), three(position[t, j])
             spin = dot(first, own), dot(second, own), dot(third, own)
             arm = here[0] - place[0], here[1] - place[1], here[2] - place[2]
-            across, lifted, swung = product(w, spin), product(dw, arm), product(w, product(w, arm))
+            across, lifted, swung = (
+                vector_product(w, spin),
+                vector_product(dw, arm),
+                vector_product(w, vector_product(w, arm)),
+            )
             for c in range(3):
                 moved[0, t, j, c] = w[c] + spin[c] * rate[t, j]
                 moved[1, t, j, c] = dw[c] + spin[c] * rate2[t, j] + across[c] * rate[t, j]
