@@ -31,7 +31,7 @@ def foresee_command(
     """
     from rich.console import Console
 
-    from biodance.pipeline.diagnosis import foresee_dance
+    from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
     from biodance.report.pages.foresight import foresight_page, refuse_page
     from biodance.report.terminal import print_foresight

@@ -6,7 +6,7 @@ from typing import Any
 from biodance.errors import BiodanceError
 from biodance.pipeline.provenance import now
 from biodance.report.pages.template import render
-from biodance.report.wording import said_size
+from biodance.report.wording import size_seen
 from biodance.version import __version__
 
 _NAMED = 6
@@ -31,7 +31,7 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         created=now(),
         words=_words,
         some=_some,
-        said_size=said_size,
+        size_seen=size_seen,
     )
 
 
