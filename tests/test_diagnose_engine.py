@@ -13,9 +13,10 @@ from scipy.signal import butter, filtfilt
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.evidence import evidence
-from biodance.diagnosis.naming import built, screen
+from biodance.diagnosis.naming import built
 from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.problem import problem
+from biodance.diagnosis.screening import screen
 from biodance.effects import Case, Effect, Parameter, effect
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.identification import standing_point
