@@ -17,7 +17,7 @@ from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.looked_at import TOO_SHORT, reasons_left_out, seconds_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
-from biodance.records.attention import Attention, Judged, Level, strongest_first
+from biodance.records.attention import Attention, Judged, Level, strongest_first, without_path
 
 _STATIC = "quiet standing tells nothing beside so much movement"
 _KEPT = "kept to measure what a finding gains"
@@ -204,12 +204,6 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [_checked(check, findings) for check in result.all_checks if not check.inside]
     load = result.identification.search if result.identification else None
     return strongest_first([*found, *_load(load)])
-
-
-def without_path(reason: str, file: str) -> str:
-    """Return a refusal without the path of the ``file`` in front, where the file is named beside it anyway."""
-    path, colon, rest = reason.partition(": ")
-    return rest if colon and path.endswith(file) else reason
 
 
 def _checked(check: Check, findings: Sequence[Finding]) -> Attention:

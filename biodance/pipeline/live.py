@@ -16,9 +16,8 @@ from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import Knowability
-from biodance.identification.running import RunningBelief, belief_before
 from biodance.identification.statistics import Fit, believable
-from biodance.identification.streaming import begin, summed_pressure
+from biodance.identification.streaming import RunningBelief, begin, belief_before, summed_pressure
 from biodance.lab.filters import force_filter, motion_filter
 from biodance.lab.prepare import at_marker_times
 from biodance.motion.contact.contact import Contact, ground_contact
@@ -26,7 +25,7 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.ik.follow import Follower
 from biodance.motion.regressor import regressor
 from biodance.motion.smoothing import smooth
-from biodance.motion.upright import upright_trunk
+from biodance.motion.track import upright_trunk
 from biodance.pipeline.live_watch import StreamWatch
 from biodance.records import Array, Markers, Motion, Trial, Wrench
 from biodance.uncertainty.caution import widened

@@ -20,8 +20,7 @@ from biodance.pipeline.session_frames import frames_of
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
-from biodance.report.documents.movement import movement_document
-from biodance.report.documents.session import plain_values, results_document, to_text
+from biodance.report.documents.session import movement_document, plain_values, results_document, to_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page

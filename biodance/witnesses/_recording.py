@@ -15,8 +15,10 @@ from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
 from biodance.lab.weight import is_still
 from biodance.motion.contact.footing import inside
 from biodance.motion.contact.soles import OUTLINE
-from biodance.records import SIDES, Array, Markers, Plate, Trial, Wrench, runs
+from biodance.records import SIDES, Array, Index, Markers, Plate, Trial, Wrench, runs
 from biodance.records.arrays import rate_of
+from biodance.settings import COP_FORCE
+from biodance.spatial import zero_moment_point
 
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -56,6 +58,7 @@ class FootPath:
     toe: Array
     centred: bool = True
     _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
@@ -104,10 +107,23 @@ class FootPath:
             return np.zeros((self.time.size, 3))
         return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
 
+    @cached_property
+    def pointing(self) -> Array:
+        """(3,) m from heel to toe marker, the median over the trial."""
+        return np.asarray(np.nanmedian(self.toe - self.heel, axis=0))
+
     def drift(self, time: Array) -> Array:
-        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
-        velocity = _between(self.time, self.velocity, time)
-        return np.nanmedian(velocity, axis=0) if np.isfinite(velocity).all(axis=1).any() else np.full(3, np.nan)
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none. It is
+        kept, like the places.
+        """
+        key = time.tobytes()
+        if key not in self._drifts:
+            if len(self._drifts) >= _KEPT:
+                self._drifts.pop(next(iter(self._drifts)))
+            velocity = _between(self.time, self.velocity, time)
+            known = velocity[np.isfinite(velocity).all(axis=1)]
+            self._drifts[key] = np.median(known, axis=0) if len(known) else np.full(3, np.nan)
+        return self._drifts[key]
 
 
 @dataclass(frozen=True)
@@ -173,10 +189,24 @@ class SeenTrial:
         which is the foot's alone while the other one swings.
         """
         own = self.plate(step.plate).wrench
+        if not step.beside:
+            return own
         value = np.array(own.value)
         for other in (self.plate(name).wrench for name in step.beside):
             value += np.stack([np.interp(own.time, other.time, column) for column in other.value.T], axis=1)
-        return Wrench(own.time, value) if step.beside else own
+        return Wrench(own.time, value)
+
+    def pressure(self, step: FootStep, part: slice | Index) -> Array:
+        """Return the centre of pressure (n, 2) m under the foot of a step at some of its plate's samples; NaN where
+        nearly nothing presses.
+        """
+        value, height = self.under(step).value[part], self.plate(step.plate).height
+        return zero_moment_point(value, height=height, threshold=COP_FORCE)[:, :2]
+
+    @cached_property
+    def total(self) -> Wrench:
+        """Total wrench of all plates."""
+        return self.trial.wrench
 
     def swings(self, step: FootStep, time: Array) -> NDArray[np.bool_]:
         """Return (n,) whether the other foot swings at some ``time`` (n,) s while this one stands."""
