@@ -24,6 +24,8 @@ _KEPT = "kept to measure what a finding gains"
 _NEVER = "it holds no measured ground contact"
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
+_EMPTY = "empty_plate"
+"""The witness that sees plates with nobody on them."""
 _WEIGHED = "kg are declared: check the mass"
 """What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
 _ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
@@ -261,8 +263,8 @@ def _short(reason: str) -> str:
 
 
 def _heard(one: Diagnosis) -> str:
-    """Return that the witnesses were asked, as a sentence; "" where they saw nothing."""
-    trials = len({o.trial for o in one.witnesses.observations}) if one.witnesses else 0
+    """Return that the witnesses were asked, as a sentence; "" where they saw nobody on a plate."""
+    trials = len({o.trial for o in one.witnesses.observations if o.witness != _EMPTY}) if one.witnesses else 0
     return (
         f" Plates and clocks, judged alone, are as without fault in {trials} trial{'s' * (trials > 1)}."
         if trials
