@@ -57,11 +57,13 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     chart = chart_of(body)
     rough = np.asarray(q).T
     even, first, second = _slow(chart, rough, _rate(time), settings)
-    posture, v, a = np.empty((len(time), body.nq)), *np.empty((2, len(time), body.nv))
+    posture, v, a = (np.empty((len(time), count)) for count in (body.nq, body.nv, body.nv))
     for start in range(0, len(time), _BLOCK):
         part = slice(start, start + _BLOCK)
         near, at = rough[len(rough) - chart.joint_count :, part], (one.at(part) for one in (even, first, second))
         posture[part], v[part], a[part] = _moving(chart, near, *at)
+    for filled in (posture, v, a):
+        filled.setflags(write=False)  # the record keeps them without a copy
     return Motion(time, posture, v, a, joint_names=names)
 
 
