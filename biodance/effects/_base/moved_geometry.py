@@ -161,6 +161,8 @@ class PostureAnswer:
 
 
 _DEGREE = 5
+_TOGETHER = 24
+"""Changes of the geometry that are filtered and differentiated together: little memory, however many there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +207,12 @@ def wrench_of(nine: Array, time: Array, wanted: Array, *, smoothed: LowPass, gra
     Q, S ``nine`` (F, 9, P) at some ``time`` (F,) s, low-passed and differentiated as the motion was (``smoothed``, see
     `biodance.motion.smoothing`).
     """
+    parts = range(0, nine.shape[2], _TOGETHER)
+    some = [_wrench_of(nine[..., k : k + _TOGETHER], time, wanted, smoothed, gravity) for k in parts]
+    return np.concatenate(some, axis=2) if some else np.empty((len(wanted), 6, 0))
+
+
+def _wrench_of(nine: Array, time: Array, wanted: Array, smoothed: LowPass, gravity: Array) -> Array:
     rough = make_interp_spline(time, nine.reshape(len(nine), -1), k=_DEGREE)(wanted)
     smooth = low_pass(rough, (len(wanted) - 1) / (wanted[-1] - wanted[0]), smoothed)
     ends = [(order, np.zeros(smooth.shape[1])) for order in (3, 4)]
