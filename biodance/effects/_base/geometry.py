@@ -61,7 +61,7 @@ class Geometry:
             place[:, own, :, own] = np.moveaxis(turn[some], 1, 0)
             return place.reshape(some.size, count, 3, -1)
 
-        posture = answer.follow(answer.marker_slopes())
+        posture = answer.follow_markers()
         return Changes(self._wrench(self.matter @ posture), self._residual(posture, moved))
 
     @cached_property
