@@ -15,6 +15,7 @@ import json
 import os
 import pickle
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -110,18 +111,29 @@ def own(text: str, folder: Path) -> SessionResult:
     return examine(read_session(hidden(folder / "s", text)))
 
 
-def foreign(index: int, folder: Path, first: int = 601) -> SessionResult:
+def foreign(index: int, first: int = 601) -> SessionResult:
     """Return a session of the independent laboratory, of a person of its own from seed ``first`` on."""
+    return examine(read_session(written(index, first)))
+
+
+def written(index: int, first: int) -> Path:
+    """Return the folder of a session of the independent laboratory, written once."""
+    folder = CACHE / "removed_sessions" / f"{first + index}"
+    if (folder / "session.toml").is_file():
+        return folder
     _, cause, size, target = FOREIGN[index]
     sex, height, mass = PEOPLE[_person(index, first)]
     given = {"--sex": sex, "--height": height, "--mass": mass, "--cause": cause, "--size": size, "--target": target}
     told = [str(text) for pair in given.items() if pair[1] for text in pair]
     script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
     command = [sys.executable, str(script), "--seed", str(first + index), *ROOM, *told, "--trials", "4"]
-    subprocess.run([*command, "--out", str(folder / "s")], check=True, stdout=subprocess.DEVNULL)
-    for squat in (folder / "s").glob("squat*"):
-        squat.unlink()
-    return examine(read_session(folder / "s"))
+    with tempfile.TemporaryDirectory() as there:
+        subprocess.run([*command, "--out", f"{there}/s"], check=True, stdout=subprocess.DEVNULL)
+        for squat in Path(there, "s").glob("squat*"):
+            squat.unlink()
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(f"{there}/s", folder)
+    return folder
 
 
 def _person(index: int, first: int) -> int:
@@ -176,7 +188,7 @@ def jobs(first: int = 601) -> list[tuple[str, str, str, Callable[[Path], Session
     mine = [("own", text.partition(":")[0], text, lambda f, t=text: own(t, f)) for text in CAUSES]
     others = "" if first == 601 else f" of {first}"
     theirs = [
-        ("foreign", row[0], " ".join(filter(None, row[1:])) + others, lambda f, k=k: foreign(k, f, first))
+        ("foreign", row[0], " ".join(filter(None, row[1:])) + others, lambda _, k=k: foreign(k, first))
         for k, row in enumerate(FOREIGN)
     ]
     return [*mine, *theirs]
@@ -218,7 +230,11 @@ def main() -> None:
     parser.add_argument("--match", default="")
     parser.add_argument("--first", type=int, default=601, help="seed of the first foreign person")
     parser.add_argument("--whole", action="store_true")
+    parser.add_argument("--write", action="store_true", help="only write the foreign sessions")
     asked = parser.parse_args()
+    if asked.write:
+        print(*(written(index, asked.first) for index in range(len(FOREIGN))), sep="\n")
+        return
     kept, found = CACHE / f"removed-{asked.run}.jsonl", []
     kept.parent.mkdir(parents=True, exist_ok=True)
     if kept.is_file():

@@ -127,6 +127,14 @@ def test_standing_weighs_pushes_and_lies_under_the_pelvis() -> None:
     np.testing.assert_allclose(values(standing(), "standing_place"), 0.0, atol=1e-9)
 
 
+def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> None:
+    """0.3 % of the weight is a lean of 0.17 degrees; all trials share it."""
+    one = seen(standing(push=4.0, weight=62.0), "standing_force")["mean Fx"]
+    (share,) = [size / (62.0 * 9.81) for size in one.norms.values()]
+    assert 0.003 < share < 0.004
+    assert size_by(hear(session(standing(push=4.0), standing(push=4.0))), ("plate_offset", "Fx"))[1] > 1.5
+
+
 def test_empty_plates_tell_what_was_taken_off() -> None:
     found = seen(walk(Wrong(zero=(3.0, -2.0, 12.0))), "empty_plate")
     assert [found[f"plate1 {c}, taken off"].value for c in ("Fx", "Fy", "Fz")] == [3.0, -2.0, 12.0]

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import STRAINED, strain
-from biodance.diagnosis.candidates import SCALE, Candidate, candidates, removed, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.diagnosis import Alias
-from biodance.diagnosis.evidence import evidence
-from biodance.diagnosis.model import Model, NamedCause, model
+from biodance.diagnosis.model import Model, NamedCause, heavier, model, stale
 from biodance.diagnosis.problem import Problem
+from biodance.diagnosis.screening import ScoredCandidate, screen, taken
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
@@ -26,12 +26,6 @@ _NEAR = 12.0
 """Natural logarithm: causes this far behind the best one of the screening are refined."""
 TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
-HEAVIER = 0.3
-"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
-STALE = 0.03
-"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
-this share.
-"""
 SURE = 2.0
 """A name is taken back where its size is less than so many of its standard deviations; of several parameters
 together, where chance brings them as far as often.
@@ -43,24 +37,6 @@ declared mass still makes it 25 standard deviations.)
 """
 _STEPS = 5
 """Gauss-Newton steps at most."""
-
-
-@dataclass(frozen=True, eq=False)
-class ScoredCandidate:
-    """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets;
-    ``start`` (p,) parameters; ``visible`` share.
-    """
-
-    cause: Candidate
-    log_bayes_factor: float
-    score: float
-    start: Array
-    visible: float
-
-    @property
-    def alias(self) -> Alias:
-        """The cause with its evidence."""
-        return Alias(*self.cause.names, self.log_bayes_factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,12 +182,6 @@ def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
     return bool(ranking.suspects) and ranking.suspects[0].score >= tolerances.threshold
 
 
-def heavier(found: Model) -> bool:
-    """Return whether the data make any segment so much heavier that its kinematic errors grow with it."""
-    before = found.problem.prior.mass
-    return bool(np.any(found.phi[::10] - before > HEAVIER * before))
-
-
 def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
     """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named
     causes settled again.
@@ -221,17 +191,6 @@ def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tup
     """
     fresh, causes = built(found.problem.with_parameters(found.phi), tolerances, chosen)
     return settle(fresh, found.named), causes
-
-
-def stale(found: Model) -> bool:
-    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by
-    more than `STALE`.
-    """
-    both = np.zeros(2)
-    for case in found.problem.cases:
-        wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
-        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
-    return bool(both[0] > STALE**2 * both[1])
 
 
 def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
@@ -256,57 +215,6 @@ def built(
 def named_of(one: NamedCause) -> tuple[str, str]:
     """Return effect and target of a named cause."""
     return one.effect.name, one.effect.target
-
-
-def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate, ...]:
-    """Return all causes with their evidence, most probable first."""
-    widths = [one.basis.shape[1] for one in causes]
-    named = taken(found)
-    Z = np.concatenate([one.basis for one in causes], axis=1)
-    Z = found.white(Z, out=Z)
-    s, G = found.belief.score(Z)
-    if named.shape[1]:
-        G = G - shared(found, named, Z)
-    targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
-    suspects, start = [], 0
-    for one, width in zip(causes, widths, strict=True):
-        cut = slice(start, start + width)
-        start += width
-        here = evidence(s[cut], G[cut, cut], float(np.sum(Z[:, cut] ** 2)))
-        tried = [(here.log_bayes_factor, one.start(here.mean)), *_at_sizes(found, one.effect)]
-        value, begin = max(tried, key=lambda pair: pair[0])
-        score = value - float(np.log(targets[one.names[0]]))
-        suspects.append(ScoredCandidate(one, value, score, begin, here.visible))
-    return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
-
-
-def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:
-    """Return the log Bayes factor of a cause near each of the sizes at which it is screened, with that size (1,): its
-    prior there, and the volume that the data leave of it (Laplace, the slope taken as that of the way from none).
-    """
-    out = []
-    for share in effect.screened_at:
-        s, G = found.belief.score(found.white(removed(found.problem, effect, share * effect.typical)[:, None]))
-        u = share / SCALE
-        out.append((float(s[0] - 0.5 * G[0, 0] - 0.5 * u**2 - 0.5 * np.log1p(G[0, 0] / u**2)), share * effect.typical))
-    return out
-
-
-def taken(found: Model) -> Array:
-    """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
-    parts = [
-        slopes(found.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
-        for one in found.named
-    ]
-    return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
-
-
-def shared(found: Model, named: Array, Z: Array) -> Array:
-    """Return (k, k): what of the information of ``Z`` (r, k) the sizes of the named causes may still absorb."""
-    both = np.concatenate([named, Z], axis=1)
-    _, G = found.belief.score(both)
-    n = named.shape[1]
-    return np.asarray(G[n:, :n] @ np.linalg.solve(np.eye(n) + G[:n, :n], G[:n, n:]))
 
 
 def refine(found: Model, ranking: Round) -> tuple[Round, Model]:

@@ -14,7 +14,8 @@ from biodance.diagnosis.candidates import Candidate, local_basis
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.evidence import Evidence, believe, evidence
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, ScoredCandidate, more_probable, needed, stands
+from biodance.diagnosis.naming import Naming, Round, more_probable, needed, stands
+from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.identification import Identification, conclude
+from biodance.identification.identification import Identification, conclude, conclude_trials
 from biodance.identification.knowledge import KNOWN, PARTLY, Knowability, Known
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
@@ -157,10 +157,9 @@ class Stream:
         ``fits`` are the recorded trials, for the disturbances that twins and plates make over them (see `mismatch`);
         without them the intervals count the noise alone, and the notes say so.
         """
-        found = self.statistics
-        noise, _ = learn_noise(found, may_carry(self.body, widened(self.body.sip, self.body.joint_errors)))
-        disturbed = mismatch(self.body, fits, noise) if fits else None
-        return conclude(self.body, found, tuple(fit.name for fit in fits) or ("stream",), noise=noise, found=disturbed)
+        if fits:
+            return conclude_trials(self.body, self.statistics, fits)
+        return conclude(self.body, self.statistics, ("stream",))
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Forward kinematics of a Body for all frames at once, and exact first derivatives of points on its segments."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +11,9 @@ from biodance.motion.ik.compiled.derivatives import fill_places, fill_tangent
 from biodance.motion.ik.compiled.tree import move_joints, place_joints
 from biodance.records import Array, Index, Motion
 from biodance.spatial import cross, quaternion_matrix, skew
+
+_BLOCK = 512
+"""Frames worked on at once where little of what is computed is kept: little memory, whatever the length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,10 @@ class Poses:
         index = list(segment)
         return np.einsum("tkij,kj->tki", self.rotation[:, index], local) + self.position[:, index]
 
+    def at(self, some: slice) -> "Poses":
+        """Return the poses in some of the frames."""
+        return Poses(*(getattr(self, one.name)[some] for one in fields(self)))
+
 
 def poses(body: Body, q: Array) -> Poses:
     """Return the poses of all joints and segments for positions ``q`` (T, nq)."""
@@ -47,6 +54,13 @@ def poses(body: Body, q: Array) -> Poses:
     place_joints(parent, turn, translation, root_rotation, root_position, angles, rotation, position)
     segments = _of_segments(body, root_rotation, rotation), _of_segments(body, root_position, position)
     return Poses(rotation, position, *segments, root_rotation, root_position)
+
+
+def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:
+    """Yield the motion in parts that need little memory, and the frames of each."""
+    for start in range(0, motion.time.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        yield part, motion.at(part)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +114,11 @@ def centre_of_mass(body: Body, motion: Motion) -> Array:
     table = body.link_parameters().reshape(-1, 10)
     mass = table[:, 0]
     carried = np.flatnonzero(mass > 0)
-    points = poses(body, motion.q).points(carried.tolist(), table[carried, 1:4] / mass[carried, None])
-    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+    places, found = table[carried, 1:4] / mass[carried, None], np.empty((motion.time.size, 3))
+    for part, frames in in_blocks(motion):
+        points = poses(body, frames.q).points(carried.tolist(), places)
+        found[part] = np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+    return found
 
 
 @lru_cache(maxsize=8)

@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.ik.chart import Balls, Smooth, chart_of, continued
+from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.records import Array, Motion
 from biodance.spatial import cross, quaternion_conjugate, quaternion_matrix, quaternion_product
 
@@ -52,12 +52,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
         return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)), joint_names=names)
     chart = chart_of(body)
     rough = np.asarray(q).T
-    longer, span = _continued_at_the_ends(chart.smooth(rough).stacked(), _rate(time), settings)
-    filtered = chart.split(low_pass(longer.T, _rate(time), settings).T)
-    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle)
-    step = np.arange(longer.shape[1]) / _rate(time)
-    first, second = (chart.split(d[:, span]) for d in _derivatives(step, even.stacked()))
-    even = chart.split(even.stacked()[:, span])
+    even, first, second = _slow(chart, rough, _rate(time), settings)
     posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
     v, a = np.empty((2, body.nv, len(time)))
     v[body.n_root + chart.single], a[body.n_root + chart.single] = first.angle, second.angle
@@ -68,6 +63,15 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     if body.n_root:
         v[:6], a[:6] = _root_rates(even, first, second)
     return Motion(time, posture.T, v.T, a.T, joint_names=names)
+
+
+def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[Smooth, Smooth, Smooth]:
+    """Return low-passed postures ``rough`` (nq, T) in the coordinates of ``chart``, and their two first derivatives."""
+    longer, span = _continued_at_the_ends(chart.smooth(rough).stacked(), rate, settings)
+    filtered = chart.split(low_pass(longer.T, rate, settings).T)
+    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle).stacked()
+    first, second = _derivatives(np.arange(even.shape[1]) / rate, even)
+    return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
 
 
 def _continued_at_the_ends(values: Array, rate: float, settings: LowPass) -> tuple[Array, slice]:

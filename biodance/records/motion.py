@@ -130,6 +130,26 @@ class Motion:
         """Columns of q that are the root's: 7 with a free flyer, else 0."""
         return 7 if self.q.shape[1] == self.v.shape[1] + 1 else 0
 
+    def at(self, frames: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Motion":
+        """Return some frames alone: their time, positions, velocities and accelerations, which kinematics need.
+
+        Parameters
+        ----------
+        frames : slice or numpy.ndarray
+            Which, by index.
+
+        Returns
+        -------
+        Motion
+            Without residuals, names and notes.
+
+        Examples
+        --------
+        >>> result["squat_1"].motion.at(slice(0, 100)).time.size
+        100
+        """
+        return Motion(self.time[frames], self.q[frames], self.v[frames], self.a[frames])
+
     @property
     def rate(self) -> float:
         """Sampling rate, Hz; NaN for fewer than two frames."""

@@ -101,8 +101,10 @@ def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) 
     """Return (K, p): sum over time of ``weight`` (F, 6, p), wrench about the lab origin, times what every error adds
     to the wrench.
     """
-    back = trial.back(weight)
-    return np.concatenate([source.transpose(trial, back) for source in sources])
+    back, sums = trial.back(weight), np.zeros((sum(len(source.groups) for source in sources), weight.shape[2]))
+    for frames, part in trial.parts():
+        sums += np.concatenate([source.transpose(part, back[frames]) for source in sources])
+    return sums
 
 
 def _patterns(body: Body) -> tuple[Array, ...]:

@@ -19,6 +19,8 @@ _HALF = 0.3
 """Share of the sole that must be over a raised plate."""
 _UNDER = 0.03
 """m: a centre of pressure so near to a sole is under it."""
+_BLOCK = 1024
+"""Frames whose points all over the soles are looked at together: little memory, whatever the length."""
 _RAISED = 0.05
 """m that a plate stands out of everything around it to count as raised."""
 
@@ -49,19 +51,14 @@ def inside(plate: Plate, points: Array) -> Array:
 
 def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: Mask) -> Footing:
     """Return which plates the touching feet (T, 2) are over, and whether they can touch anything else."""
-    samples = _samples(soles)
+    spread = _spread_over(plates, soles)
     low = (soles.outline[..., 2] - surfaces.offset).min(axis=2)
     unseen = np.isnan(low)
-    anywhere = np.zeros(samples.shape[:-1], dtype=bool)
+    anywhere = np.zeros(spread.shape[1:], dtype=bool)
     raised = np.ones(low.shape, dtype=bool)
     on_plate = np.zeros((*low.shape, len(plates)), dtype=bool)
     for index, plate in enumerate(plates):
-        over = (
-            inside(plate, samples) >= 0
-            if plate.placed
-            else _pressed(plate, soles)[..., None] & ~np.isnan(samples[..., 0])
-        )
-        over &= (np.abs(low - plate.height) < REACH)[..., None]
+        over = spread[index] & (np.abs(low - plate.height) < REACH)[..., None]
         on_plate[..., index] = over.any(axis=-1) & touching
         anywhere |= over
         if any(abs(height - plate.height) < _RAISED for height in surfaces.bare):
@@ -69,6 +66,20 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
     share = anywhere.mean(axis=-1)
     covered = (share == 1) | (raised & (share >= _HALF))
     return Footing(on_plate, share, covered & ~unseen, unseen)
+
+
+def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> Mask:
+    """Return (P, T, 2, S) which points all over the soles are over each plate, seen from above; of a plate of unknown
+    place, all that are seen of a foot that presses it.
+    """
+    pressed = [None if plate.placed else _pressed(plate, soles)[..., None] for plate in plates]
+    parts = []
+    for start in range(0, soles.time.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        samples = _samples(soles.outline[part])
+        seen, pairs = ~np.isnan(samples[..., 0]), zip(plates, pressed, strict=True)
+        parts.append([inside(plate, samples) >= 0 if who is None else who[part] & seen for plate, who in pairs])
+    return np.concatenate(parts, axis=1)
 
 
 def _pressed(plate: Plate, soles: Soles) -> Mask:
@@ -85,14 +96,13 @@ def _pressed(plate: Plate, soles: Soles) -> Mask:
     return alone
 
 
-def _samples(soles: Soles) -> Array:
-    """Return points (T, 2, S, 3) m all over the soles without their rim: the outline and the middles of all its
-    chords.
+def _samples(outline: Array) -> Array:
+    """Return points (T, 2, S, 3) m all over the soles without their rim: their ``outline`` (T, 2, P, 3) m and the
+    middles of all its chords.
     """
-    centre = soles.centre[:, :, None]
-    outwards = (soles.outline - centre) * np.array([1.0, 1.0, 0.0])
+    outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
     length = np.linalg.norm(outwards, axis=-1, keepdims=True)
-    narrow = soles.outline - np.minimum(RIM / np.maximum(length, 1e-9), 1.0) * outwards
+    narrow = outline - np.minimum(RIM / np.maximum(length, 1e-9), 1.0) * outwards
     middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
     return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 

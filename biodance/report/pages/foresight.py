@@ -31,7 +31,7 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         created=now(),
         words=_words,
         some=_some,
-        seen_from=size_seen,
+        size_seen=size_seen,
     )
 
 

@@ -6,7 +6,7 @@ Coordinates are the root's place and turn where it moves (``roots`` 6, else 0), 
 """
 
 from biodance.motion.ik.compiled import compiled
-from biodance.motion.ik.compiled.tree import dot, rows, three, vector_product
+from biodance.motion.ik.compiled.tree import cross_of, dot_of, matrix_of, three_of
 
 
 @compiled
@@ -23,21 +23,21 @@ def fill_places(hangs, axis, rotation, origin, root, roots, points, J):
                 J[t, k, 0, 4], J[t, k, 0, 5], J[t, k, 1, 3] = z, -y, -z
                 J[t, k, 1, 5], J[t, k, 2, 3], J[t, k, 2, 4] = x, y, -x
         for j in range(axis.shape[0]):
-            turn, o = turned_axis(rotation[t, j], axis[j]), origin[t, j]
+            turn, o = _turned_axis(rotation[t, j], axis[j]), origin[t, j]
             for k in range(points.shape[1]):
                 if hangs[j, k]:
                     arm = points[t, k, 0] - o[0], points[t, k, 1] - o[1], points[t, k, 2] - o[2]
-                    moved = vector_product(turn, arm)
+                    moved = cross_of(turn, arm)
                     for c in range(3):
                         J[t, k, c, roots + j] = moved[c]
 
 
 @compiled
-def turned_axis(R, axis):
+def _turned_axis(R, axis):
     """Return R times an axis (3,)."""
-    first, second, third = rows(R)
-    own = three(axis)
-    return dot(first, own), dot(second, own), dot(third, own)
+    first, second, third = matrix_of(R)
+    own = three_of(axis)
+    return dot_of(first, own), dot_of(second, own), dot_of(third, own)
 
 
 @compiled
@@ -47,17 +47,17 @@ def fill_tangent(hangs, axis, rotation, origin, root, roots, com, place, turn, t
     """
     for t in range(com.shape[0]):
         for s in range(com.shape[1]):
-            P, D, at = place[t, s], turn[t, s], three(com[t, s])
+            P, D, at = place[t, s], turn[t, s], three_of(com[t, s])
             if roots:
                 arm = at[0] - root[t, 0], at[1] - root[t, 1], at[2] - root[t, 2]
                 for f in range(P.shape[0]):
-                    across = vector_product(arm, three(P[f]))
+                    across = cross_of(arm, three_of(P[f]))
                     for c in range(3):
                         tangent[t, f, c] += P[f, c]
                         tangent[t, f, 3 + c] += D[f, c] + across[c]
             for j in range(axis.shape[0]):
                 if hangs[j, s]:
-                    a, o = turned_axis(rotation[t, j], axis[j]), origin[t, j]
-                    moved = vector_product(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
+                    a, o = _turned_axis(rotation[t, j], axis[j]), origin[t, j]
+                    moved = cross_of(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
                     for f in range(P.shape[0]):
-                        tangent[t, f, roots + j] += dot(three(P[f]), moved) + dot(three(D[f]), a)
+                        tangent[t, f, roots + j] += dot_of(three_of(P[f]), moved) + dot_of(three_of(D[f]), a)

@@ -40,25 +40,25 @@ def _multiply(A, B, out):
 
 
 @compiled
-def three(v):
+def three_of(v):
     """Return the vector (3,) as three numbers, which the compiler keeps in registers."""
     return v[0], v[1], v[2]
 
 
 @compiled
-def vector_product(a, b):
+def cross_of(a, b):
     """Return the vector product a x b of three numbers each."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @compiled
-def rows(R):
+def matrix_of(R):
     """Return the rows of R (3, 3), three numbers each."""
-    return three(R[0]), three(R[1]), three(R[2])
+    return three_of(R[0]), three_of(R[1]), three_of(R[2])
 
 
 @compiled
-def dot(a, b):
+def dot_of(a, b):
     """Return the scalar product of three numbers each."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -70,18 +70,18 @@ def place_joints(parent, turn, translation, root_rotation, root_position, angle,
     """
     for t in range(angle.shape[0]):
         for j in range(parent.shape[0]):
-            k, sine, versine, arm = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j]), three(translation[j])
-            above, place = rows(root_rotation[t]), three(root_position[t])
+            k, sine, versine, arm = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j]), three_of(translation[j])
+            above, place = matrix_of(root_rotation[t]), three_of(root_position[t])
             if k >= 0:
-                above, place = rows(rotation[t, k]), three(position[t, k])
+                above, place = matrix_of(rotation[t, k]), three_of(position[t, k])
             for d in range(3):
                 a = turn[j, 0, 0, d] + sine * turn[j, 1, 0, d] + versine * turn[j, 2, 0, d]
                 b = turn[j, 0, 1, d] + sine * turn[j, 1, 1, d] + versine * turn[j, 2, 1, d]
                 c = turn[j, 0, 2, d] + sine * turn[j, 1, 2, d] + versine * turn[j, 2, 2, d]
                 for e in range(3):
-                    rotation[t, j, e, d] = dot(above[e], (a, b, c))
+                    rotation[t, j, e, d] = dot_of(above[e], (a, b, c))
             for e in range(3):
-                position[t, j, e] = place[e] + dot(above[e], arm)
+                position[t, j, e] = place[e] + dot_of(above[e], arm)
 
 
 @compiled
@@ -92,19 +92,15 @@ def move_joints(parent, axis, rotation, position, root, rate, rate2, moved):
     for t in range(rate.shape[0]):
         for j in range(parent.shape[0]):
             k = parent[j]
-            w, dw, a = three(root[0, t]), three(root[1, t]), three(root[2, t])
-            place = three(root[3, t])
+            w, dw, a = three_of(root[0, t]), three_of(root[1, t]), three_of(root[2, t])
+            place = three_of(root[3, t])
             if k >= 0:
-                w, dw, a = three(moved[0, t, k]), three(moved[1, t, k]), three(moved[2, t, k])
-                place = three(position[t, k])
-            (first, second, third), own, here = rows(rotation[t, j]), three(axis[j]), three(position[t, j])
-            spin = dot(first, own), dot(second, own), dot(third, own)
+                w, dw, a = three_of(moved[0, t, k]), three_of(moved[1, t, k]), three_of(moved[2, t, k])
+                place = three_of(position[t, k])
+            (first, second, third), own, here = matrix_of(rotation[t, j]), three_of(axis[j]), three_of(position[t, j])
+            spin = dot_of(first, own), dot_of(second, own), dot_of(third, own)
             arm = here[0] - place[0], here[1] - place[1], here[2] - place[2]
-            across, lifted, swung = (
-                vector_product(w, spin),
-                vector_product(dw, arm),
-                vector_product(w, vector_product(w, arm)),
-            )
+            across, lifted, swung = cross_of(w, spin), cross_of(dw, arm), cross_of(w, cross_of(w, arm))
             for c in range(3):
                 moved[0, t, j, c] = w[c] + spin[c] * rate[t, j]
                 moved[1, t, j, c] = dw[c] + spin[c] * rate2[t, j] + across[c] * rate[t, j]
