@@ -136,17 +136,11 @@ def _told(
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
-    errors = tuple(
-        JointError(
-            joint,
-            _centre_sd(joint, deviation),
-            axis.get(joint, 0.0),
-            joint in wrong,
-            *reversed(spared.get(joint, ("", moved.get(joint, 0.0)))),
-        )
-        for joint in JOINTS
-        if joint in moved or joint in spared
-    )
+    errors = []
+    for joint in (one for one in JOINTS if one in moved or one in spared):
+        marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
+        sd = _centre_sd(joint, deviation), axis.get(joint, 0.0)
+        errors.append(JointError(joint, *sd, contradicted=joint in wrong, moved=far, spared=marker))
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
     if moved:
@@ -161,9 +155,9 @@ def _told(
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
-    centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
+    centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=tuple(errors))
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
-    return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+    return FunctionalJoints(placed, moved, turned, tuple(errors), kept, (start.rms, found.rms), tuple(notes))
 
 
 def _contradiction(joint: str, far: float) -> str:
