@@ -12,7 +12,7 @@ from biodance.doctor import MachineFinding
 from biodance.pipeline.attention import without_path
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention
-from biodance.report.wording import format_number, millimetres, seen_from, trial_and_subject
+from biodance.report.wording import format_number, millimetres, trial_and_subject, visible_from
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
@@ -173,7 +173,7 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
     for heading in ("cause", "will be seen from", "and told from the others from", "typical"):
         table.add_column(heading)
     for row in found["limits"]:
-        cells = (seen_from(row, key) for key in ("limit", "told_from", "typical"))
+        cells = (visible_from(row, key) for key in ("limit", "told_from", "typical"))
         table.add_row(escape(f"{row['effect']} {row['target']}".strip()), *cells)
     console.print(table)
     for pair in found["confusions"]:

@@ -32,7 +32,7 @@ def sized(value: float, unit: str) -> str:
     return f"{format_number(factor * value, digits)} {name}".strip()
 
 
-def seen_from(row: dict[str, Any], key: str) -> str:
+def visible_from(row: dict[str, Any], key: str) -> str:
     """Return a size of a cause, ``limit``, ``told_from`` or ``typical``, as a person says it: 12 mm, or never."""
     value = row[key]
     if value is None or not value < _ABSURD * row["typical"]:

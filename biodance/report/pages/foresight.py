@@ -6,7 +6,7 @@ from typing import Any
 from biodance.errors import BiodanceError
 from biodance.pipeline.provenance import now
 from biodance.report.pages.template import render
-from biodance.report.wording import seen_from
+from biodance.report.wording import visible_from
 from biodance.version import __version__
 
 _NAMED = 6
@@ -31,7 +31,7 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         created=now(),
         words=_words,
         some=_some,
-        seen_from=seen_from,
+        visible_from=visible_from,
     )
 
 
