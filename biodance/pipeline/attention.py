@@ -5,23 +5,17 @@ or outside its limit, strongest first. Page, terminal and JSON show the same rec
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
 from biodance.diagnosis.heard import Testimony
-from biodance.diagnosis.problem import Look
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.identification.added_mass import LoadSearch
-from biodance.pipeline.looked_at import TOO_SHORT, reasons_left_out, seconds_of
+from biodance.pipeline.looked_at import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, Level, strongest_first, without_path
 
-_STATIC = "quiet standing tells nothing beside so much movement"
-_KEPT = "kept to measure what a finding gains"
-_NEVER = "it holds no measured ground contact"
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
 _EMPTY = "empty_plate"
@@ -48,41 +42,6 @@ EXPLAINS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Causes that a check outside its limit may come from, by the beginning of the check's name."""
-
-
-def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged, ...]:
-    """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
-    is not.
-    """
-    seconds = {look.trial.name: seconds_of(look) for look in used}
-    why = reasons_left_out(result.trials)
-    kept = {look.trial.role for look in used if seconds[look.trial.name] > 0}
-    rows = []
-    for one in result.trials:
-        name, role = one.trial.name, one.trial.role
-        if seconds.get(name, 0.0) > 0:
-            rows.append(Judged(name, seconds[name]))
-        elif "fit" in kept and role not in ("fit", "static"):
-            rows.append(Judged(name, 0.0, _KEPT))
-        elif role == "static" and kept:
-            rows.append(Judged(name, 0.0, _STATIC))
-        else:
-            short = TOO_SHORT if one.comparison is not None and one.comparison.used.any() else _NEVER
-            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or short, missed=True))
-    return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
-
-
-def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
-    """Return for every trial to identify from how many measured seconds it holds, or why none."""
-    used = set(result.identification.identification.trials) if result.identification else set()
-    rows = []
-    for one in result.trials:
-        if one.trial.role != "fit":
-            continue
-        here = one.comparison if one.name in used else None
-        seconds = float(here.used.sum() * np.median(np.diff(here.time))) if here and here.time.size > 1 else 0.0
-        rows.append(Judged(one.name, seconds, "" if seconds else " ".join(one.reasons) or _NEVER, missed=not seconds))
-    return tuple(rows)
 
 
 def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:

@@ -21,10 +21,10 @@ from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.rival_bodies import expect_unloaded
-from biodance.pipeline.attention import judged_trials, told
+from biodance.pipeline.attention import told
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
-from biodance.pipeline.looked_at import all_looks, cases_of, left_out, looked_at, own_tolerances
+from biodance.pipeline.looked_at import all_looks, cases_of, judged_trials, left_out, looked_at, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
 from biodance.threads import one_thread
