@@ -18,8 +18,7 @@ from biodance.errors import TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import Knowability
 from biodance.identification.statistics import Fit, believable
-from biodance.identification.streaming import RunningBelief, begin, belief_before, summed_pressure
-from biodance.identification.streaming import summed_pressure
+from biodance.identification.streaming import RunningBelief, belief_before, summed_pressure
 from biodance.lab.filters import force_filter, motion_filter
 from biodance.lab.prepare import at_marker_times
 from biodance.motion.contact.contact import Contact, ground_contact
