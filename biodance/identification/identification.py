@@ -7,6 +7,7 @@ with the table's interval, and says so.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -26,7 +27,7 @@ from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Fit, Statistics, believable, layout_for, statistics_together
 from biodance.records import Array, Sip
-from biodance.threads import one_thread
+from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.caution import from_true_centres, widened
 from biodance.uncertainty.noise import Noise
 
@@ -44,7 +45,7 @@ _TOO_SLOW = (
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Sendable):
     """What a session says about a body.
 
     Parameters
@@ -190,7 +191,7 @@ class Identification:
             raise NotSolved(f"Nothing was identified from {', '.join(self.trials)}. {self.fit.cause}")
         return self.fit.sip
 
-    @property
+    @cached_property
     def identified(self) -> Body:
         """The body with the identified parameters; raises `NotSolved` like `sip`."""
         notes = (*self.body.notes, f"SIP identified from {', '.join(self.trials)}.")

@@ -138,7 +138,7 @@ def _add(body: Body, fit: Fit, total: Statistics) -> None:
     gram, count, layout = total.gram, total.count, total.layout
     size = gram.shape[2]
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
-        part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
+        part = fit.motion.at(pick)
         moved = segment_motion(body, part)
         W = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)

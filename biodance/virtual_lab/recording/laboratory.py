@@ -152,7 +152,7 @@ class Instruments:
 
 
 def set_up(person: Person, visit: LabVisit) -> Instruments:
-    """Set up the instruments of one visit: the plates as installed, zeros and the cameras' level of the day."""
+    """Set up the instruments of one visit: plates as installed, zeros and level of the cameras as of the day."""
     laboratory, tolerances = visit.laboratory, visit.tolerances
     (_, installed), (tilt, today) = (_draw(person, visit, day) for day in (FIRST_VISIT.number, visit.number))
     return Instruments(
