@@ -83,6 +83,6 @@ def planned_shares(dance: Dance, told: Telling) -> Array:
     plan, total = dance.motion(_RATE), np.zeros_like(told.root)
     for phase in dance.phases:
         inside = (plan.time >= phase.start - 1e-9) & (plan.time <= phase.end + 1e-9)
-        part = Motion(plan.time[inside], plan.q[inside], plan.v[inside], plan.a[inside])
+        part = plan.at(inside)
         total += told.information(dance.body, part, held=phase.kind == "hold")
     return told.shares(total)

@@ -117,7 +117,7 @@ def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round,
     """
     while found.named:
         found = settle(found, found.named)
-        evidence_of = [beside(found, _without(found, i)) for i in range(len(found.named))]
+        evidence_of = [more_probable(found, _without(found, i)) for i in range(len(found.named))]
         falls = [
             i
             for i, one in enumerate(accepted)
@@ -167,7 +167,7 @@ def _without(found: Model, index: int) -> Model:
     return settle(found, (*found.named[:index], *found.named[index + 1 :]))
 
 
-def beside(found: Model, other: Model) -> float:
+def more_probable(found: Model, other: Model) -> float:
     """Return the log Bayes factor of the causes named in one model against those named in another."""
     return found.log_likelihood - _penalty(found) - other.log_likelihood + _penalty(other)
 
@@ -226,7 +226,7 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     for one in near:
         start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
         settled = settle(found, (*found.named, start))
-        gain = beside(settled, found)
+        gain = more_probable(settled, found)
         last = settled.named[-1]
         bayes = gain if last.effect.possible_in(found.problem.cases[0], last.theta) else -np.inf
         refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))

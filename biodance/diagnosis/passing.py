@@ -14,7 +14,7 @@ from biodance.diagnosis.candidates import Candidate, local_basis
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.evidence import Evidence, believe, evidence
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, beside, needed, stands
+from biodance.diagnosis.naming import Naming, Round, more_probable, needed, stands
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
@@ -49,7 +49,7 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
     """
     if alarming(adequacy(naming.found)) <= LIMIT:
         return naming
-    best, steady = naming, beside(naming.found, naming.bare)
+    best, steady = naming, more_probable(naming.found, naming.bare)
     for base, accepted, than in ((naming.bare, (), steady), (naming.found, naming.accepted, 0.0)):
         tried = _with(naming, base, accepted, chosen, than=than)
         if tried is not None and alarming(adequacy(tried.found)) < alarming(adequacy(best.found)):

@@ -12,7 +12,7 @@ from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.discovery import Chosen
-from biodance.effects import Case, DiscreteEffect, Effect, effects
+from biodance.effects import Case, DiscreteEffect, Effect, Gate, effects
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
@@ -91,3 +91,31 @@ def _named(effect: Effect, sizes: list[tuple[str, float]], sd: float) -> Finding
     parameters = tuple(Estimate(name, float(size), sd, "m") for name, size in sizes)
     cause = Alias(effect.name, effect.target, float("inf"))
     return Finding(effect.name, effect.target, parameters, (cause,), 1.0, advice=effect.advice)
+
+
+def by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None, *, suspicious: bool = False) -> Diagnosis:
+    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
+    recordings: of what the statistics ``left``, with something ``suspicious`` or not, no findings are taken.
+    """
+    findings = tuple(failed_check(gate) for gate in checks if not gate.ok)
+    note = (
+        "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
+        "recordings that are wrong."
+    )
+    clean = left is not None and left.verdict == "named, complete" and not suspicious
+    return Diagnosis(
+        verdict="named, complete" if clean else "named, incomplete",
+        findings=findings,
+        gates=checks,
+        adequacy=left.adequacy if left else (),
+        unobservable=left.unobservable if left else (),
+        limits=left.limits if left else (),
+        notes=(note, *(left.notes if left else ())),
+    )
+
+
+def failed_check(gate: Gate) -> Finding:
+    """Return a failed check as a finding."""
+    size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
+    cause = Alias(gate.effect, gate.target, float("inf"))
+    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {gate.advice}".strip())

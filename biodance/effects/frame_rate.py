@@ -161,7 +161,7 @@ def _slow_parts(case: Case) -> tuple[Array, Array, Array]:
     skip, edge = max(1, int(case.motion.rate / COARSE)), int(_EDGE * case.motion.rate)
     take = slice(edge, -edge, skip)
     motion = case.motion
-    some = Motion(motion.time[take], motion.q[take], motion.v[take], motion.a[take])
+    some = motion.at(take)
     weight, whole = regressor(case.body, Motion(some.time, some.q, 0 * some.v, 0 * some.a)), regressor(case.body, some)
     force = case.trial.wrench.value[take]
     force = force * (np.mean(whole[:, 2] @ case.phi) / np.mean(force[:, 2]))

@@ -48,7 +48,7 @@ def impacts(found: Identification, motion: Motion, use: NDArray[np.bool_]) -> tu
         return ()
     at = np.flatnonzero(use)
     at = at[:: max(1, at.size // _FRAMES)]
-    frames = Motion(motion.time[at], motion.q[at], motion.v[at], motion.a[at])
+    frames = motion.at(at)
     joints = [i for kind in _JOINTS for i in of[kind]]
     Y = torque_regressor(found.body, frames)[:, joints]
     moved, sd = _moved(found)

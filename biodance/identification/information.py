@@ -93,6 +93,6 @@ def information(
 def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used: NDArray[np.bool_]) -> Iterator[Array]:
     """Yield whitened rows (m, 6, 10N + 1) of [W y], block by block."""
     for pick in noise.bands.runs(used, motion.rate):
-        part = Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
+        part = motion.at(pick)
         W = regressor(body, part)
         yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))

@@ -17,13 +17,12 @@ from biodance.body.changes import parts_as_segments
 from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.regressor import regressor
-from biodance.records import Array, Motion, Sip
-from biodance.uncertainty.deviations import deviations
+from biodance.records import Array, Sip
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
 from biodance.uncertainty.response import Response
 from biodance.uncertainty.source import ErrorSource
-from biodance.uncertainty.sources import of_markers, transpose
+from biodance.uncertainty.sources import deviations, of_markers, transpose
 
 EVERY = 8
 """Frames: one of so many is enough to predict the size of the marker residuals from."""
@@ -66,14 +65,14 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
         for pick in noise.bands.runs(fit.use, fit.motion.rate):
             if pick.size < SHORTEST:
                 continue
-            motion = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
-            W = regressor(body, motion)
+            motion = fit.motion.at(pick)
+            W, trial = regressor(body, motion), Response.of(sources[0].body, motion)
             weight = white.weighted(W)
-            scores += transpose(sources, Response.of(sources[0].body, motion), weight).T
+            scores += transpose(sources, trial, weight).T
             wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
             plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
             if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
-                predicted += float(sd**2 @ _marker_squares(motion, sources)) * pick.size
+                predicted += float(sd**2 @ _marker_squares(trial, sources)) * pick.size
                 observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0
@@ -86,12 +85,11 @@ def nothing(body: Body) -> Mismatch:
     return Mismatch(np.zeros((size, sources)), np.zeros((size, PLATE_SOURCES)))
 
 
-def _marker_squares(motion: Motion, sources: tuple[ErrorSource, ...]) -> Array:
+def _marker_squares(trial: Response, sources: tuple[ErrorSource, ...]) -> Array:
     """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
     of `EVERY` frames (two at least).
     """
-    some = slice(None, None, min(EVERY, max(1, motion.time.size // 2)))
-    few = Response.of(sources[0].body, Motion(motion.time[some], motion.q[some], motion.v[some], motion.a[some]))
+    few = trial.at(slice(None, None, min(EVERY, max(1, trial.motion.time.size // 2))))
     return np.concatenate([source.squares(few) for source in sources])
 
 

@@ -44,7 +44,7 @@ THINNED = 4
 
 def some_frames(motion: Motion, pick: "slice | np.ndarray") -> Motion:
     """Return the chosen frames of a motion."""
-    return Motion(motion.time[pick], motion.q[pick], motion.v[pick], motion.a[pick])
+    return motion.at(pick)
 
 
 def zero_changes(body: Body, one: Grounded, angle: Array) -> Array:

@@ -74,6 +74,11 @@ class Statistics:
             )
         return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
 
+    def slower(self) -> "Statistics":
+        """Return the statistics without their fastest band."""
+        bands = replace(self.layout.bands, edges=self.layout.bands.edges[:-1])
+        return Statistics(self.gram[:-1], self.count[:-1], layout_for(self.layout.about, bands))
+
     def information(self, noise: Noise) -> Information:
         """Return the R factor of the data whitened by ``noise`` (same bands)."""
         weight = np.linalg.inv(noise.covariance)
@@ -133,7 +138,7 @@ def _add(body: Body, fit: Fit, total: Statistics) -> None:
     gram, count, layout = total.gram, total.count, total.layout
     size = gram.shape[2]
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
-        part = Motion(fit.motion.time[pick], fit.motion.q[pick], fit.motion.v[pick], fit.motion.a[pick])
+        part = fit.motion.at(pick)
         moved = segment_motion(body, part)
         W = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
         rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
-from biodance.motion.kinematics import below, poses, segment_motion
-from biodance.motion.regressor import in_blocks, regressor_of
+from biodance.motion.kinematics import below, in_blocks, poses, segment_motion
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Wrench
 from biodance.spatial import cross
 
@@ -87,10 +87,12 @@ def torque_regressor(body: Body, motion: Motion) -> Array:
 
 def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> Array:
     """Return (T, n) N·m: what the ground's wrenches give about each joint's axis."""
-    total, axes = np.zeros((motion.time.size, len(body.joints))), _axes(body, motion)
-    for segment, wrench in ground.items():
-        beyond = below(body)[:, body.segment_index(segment)]
-        total += beyond * _about_axes(axes, wrench.value[..., None])[..., 0]
+    total = np.zeros((motion.time.size, len(body.joints)))
+    for part, frames in in_blocks(motion):
+        axes = _axes(body, frames)
+        for segment, wrench in ground.items():
+            beyond = below(body)[:, body.segment_index(segment)]
+            total[part] += beyond * _about_axes(axes, wrench.value[part, :, None])[..., 0]
     return total
 
 

@@ -2,6 +2,8 @@
 about the person.
 """
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from biodance.errors import TrialRefused
@@ -11,6 +13,10 @@ from biodance.settings import STANDARD_GRAVITY, StandingRules
 _BLOCK = 0.05  # s, the force is averaged over blocks of this length before it is judged
 
 
+_NUMBERS = 1_000_000
+"""Numbers ordered at once, so that a long trial needs little memory."""
+_MOVEMENT: WeakKeyDictionary[Markers, float] = WeakKeyDictionary()
+"""How far markers moved, kept as long as they live: reader, roles and checks ask for it."""
 _PLACES = 16
 """As many places in an order are found without ordering all."""
 
@@ -22,11 +28,20 @@ def movement(markers: Markers) -> float:
     The box is taken between the 2nd and 98th percentile of each coordinate, so that a flickering marker does not count
     as movement. NaN if no marker was ever seen.
     """
-    seen = markers.seen.any(axis=0)
-    if not seen.any():
+    if markers not in _MOVEMENT:
+        _MOVEMENT[markers] = _movement(markers)
+    return _MOVEMENT[markers]
+
+
+def _movement(markers: Markers) -> float:
+    seen = np.flatnonzero(markers.seen.any(axis=0))
+    if not seen.size:
         return float("nan")
-    low, high = _percentiles(markers.xyz[:, seen], 0.02, 0.98)
-    return float(np.median(np.linalg.norm(high - low, axis=1)))
+    some, boxes = max(1, _NUMBERS // (3 * markers.time.size)), []
+    for start in range(0, seen.size, some):
+        low, high = _percentiles(markers.xyz[:, seen[start : start + some]], 0.02, 0.98)
+        boxes.append(np.linalg.norm(high - low, axis=1))
+    return float(np.median(np.concatenate(boxes)))
 
 
 def _percentiles(values: Array, *shares: float) -> list[Array]:

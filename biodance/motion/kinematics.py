@@ -1,15 +1,19 @@
 """Forward kinematics of a Body for all frames at once, and exact first derivatives of points on its segments."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.motion.ik.compiled.derivatives import fill_places, fill_tangent
 from biodance.motion.ik.compiled.tree import move_joints, place_joints
 from biodance.records import Array, Index, Motion
 from biodance.spatial import cross, quaternion_matrix, skew
+
+_BLOCK = 512
+"""Frames worked on at once where little of what is computed is kept: little memory, whatever the length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,10 @@ class Poses:
         index = list(segment)
         return np.einsum("tkij,kj->tki", self.rotation[:, index], local) + self.position[:, index]
 
+    def at(self, some: slice) -> "Poses":
+        """Return the poses in some of the frames."""
+        return Poses(*(getattr(self, one.name)[some] for one in fields(self)))
+
 
 def poses(body: Body, q: Array) -> Poses:
     """Return the poses of all joints and segments for positions ``q`` (T, nq)."""
@@ -48,6 +56,13 @@ def poses(body: Body, q: Array) -> Poses:
     return Poses(rotation, position, *segments, root_rotation, root_position)
 
 
+def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:
+    """Yield the motion in parts that need little memory, and the frames of each."""
+    for start in range(0, motion.time.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        yield part, motion.at(part)
+
+
 @dataclass(frozen=True, eq=False)
 class SegmentMotion:
     """Segments in the lab frame, the body's parts behind them: ``rotation`` (T, N, 3, 3), ``position`` (T, N, 3) m of
@@ -62,9 +77,9 @@ class SegmentMotion:
     acceleration: Array
 
 
-def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
-    """Return the spatial motion of all segments of ``body`` during ``motion``."""
-    pose = poses(body, motion.q)
+def segment_motion(body: Body, motion: Motion, *, pose: Poses | None = None) -> SegmentMotion:
+    """Return the spatial motion of all segments of ``body`` during ``motion``, whose ``pose`` may be known already."""
+    pose = pose or poses(body, motion.q)
     frames, n = motion.time.size, len(body.joints)
     w_root, dw_root, acc_root = np.zeros((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3))
     if body.n_root:
@@ -99,8 +114,11 @@ def centre_of_mass(body: Body, motion: Motion) -> Array:
     table = body.link_parameters().reshape(-1, 10)
     mass = table[:, 0]
     carried = np.flatnonzero(mass > 0)
-    points = poses(body, motion.q).points(carried.tolist(), table[carried, 1:4] / mass[carried, None])
-    return np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+    places, found = table[carried, 1:4] / mass[carried, None], np.empty((motion.time.size, 3))
+    for part, frames in in_blocks(motion):
+        points = poses(body, frames.q).points(carried.tolist(), places)
+        found[part] = np.einsum("k,tkj->tj", mass[carried], points) / mass[carried].sum()
+    return found
 
 
 @lru_cache(maxsize=8)
@@ -159,12 +177,21 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
 def place_jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> Array:
     """Return (T, 3S, nv) of points (T, S, 3) on segments, the first of `jacobian`."""
     place = np.zeros((*points.shape, body.nv))
-    if body.n_root:
-        place[..., :3] = np.eye(3)
-        place[..., 3:6] = -skew(points - pose.root_position[:, None])
-    for j, on, axis in _axes_before(body, pose, segment):
-        place[..., body.n_root + j][:, on] = cross(axis, points[:, on] - pose.joint_position[:, j, None])
+    hangs, root = below(body)[:, segment] > 0, pose.root_position
+    axis, points = _tree(body)[3], np.ascontiguousarray(points)
+    fill_places(hangs, axis, pose.joint_rotation, pose.joint_position, root, body.n_root, points, place)
     return place.reshape(len(place), -1, body.nv)
+
+
+def tangent_of(body: Body, pose: Poses, com: Array, place: Array, turn: Array) -> Array:
+    """Return (T, L, nv): what each coordinate, as in `jacobian`, does to L functionals that are ``place`` (T, N, L, 3)
+    of the moved ``com`` (T, N, 3) m of the body's segments and ``turn`` (T, N, L, 3) of their turn.
+    """
+    tangent = np.zeros((len(com), place.shape[2], body.nv))
+    hangs = below(body)[:, : com.shape[1]] > 0
+    joints = _tree(body)[3], pose.joint_rotation, pose.joint_position, pose.root_position, body.n_root
+    fill_tangent(hangs, *joints, np.ascontiguousarray(com), place, turn, tangent)
+    return tangent
 
 
 def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:

@@ -10,17 +10,17 @@ a, with g the gravity vector, first moment h = R mc and inertia J = R I R' about
 and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc, I]: the columns of W.
 """
 
-from collections.abc import Iterator
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.motion.ik.compiled.tree import fill_regressor, fill_wrench
-from biodance.motion.kinematics import SegmentMotion, segment_motion
+from biodance.motion.kinematics import SegmentMotion, in_blocks, segment_motion
 from biodance.records import Array, Motion, Wrench
 
-_BLOCK = 512
-"""Frames worked on at once where only a sum over the segments is kept: little memory, whatever the length."""
+_NEEDED: WeakKeyDictionary[Motion, WeakKeyDictionary[Body, Wrench]] = WeakKeyDictionary()
+"""What motions need with a body's own parameters, kept as long as both live: many stages of a session ask for it."""
 
 
 def regressor_of(segments: SegmentMotion, *, gravity: Array, sharing: Array | None = None) -> Array:
@@ -72,9 +72,18 @@ def predict_wrench(body: Body, motion: Motion, phi: Array | None = None) -> Wren
     >>> round(float(needed.force[:, 2].mean()), -1)
     610.0
     """
-    known, value = body.sip.phi if phi is None else phi, np.empty((motion.time.size, 6))
+    if phi is not None:
+        return _predicted(body, motion, phi)
+    kept = _NEEDED.setdefault(motion, WeakKeyDictionary())
+    if body not in kept:
+        kept[body] = _predicted(body, motion, body.sip.phi)
+    return kept[body]
+
+
+def _predicted(body: Body, motion: Motion, phi: Array) -> Wrench:
+    value = np.empty((motion.time.size, 6))
     for part, frames in in_blocks(motion):
-        value[part] = wrench_of_segments(body, segment_motion(body, frames), known)
+        value[part] = wrench_of_segments(body, segment_motion(body, frames), phi)
     return Wrench(motion.time, value)
 
 
@@ -86,10 +95,3 @@ def wrench_of_segments(body: Body, move: SegmentMotion, phi: Array) -> Array:
     value, drive = np.zeros((len(move.position), 6)), move.acceleration - body.gravity
     fill_wrench(move.rotation, move.position, move.angular_velocity, move.angular_acceleration, drive, links, value)
     return value
-
-
-def in_blocks(motion: Motion) -> Iterator[tuple[slice, Motion]]:
-    """Yield the motion in parts that need little memory, and the frames of each."""
-    for start in range(0, motion.time.size, _BLOCK):
-        part = slice(start, start + _BLOCK)
-        yield part, Motion(motion.time[part], motion.q[part], motion.v[part], motion.a[part])

@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.ik.chart import Balls, Smooth, chart_of, continued
+from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.records import Array, Motion
 from biodance.spatial import cross, quaternion_conjugate, quaternion_matrix, quaternion_product
 
@@ -30,6 +30,10 @@ LEAST_COSINE = 1e-3
 """Smallest |cos| of a ball joint's second angle that rates are divided by: nearer to the singularity the rates are
 bounded, not exact.
 """
+
+
+_BLOCK = 2048
+"""Frames whose angles are taken from the smooth coordinates together: little memory, whatever the length."""
 
 
 def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None) -> Motion:
@@ -52,22 +56,41 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
         return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)), joint_names=names)
     chart = chart_of(body)
     rough = np.asarray(q).T
-    longer, span = _continued_at_the_ends(chart.smooth(rough).stacked(), _rate(time), settings)
-    filtered = chart.split(low_pass(longer.T, _rate(time), settings).T)
-    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle)
-    step = np.arange(longer.shape[1]) / _rate(time)
-    first, second = (chart.split(d[:, span]) for d in _derivatives(step, even.stacked()))
-    even = chart.split(even.stacked()[:, span])
-    posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
-    v, a = np.empty((2, body.nv, len(time)))
-    v[body.n_root + chart.single], a[body.n_root + chart.single] = first.angle, second.angle
-    angles = chart.joints.angles_of(posture[len(posture) - chart.joint_count :])
-    rates = _ball_rates(chart.joints, angles, even.ball, first.ball, second.ball)
+    even, first, second = _slow(chart, rough, _rate(time), settings)
+    posture, v, a = (np.empty((len(time), count)) for count in (body.nq, body.nv, body.nv))
+    for start in range(0, len(time), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        near, at = rough[len(rough) - chart.joint_count :, part], (one.at(part) for one in (even, first, second))
+        posture[part], v[part], a[part] = _moving(chart, near, *at)
+    for filled in (posture, v, a):
+        filled.setflags(write=False)  # the record keeps them without a copy
+    return Motion(time, posture, v, a, joint_names=names)
+
+
+def _moving(chart: Chart, near: Array, at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array, Array]:
+    """Return posture (B, nq), v and a (B, nv) from the coordinates of ``chart`` and their two first derivatives;
+    ``near`` (n, B) rad decides between equal sets of angles.
+    """
+    joints, n_root = chart.joints, chart.n_root
+    posture = chart.posture(at, near)
+    v, a = np.empty((2, n_root + chart.joint_count, near.shape[1]))
+    v[n_root + chart.single], a[n_root + chart.single] = first.angle, second.angle
+    angles = joints.angles_of(posture[len(posture) - chart.joint_count :])
+    rates = _ball_rates(joints, angles, at.ball, first.ball, second.ball)
     for k in range(3):
-        v[body.n_root + chart.joints.first + k], a[body.n_root + chart.joints.first + k] = rates[0][k], rates[1][k]
-    if body.n_root:
-        v[:6], a[:6] = _root_rates(even, first, second)
-    return Motion(time, posture.T, v.T, a.T, joint_names=names)
+        v[n_root + joints.first + k], a[n_root + joints.first + k] = rates[0][k], rates[1][k]
+    if n_root:
+        v[:6], a[:6] = _root_rates(at, first, second)
+    return posture.T, v.T, a.T
+
+
+def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[Smooth, Smooth, Smooth]:
+    """Return low-passed postures ``rough`` (nq, T) in the coordinates of ``chart``, and their two first derivatives."""
+    longer, span = _continued_at_the_ends(chart.smooth(rough).stacked(), rate, settings)
+    filtered = chart.split(low_pass(longer.T, rate, settings).T)
+    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle).stacked()
+    first, second = _derivatives(np.arange(even.shape[1]) / rate, even)
+    return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
 
 
 def _continued_at_the_ends(values: Array, rate: float, settings: LowPass) -> tuple[Array, slice]:

@@ -57,7 +57,7 @@ def stretches(dance: Dance) -> tuple[Shown, ...]:
 
 def _shown(dance: Dance, motion: Motion, phases: list[Phase], name: str) -> Shown:
     rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
-    part = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.a[rows])
+    part = motion.at(rows)
     raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
     return Shown(
         name, dance.body, part, phases[0].stance.ankle, raised, zmp_path(predict_wrench(dance.body, part).value)

@@ -14,7 +14,7 @@ from biodance.identification.validation import TrialValidation
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import SIDES, Array, Motion
+from biodance.records import SIDES, Array
 from biodance.spatial import zero_moment_point
 
 _FASTEST, _FRAMES = 25.0, 3000
@@ -95,7 +95,7 @@ def _trial(
     size = np.linalg.norm(residual, axis=1)
     worst, step = int(np.nanargmax(size)) if np.isfinite(size).any() else None, max(1, round(motion.rate / rate))
     chosen = np.arange((worst or 0) % step, motion.time.size, step)
-    shown = Motion(motion.time[chosen], motion.q[chosen], motion.v[chosen], motion.a[chosen])
+    shown = motion.at(chosen)
     pose = poses(body, shown.q)
     measured = np.full((motion.time.size, 2, 3), np.nan)
     if trial.plates:

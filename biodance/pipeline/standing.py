@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
-from biodance.motion.kinematics import centre_of_mass, poses
+from biodance.motion.kinematics import centre_of_mass, in_blocks, poses
 from biodance.pipeline.trial_result import QuietStanding
 from biodance.records import Array, Markers, Motion, Trial, runs
 from biodance.settings import StandingRules
@@ -38,8 +38,8 @@ def quiet_run(
 
 def facing(body: Body, motion: Motion) -> Array:
     """Return the horizontal unit vector (2,) along which the pelvis faces on average (its x axis, anterior)."""
-    ahead = poses(body, motion.q).rotation[:, 0, :2, 0].mean(axis=0)
-    return ahead / np.linalg.norm(ahead)
+    ahead = np.sum([poses(body, part.q).rotation[:, 0, :2, 0].sum(axis=0) for _, part in in_blocks(motion)], axis=0)
+    return np.asarray(ahead / np.linalg.norm(ahead))
 
 
 def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:

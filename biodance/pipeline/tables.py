@@ -77,17 +77,16 @@ def _strides(moved: SessionMovement) -> "DataFrame":
 def _curves(one: TrialMovement) -> list["DataFrame"]:
     import pandas as pd
 
+    if not one.curves:
+        return []
     numbers = {id(cycle): k for k, cycle in enumerate(one.cycles)}
-    parts = []
-    for curve in one.curves:
-        trial, number, kind, _ = _named(one, numbers[id(curve.cycle)])
-        about = {"trial": trial, "cycle": number, "kind": kind, "quantity": curve.quantity, "side": curve.side}
-        parts.append(
-            pd.DataFrame(
-                about | {"unit": curve.unit, "percent": PERCENT, "value": curve.value, "parameters_sd": curve.sd}
-            )
-        )
-    return parts
+    rows = [(*_named(one, numbers[id(c.cycle)])[:3], c.quantity, c.side, c.unit) for c in one.curves]
+    about = pd.DataFrame(rows, columns=["trial", "cycle", "kind", "quantity", "side", "unit"])
+    lasting = about.loc[about.index.repeat(len(PERCENT))].reset_index(drop=True)
+    lasting["percent"] = np.tile(PERCENT, len(rows))
+    lasting["value"] = np.concatenate([curve.value for curve in one.curves])
+    lasting["parameters_sd"] = np.concatenate([np.broadcast_to(curve.sd, curve.value.shape) for curve in one.curves])
+    return [lasting]
 
 
 Row = Mapping[str, Any]

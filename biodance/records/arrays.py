@@ -1,7 +1,7 @@
 """Arrays and names as all records use them: checked, copied, read-only."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 CHANNEL_TITLES = ("Fx (N)", "Fy (N)", "Fz (N)", "Mx (N·m)", "My (N·m)", "Mz (N·m)")
 
@@ -26,20 +27,26 @@ Named = TypeVar("Named", bound=_HasName)
 
 
 def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> Array:
-    """Return a read-only float copy of ``value`` after checking its shape (``None`` = any length).
+    """Return a read-only float copy of ``value`` after checking its shape (``None`` = any length); ``value`` itself
+    where it is one that a record froze before.
 
     Raises
     ------
     BiodanceError
         The shape is wrong; the message names ``what``, the shape found and the shape expected.
     """
-    array = np.array(value, dtype=float)
+    array = value if _is_frozen(value) else np.array(value, dtype=float)
     fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape, strict=True))
     if not fits:
         expected = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise BiodanceError(f"{what} has shape {array.shape}, expected {expected}.")
     array.setflags(write=False)
     return array
+
+
+def _is_frozen(value: ArrayLike) -> TypeGuard[Array]:
+    """Return whether nobody can write into an array, nor into what it might be a view of."""
+    return isinstance(value, np.ndarray) and value.dtype == float and not value.flags.writeable and value.base is None
 
 
 def assign(record: object, **values: object) -> None:

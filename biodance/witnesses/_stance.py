@@ -44,19 +44,19 @@ def walks(seen: SeenTrial, step: FootStep) -> bool:
 
 
 @lru_cache(maxsize=128)
-def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
-    """Return one step sample by sample; None where its plate's force does not show it or the foot runs. Of the last
-    steps it is kept: several witnesses ask for it.
+def step_course(seen: SeenTrial, step: FootStep, *, running: bool = False) -> StepCourse | None:
+    """Return one step sample by sample; None where its plate's force does not show it or the foot runs (with
+    ``running``: walks). Of the last steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
-    if part is None or not walks(seen, step):
+    if part is None or walks(seen, step) is running:
         return None
     wrench = seen.under(step)
-    time, force = wrench.time[part], np.array(wrench.force[part])
-    cop = np.array(wrench.cop(height=seen.plate(step.plate).height)[part, :2])
+    time, force, cop = wrench.time[part], wrench.force[part], seen.pressure(step, part)
     phase = (time - time[0]) / (time[-1] - time[0])
     if step.beside:
         cop[~seen.swings(step, time)] = np.nan  # the plates beside hold the other foot, too
     ahead, outwards, apart = seen.foot(step.side).in_foot(time, cop)
-    length = float(np.nanmedian(apart)) if np.isfinite(apart).any() else float("nan")
+    known = apart[np.isfinite(apart)]
+    length = float(np.median(known)) if known.size else float("nan")
     return StepCourse(phase, time, force, ahead, outwards, length)

@@ -32,7 +32,7 @@ class FootOutline(Witness):
         first, last = (part.start + share * count for share in _STEADY)
         span = np.unique(np.linspace(first, last, 25).astype(int))
         sole = seen.foot(step.side).outline(plate.wrench.time[span])
-        cop = seen.under(step).cop(height=plate.height)[span, :2]
+        cop = seen.pressure(step, span)
         known = np.isfinite(sole).all(axis=(1, 2)) & np.isfinite(cop).all(axis=1)
         if known.sum() < 5:
             return None

@@ -33,12 +33,12 @@ class StandingPlace(Witness):
         plates = [plate for plate in trial.plates if plate.wrench.time.size]
         if not plates or not seen.still or seen.pelvis is None or not seen.feet:
             return ()
-        force = mean_force(trial.wrench.force)[2]
+        force = mean_force(seen.total.force)[2]
         ahead = _facing(seen)
         if not force > 0.75 * seen.mass * trial.settings.gravity or ahead is None:
             return ()
         height = float(np.mean([plate.height for plate in plates]))
-        away = np.nanmean(trial.wrench.cop(height=height)[:, :2], axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
+        away = np.nanmean(seen.total.cop(height=height)[:, :2], axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
         loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * force]
         where = loaded[0] if len(loaded) == 1 else ""
         axes = {"to the left": (np.array([-ahead[1], ahead[0]]), _ASIDE), "ahead": (ahead, _AHEAD)}
@@ -53,7 +53,7 @@ class StandingPlace(Witness):
 
 def _facing(seen: SeenTrial) -> Array | None:
     """Return the unit vector (2,) along which both feet point on average; None where they are not seen."""
-    both = np.mean([np.nanmedian(foot.toe - foot.heel, axis=0)[:2] for foot in seen.feet], axis=0)
+    both = np.mean([foot.pointing[:2] for foot in seen.feet], axis=0)
     length = float(np.linalg.norm(both))
     return both / length if length > 0.05 else None
 

@@ -61,7 +61,7 @@ class StrideForce(Witness):
         moving = [step for step in seen.steps if seen.belt(step) is not None]
         if len(moving) < _MANY or len(moving) < len(seen.steps) or not _one_clock(seen):
             return []
-        total, names = seen.trial.wrench, {step.plate for step in moving}
+        total, names = seen.total, {step.plate for step in moving}
         here = (total.time >= moving[0].middle) & (total.time <= moving[-1].middle)
         value = _mass(seen, total.time[here], total.force[here])
         return [
@@ -86,7 +86,7 @@ class StrideForce(Witness):
         span = _both(seen, first, last)
         if span is None:
             return []
-        total, g, name = seen.trial.wrench, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
+        total, g, name = seen.total, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
         time, force = total.time[span], total.force[span]
         what = f"{name} from {first.middle:.2f} s"
         found = [_weighed(self.name, what, seen, _mass(seen, time, force), "in a step", _STEP)]

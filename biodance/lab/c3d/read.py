@@ -53,11 +53,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     if poses and not raw.analog.size:
         raise FileRefused(poses)
     labels = marker_labels(raw, subject=subject)
-    points = raw.points[:, list(labels.columns)]
-    metres, unit_history, unit_warnings = metres_per_unit(raw.parameters, points, where=str(raw.path))
-    in_file_axes = _markers(raw, labels, points)
-    turn, turn_history, turn_warnings = turn_to_z_up(raw, in_file_axes)
-    markers = None if in_file_axes is None else replace(in_file_axes, xyz=metres * in_file_axes.xyz @ turn.T)
+    markers, metres, turn, axes_history, axes_warnings = _in_lab(raw, labels)
     measures, measure_history, measure_warnings = measurements_of(raw)
     plates, plate_warnings = _plates(raw, metres, turn, markers, measures.get("Bodymass"))
     marker_set = recognise(markers.names) if markers is not None else None
@@ -65,8 +61,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
         *raw.warnings,
         *([poses] if poses else []),
         *labels.warnings,
-        *unit_warnings,
-        *turn_warnings,
+        *axes_warnings,
         *measure_warnings,
         *plate_warnings,
     )
@@ -80,7 +75,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
         ),
         marker_set=marker_set.name if marker_set is not None else "",
         measurements=measures,
-        history=(*_read(raw), *labels.history, *unit_history, *turn_history, *_gaps(markers), *measure_history),
+        history=(*_read(raw), *labels.history, *axes_history, *_gaps(markers), *measure_history),
         warnings=warnings,
     )
 
@@ -93,10 +88,19 @@ def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array
     FileRefused
         As `read_c3d`.
     """
-    labels = marker_labels(raw, subject=subject)
+    return _in_lab(raw, marker_labels(raw, subject=subject))[1:3]
+
+
+def _in_lab(raw: RawC3d, labels: MarkerLabels) -> tuple[Markers | None, float, Array, tuple[str, ...], tuple[str, ...]]:
+    """Return the markers in m in the lab frame, the file's unit of length in m, lab_R_file (3, 3), what was decided
+    and what is doubtful.
+    """
     points = raw.points[:, list(labels.columns)]
-    metres, _, _ = metres_per_unit(raw.parameters, points, where=str(raw.path))
-    return metres, turn_to_z_up(raw, _markers(raw, labels, points))[0]
+    metres, units, doubts = metres_per_unit(raw.parameters, points, where=str(raw.path))
+    own = _markers(raw, labels, points)
+    turn, axes, doubtful = turn_to_z_up(raw, own)
+    markers = None if own is None else replace(own, xyz=metres * own.xyz @ turn.T)
+    return markers, metres, turn, (*units, *axes), (*doubts, *doubtful)
 
 
 def _read(raw: RawC3d) -> tuple[str, ...]:

@@ -69,8 +69,10 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
     longer ones and those without six seen frames on both sides are filled from at least three other markers of the
     segment that were seen throughout.
     """
-    xyz = markers.xyz.copy()
     hidden = {label: runs(~seen) for label, seen in zip(markers.names, markers.seen.T, strict=True)}
+    if not any(map(len, hidden.values())):
+        return markers, ()
+    xyz = markers.xyz.copy()
     gaps: list[Gap] = []
     later: list[Gap] = []
     for column, (label, found) in enumerate(hidden.items()):

@@ -4,20 +4,13 @@ sole.
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.motion.contact.soles import Soles
-from biodance.records import SIDES, Array, Plate, Trial, runs
+from biodance.records import SIDES, Array, Mask, Plate, Trial, runs
 from biodance.settings import COP_FORCE
 
-if TYPE_CHECKING:
-    pass
-
-
-_Mask = NDArray[np.bool_]
 RIM = 0.005
 """m of the outline's edge that carry nothing: a sole is rounded, and broadest above the ground."""
 REACH = 0.09
@@ -26,6 +19,8 @@ _HALF = 0.3
 """Share of the sole that must be over a raised plate."""
 _UNDER = 0.03
 """m: a centre of pressure so near to a sole is under it."""
+_BLOCK = 1024
+"""Frames whose points all over the soles are looked at together: little memory, whatever the length."""
 _RAISED = 0.05
 """m that a plate stands out of everything around it to count as raised."""
 
@@ -37,10 +32,10 @@ class Footing:
     ``unseen`` (T, 2) not seen.
     """
 
-    on_plate: _Mask
+    on_plate: Mask
     share: Array
-    covered: _Mask
-    unseen: _Mask
+    covered: Mask
+    unseen: Mask
 
 
 def inside(plate: Plate, points: Array) -> Array:
@@ -54,21 +49,16 @@ def inside(plate: Plate, points: Array) -> Array:
     return np.asarray(np.min(points[..., :2] @ inward - (x * inward[0] + y * inward[1]), axis=-1))
 
 
-def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: _Mask) -> Footing:
+def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: Mask) -> Footing:
     """Return which plates the touching feet (T, 2) are over, and whether they can touch anything else."""
-    samples = _samples(soles)
+    spread = _spread_over(plates, soles)
     low = (soles.outline[..., 2] - surfaces.offset).min(axis=2)
     unseen = np.isnan(low)
-    anywhere = np.zeros(samples.shape[:-1], dtype=bool)
+    anywhere = np.zeros(spread.shape[1:], dtype=bool)
     raised = np.ones(low.shape, dtype=bool)
     on_plate = np.zeros((*low.shape, len(plates)), dtype=bool)
     for index, plate in enumerate(plates):
-        over = (
-            inside(plate, samples) >= 0
-            if plate.placed
-            else _pressed(plate, soles)[..., None] & ~np.isnan(samples[..., 0])
-        )
-        over &= (np.abs(low - plate.height) < REACH)[..., None]
+        over = spread[index] & (np.abs(low - plate.height) < REACH)[..., None]
         on_plate[..., index] = over.any(axis=-1) & touching
         anywhere |= over
         if any(abs(height - plate.height) < _RAISED for height in surfaces.bare):
@@ -78,7 +68,21 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
     return Footing(on_plate, share, covered & ~unseen, unseen)
 
 
-def _pressed(plate: Plate, soles: Soles) -> _Mask:
+def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> Mask:
+    """Return (P, T, 2, S) which points all over the soles are over each plate, seen from above; of a plate of unknown
+    place, all that are seen of a foot that presses it.
+    """
+    pressed = [None if plate.placed else _pressed(plate, soles)[..., None] for plate in plates]
+    parts = []
+    for start in range(0, soles.time.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        samples = _samples(soles.outline[part])
+        seen, pairs = ~np.isnan(samples[..., 0]), zip(plates, pressed, strict=True)
+        parts.append([inside(plate, samples) >= 0 if who is None else who[part] & seen for plate, who in pairs])
+    return np.concatenate(parts, axis=1)
+
+
+def _pressed(plate: Plate, soles: Soles) -> Mask:
     """Return (T, 2) which soles carry what a plate of unknown place measures: its centre of pressure lies under this
     foot, else under both.
     """
@@ -92,19 +96,18 @@ def _pressed(plate: Plate, soles: Soles) -> _Mask:
     return alone
 
 
-def _samples(soles: Soles) -> Array:
-    """Return points (T, 2, S, 3) m all over the soles without their rim: the outline and the middles of all its
-    chords.
+def _samples(outline: Array) -> Array:
+    """Return points (T, 2, S, 3) m all over the soles without their rim: their ``outline`` (T, 2, P, 3) m and the
+    middles of all its chords.
     """
-    centre = soles.centre[:, :, None]
-    outwards = (soles.outline - centre) * np.array([1.0, 1.0, 0.0])
+    outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
     length = np.linalg.norm(outwards, axis=-1, keepdims=True)
-    narrow = soles.outline - np.minimum(RIM / np.maximum(length, 1e-9), 1.0) * outwards
+    narrow = outline - np.minimum(RIM / np.maximum(length, 1e-9), 1.0) * outwards
     middles = [(narrow[:, :, i] + narrow[:, :, j]) / 2 for i, j in combinations(range(narrow.shape[2]), 2)]
     return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 
 
-def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: _Mask) -> Array:
+def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: Mask) -> Array:
     """Return the distance (T, P) m of every plate's centre of pressure from the soles on it; 0 inside, NaN without foot
     or not ``pressed``.
 
@@ -139,7 +142,6 @@ def distance_to_hull(point: Array, points: Array) -> Array:
     return distance
 
 
-_Mask2 = NDArray[np.bool_]
 SAME_LEVEL = 0.05
 """m: heights closer than this are one surface."""
 MARKER_HEIGHT = 0.20
@@ -175,7 +177,7 @@ def speeds(soles: Soles, plates: tuple[Plate, ...] = (), moving: Array | None = 
     return np.linalg.norm(velocity, axis=-1)
 
 
-def resting(speed: Array, time: Array, *, still: float, lasting: float) -> _Mask2:
+def resting(speed: Array, time: Array, *, still: float, lasting: float) -> Mask:
     """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for at least ``lasting`` s (or the
     whole trial).
     """
@@ -188,7 +190,7 @@ def resting(speed: Array, time: Array, *, still: float, lasting: float) -> _Mask
     return found
 
 
-def dilate(mask: _Mask2, frames: int) -> _Mask2:
+def dilate(mask: Mask, frames: int) -> Mask:
     """Return ``mask`` (T, ...) widened by ``frames`` before and after every True."""
     wide = mask.copy()
     for shift in range(1, min(frames, len(mask) - 1) + 1):
@@ -197,7 +199,7 @@ def dilate(mask: _Mask2, frames: int) -> _Mask2:
     return wide
 
 
-def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, weight: float) -> Surfaces:
+def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight: float) -> Surfaces:
     """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N (NaN =
     unknown).
     """
@@ -234,7 +236,7 @@ def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, we
     return Surfaces(offset, tuple(sorted({*plates, *bare})), tuple(bare), tuple(notes))
 
 
-def _over(trial: Trial, centre: Array, load: _Mask2) -> bool:
+def _over(trial: Trial, centre: Array, load: Mask) -> bool:
     """Return whether a resting sole's ``centre`` (n, 3) is over a plate that is loaded meanwhile."""
     middle = np.median(centre, axis=0)
     return any(
@@ -242,7 +244,7 @@ def _over(trial: Trial, centre: Array, load: _Mask2) -> bool:
     )
 
 
-def _offsets(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2) -> Array:
+def _offsets(trial: Trial, soles: Soles, rests: Mask, load: Mask) -> Array:
     """Return the standing height (2, P) m of each point: low percentile while the foot rests on a loaded plate.
 
     A foot that never does takes the other's; if neither does, its lowest resting (or lowest) height is taken for the

@@ -7,7 +7,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import MarkerSet, landmark
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import in_blocks, poses
 from biodance.records import SIDES, Array, Markers, Motion, frozen_array
 
 OUTLINE = np.array([[0.0, 0.17], [0.0, -0.17], [0.6, -0.21], [1.0, -0.23], [1.25, 0.0], [1.0, 0.23], [0.6, 0.21]])
@@ -79,8 +79,9 @@ def soles_from_body(body: Body, motion: Motion) -> Soles:
             f"The body {body.name} lacks two feet with outlines of equally many points, so its ground contact is "
             f"unknown."
         )
-    pose = poses(body, motion.q)
-    feet = [
-        pose.points([body.feet[side].segment] * len(body.feet[side].outline), body.feet[side].outline) for side in SIDES
-    ]
-    return Soles(motion.time, np.stack(feet, axis=1))
+    feet = [body.feet[side] for side in SIDES]
+    segments, points = [foot.segment for foot in feet for _ in foot.outline], np.concatenate([f.outline for f in feet])
+    outline = np.empty((motion.time.size, len(points), 3))
+    for part, frames in in_blocks(motion):
+        outline[part] = poses(body, frames.q).points(segments, points)
+    return Soles(motion.time, outline.reshape(motion.time.size, 2, -1, 3))

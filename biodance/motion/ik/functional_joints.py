@@ -136,11 +136,13 @@ def _told(
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
-    errors = []
-    for joint in (one for one in JOINTS if one in moved or one in spared):
+    placed_errors = []
+    for joint in (joint for joint in JOINTS if joint in moved or joint in spared):
         marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
-        sd = _centre_sd(joint, deviation), axis.get(joint, 0.0)
-        errors.append(JointError(joint, *sd, contradicted=joint in wrong, moved=far, spared=marker))
+        placed_errors.append(
+            JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far, marker)
+        )
+    errors = tuple(placed_errors)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
     if moved:
@@ -155,9 +157,9 @@ def _told(
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
-    centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=tuple(errors))
+    centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
-    return FunctionalJoints(placed, moved, turned, tuple(errors), kept, (start.rms, found.rms), tuple(notes))
+    return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
 
 
 def _contradiction(joint: str, far: float) -> str:

@@ -40,22 +40,48 @@ def _multiply(A, B, out):
 
 
 @compiled
+def three_of(v):
+    """Return the vector (3,) as three numbers, which the compiler keeps in registers."""
+    return v[0], v[1], v[2]
+
+
+@compiled
+def cross_of(a, b):
+    """Return the vector product a x b of three numbers each."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def matrix_of(R):
+    """Return the rows of R (3, 3), three numbers each."""
+    return three_of(R[0]), three_of(R[1]), three_of(R[2])
+
+
+@compiled
+def dot_of(a, b):
+    """Return the scalar product of three numbers each."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
 def place_joints(parent, turn, translation, root_rotation, root_position, angle, rotation, position):
     """Fill rotation (T, n, 3, 3) and position (T, n, 3) m of the joints at angle (T, n) rad; ``turn`` (n, 3, 3, 3): a
     joint's own rotation is turn[0] + sin turn[1] + (1 - cos) turn[2].
     """
-    own, arm = np.empty((3, 3)), np.empty(3)
     for t in range(angle.shape[0]):
         for j in range(parent.shape[0]):
-            k, sine, versine = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j])
-            above, place = (root_rotation[t], root_position[t]) if k < 0 else (rotation[t, k], position[t, k])
-            for c in range(3):
-                for d in range(3):
-                    own[c, d] = turn[j, 0, c, d] + sine * turn[j, 1, c, d] + versine * turn[j, 2, c, d]
-            _multiply(above, own, rotation[t, j])
-            _apply(above, translation[j], arm)
-            for c in range(3):
-                position[t, j, c] = place[c] + arm[c]
+            k, sine, versine, arm = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j]), three_of(translation[j])
+            above, place = matrix_of(root_rotation[t]), three_of(root_position[t])
+            if k >= 0:
+                above, place = matrix_of(rotation[t, k]), three_of(position[t, k])
+            for d in range(3):
+                a = turn[j, 0, 0, d] + sine * turn[j, 1, 0, d] + versine * turn[j, 2, 0, d]
+                b = turn[j, 0, 1, d] + sine * turn[j, 1, 1, d] + versine * turn[j, 2, 1, d]
+                c = turn[j, 0, 2, d] + sine * turn[j, 1, 2, d] + versine * turn[j, 2, 2, d]
+                for e in range(3):
+                    rotation[t, j, e, d] = dot_of(above[e], (a, b, c))
+            for e in range(3):
+                position[t, j, e] = place[e] + dot_of(above[e], arm)
 
 
 @compiled
@@ -63,24 +89,22 @@ def move_joints(parent, axis, rotation, position, root, rate, rate2, moved):
     """Fill moved (3, T, n, 3), angular velocity rad/s, angular acceleration rad/s² and acceleration m/s² of the joints,
     lab, from rate (T, n) and rate2 (T, n); ``root`` (4, T, 3) the root's same three, then its position m.
     """
-    arm, spin, across = np.empty(3), np.empty(3), np.empty(3)
     for t in range(rate.shape[0]):
         for j in range(parent.shape[0]):
             k = parent[j]
-            w, dw, a, x = root[0, t], root[1, t], root[2, t], root[3, t]
+            w, dw, a = three_of(root[0, t]), three_of(root[1, t]), three_of(root[2, t])
+            place = three_of(root[3, t])
             if k >= 0:
-                w, dw, a, x = moved[0, t, k], moved[1, t, k], moved[2, t, k], position[t, k]
-            omega, alpha, acceleration = moved[0, t, j], moved[1, t, j], moved[2, t, j]
-            _apply(rotation[t, j], axis[j], spin)
+                w, dw, a = three_of(moved[0, t, k]), three_of(moved[1, t, k]), three_of(moved[2, t, k])
+                place = three_of(position[t, k])
+            (first, second, third), own, here = matrix_of(rotation[t, j]), three_of(axis[j]), three_of(position[t, j])
+            spin = dot_of(first, own), dot_of(second, own), dot_of(third, own)
+            arm = here[0] - place[0], here[1] - place[1], here[2] - place[2]
+            across, lifted, swung = cross_of(w, spin), cross_of(dw, arm), cross_of(w, cross_of(w, arm))
             for c in range(3):
-                arm[c], across[c] = position[t, j, c] - x[c], 0.0
-                alpha[c], acceleration[c] = dw[c] + spin[c] * rate2[t, j], a[c]
-                spin[c] *= rate[t, j]
-                omega[c] = w[c] + spin[c]
-            _add_product(w, spin, alpha)
-            _add_product(dw, arm, acceleration)
-            _add_product(w, arm, across)
-            _add_product(w, across, acceleration)
+                moved[0, t, j, c] = w[c] + spin[c] * rate[t, j]
+                moved[1, t, j, c] = dw[c] + spin[c] * rate2[t, j] + across[c] * rate[t, j]
+                moved[2, t, j, c] = a[c] + lifted[c] + swung[c]
 
 
 @compiled
@@ -121,7 +145,8 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
                 column[:] = 0.0
                 _add_product(p, first[:, d], column)
                 _add_product(R[:, d], f, column)
-                own[3:, 1 + d] = column
+                for c in range(3):
+                    own[3 + c, 1 + d] = column[c]
 
 
 @compiled

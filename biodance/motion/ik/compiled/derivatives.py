@@ -1,0 +1,63 @@
+"""First derivatives of places on a tree of joints and of what is linear in them, compiled (numba): what
+`motion.kinematics` and `uncertainty.response` define, frame by frame.
+
+Coordinates are the root's place and turn where it moves (``roots`` 6, else 0), then the n joints, lab axes.
+``hangs`` (n, K) tells which of K points hang on a joint; functions fill the arrays that come last, which hold zeros.
+"""
+
+from biodance.motion.ik.compiled import compiled
+from biodance.motion.ik.compiled.tree import cross_of, dot_of, matrix_of, three_of
+
+
+@compiled
+def fill_places(hangs, axis, rotation, origin, root, roots, points, J):
+    """Fill J (T, K, 3, nv) of ``points`` (T, K, 3) m from the joints' own ``axis`` (n, 3), their ``rotation`` (T, n, 3,
+    3) and ``origin`` (T, n, 3) m, and the ``root`` (T, 3) m.
+    """
+    for t in range(points.shape[0]):
+        for k in range(points.shape[1]):
+            if roots:
+                for c in range(3):
+                    J[t, k, c, c] = 1.0
+                x, y, z = points[t, k, 0] - root[t, 0], points[t, k, 1] - root[t, 1], points[t, k, 2] - root[t, 2]
+                J[t, k, 0, 4], J[t, k, 0, 5], J[t, k, 1, 3] = z, -y, -z
+                J[t, k, 1, 5], J[t, k, 2, 3], J[t, k, 2, 4] = x, y, -x
+        for j in range(axis.shape[0]):
+            turn, o = _turned_axis(rotation[t, j], axis[j]), origin[t, j]
+            for k in range(points.shape[1]):
+                if hangs[j, k]:
+                    arm = points[t, k, 0] - o[0], points[t, k, 1] - o[1], points[t, k, 2] - o[2]
+                    moved = cross_of(turn, arm)
+                    for c in range(3):
+                        J[t, k, c, roots + j] = moved[c]
+
+
+@compiled
+def _turned_axis(R, axis):
+    """Return R times an axis (3,)."""
+    first, second, third = matrix_of(R)
+    own = three_of(axis)
+    return dot_of(first, own), dot_of(second, own), dot_of(third, own)
+
+
+@compiled
+def fill_tangent(hangs, axis, rotation, origin, root, roots, com, place, turn, tangent):
+    """Fill tangent (T, L, nv): what each coordinate does to L functionals that are ``place`` (T, N, L, 3) of the moved
+    ``com`` (T, N, 3) m of N segments and ``turn`` (T, N, L, 3) of their turn.
+    """
+    for t in range(com.shape[0]):
+        for s in range(com.shape[1]):
+            P, D, at = place[t, s], turn[t, s], three_of(com[t, s])
+            if roots:
+                arm = at[0] - root[t, 0], at[1] - root[t, 1], at[2] - root[t, 2]
+                for f in range(P.shape[0]):
+                    across = cross_of(arm, three_of(P[f]))
+                    for c in range(3):
+                        tangent[t, f, c] += P[f, c]
+                        tangent[t, f, 3 + c] += D[f, c] + across[c]
+            for j in range(axis.shape[0]):
+                if hangs[j, s]:
+                    a, o = _turned_axis(rotation[t, j], axis[j]), origin[t, j]
+                    moved = cross_of(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
+                    for f in range(P.shape[0]):
+                        tangent[t, f, roots + j] += dot_of(three_of(P[f]), moved) + dot_of(three_of(D[f]), a)
