@@ -5,7 +5,7 @@ from where the laboratory puts its toe marker. A turned plate shows as a slant o
 """
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import step_course
+from biodance.witnesses._stance import by_step, step_course
 
 ACROSS_PHASES = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -33,6 +33,7 @@ class FootAcross(Witness):
         """
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
+    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, found = step_course(seen, step), []
         if part is None:
