@@ -41,8 +41,7 @@ from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.smoothing import smooth
 from biodance.records import Array, Motion, Subject
-from biodance.report.feedback.follow import follow_scene
-from biodance.report.feedback.scene import scene_of
+from biodance.report.feedback.write import follow_scene, scene_of
 
 RATE, PICTURES = 25.0, 5.0
 """Hz of a motion and of the pictures of it."""
@@ -242,14 +241,13 @@ def main(folder: str, dancers: str) -> None:
     noise = typical_noise(np.asarray(predict_wrench(body, plan).cop().mean(axis=0)))
     rows = []
     for seed in range(int(dancers)):
-        kept = place / f"{seed}.npz"
+        kept, motion = place / f"{seed}.npz", performed(dance, seed)
         if not kept.exists():
-            motion = performed(dance, seed)
-            worth, when = worth_of(body, motion, noise=noise), np.arange(0.0, motion.time[-1], 1 / PICTURES)
-            points = points_seen(pictures(body, motion, when))
-            np.savez(kept, truth=shares(belief_after(body, worth.H, worth.disturbed)), when=when, points=points)
-        found = np.load(kept)
-        rows.append((found["truth"], graded(dance, found["when"], found["points"])))
+            when = np.arange(0.0, motion.time[-1], 1 / PICTURES)
+            np.savez(kept, when=when, points=points_seen(pictures(body, motion, when)))
+        found, worth = np.load(kept), worth_of(body, motion, noise=noise)
+        told = shares(belief_after(body, worth.H, worth.disturbed))  # of this engine, whoever drew the pictures
+        rows.append((told, graded(dance, found["when"], found["points"])))
         print(seed, rows[-1][0].round(2), rows[-1][1].round(2), flush=True)
         truth, score = (np.array(each) for each in zip(*rows, strict=True))
         own, mine = truth - truth.mean(axis=0), score - score.mean(axis=0)

@@ -28,8 +28,8 @@ from biodance.identification.identification import identify_body
 from biodance.identification.rival_bodies import weighing
 from biodance.identification.statistics import Fit
 from biodance.lab.session.read import read_session
-from biodance.pipeline.identification import trial_fit
 from biodance.pipeline.session import examine
+from biodance.pipeline.trial_result import trial_fit
 
 SEGMENTS = {
     "left_forearm_hand": "l_farm",

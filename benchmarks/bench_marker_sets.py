@@ -14,10 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance.diagnosis.diagnosis import ABOUT
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import MarkerSet, landmark, read_marker_set
 from biodance.lab.read import read_trial
 from biodance.library import read_toml
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Markers, Trial
 
 SESSIONS = {
@@ -37,43 +40,44 @@ SESSIONS = {
 
 
 def sessions(data: Path) -> None:
-    """Print session, set, and of every moving trial the RMS marker distance, or why it was not tracked."""
+    """Print session, set, of every trial the RMS marker distance of all and of legs, and the first line of its page."""
+    from biodance.errors import BiodanceError
     from biodance.lab.session.read import read_session
+    from biodance.pipeline.diagnosis import diagnose_session
     from biodance.pipeline.session import examine
 
-    print("| session | marker set | unseen parts | trial: RMS mm |\n|---|---|---|---|")
+    print("| session | marker set | unseen parts | trial: RMS of all (legs), mm | first line |\n|---|---|---|---|---|")
     for name, patterns in SESSIONS.items():
         if len(sys.argv) > 2 and not any(word in name for word in sys.argv[2:]):
             continue
         with tempfile.TemporaryDirectory() as folder:
-            for pattern in patterns:
-                for file in sorted(data.glob(pattern)):
-                    os.symlink(file, Path(folder) / file.name)
+            for file in (one for pattern in patterns for one in sorted(data.glob(pattern))):
+                os.symlink(file, Path(folder) / file.name)
             try:
                 result = examine(read_session(folder, subject_name=None))
-            except Exception as error:
-                print(f"| {name} | - | - | {error} |", flush=True)
+                first = next(one.text for one in diagnose_session(result).diagnosis.attention if one.about == ABOUT)
+            except BiodanceError as error:
+                print(f"| {name} | - | - | - | refused: {error} |", flush=True)
                 continue
-        sets = sorted({trial.trial.worn or "none" for trial in result.trials})
-        body = result.body
-        held = (
-            sorted({j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free})
-            if body
-            else []
-        )
-        unseen = "trunk, arms" if "trunk" in held else "arms" if held else "-"
-        fits = [
-            f"{one.trial.name}: {1e3 * one.fit.total_rms:.1f}"
-            if one.fit is not None
-            else f"{one.trial.name}: {_why(one)}"
-            for one in result.trials
-        ]
-        print(f"| {name} | {', '.join(sets)} | {unseen} | {'; '.join(fits)} |", flush=True)
+        worn = ", ".join(sorted({trial.trial.worn or "none" for trial in result.trials}))
+        print(f"| {name} | {worn} | {_unseen(result)} | {'; '.join(map(_near, result.trials))} | {first} |", flush=True)
 
 
-def _why(one: object) -> str:
-    """Return the first refusal of a trial."""
-    return next((step.text for step in one.steps if step.status != "done"), "?")[:160]
+def _unseen(result: SessionResult) -> str:
+    """Return the parts of the body that no marker shows."""
+    body = result.body
+    pairs = zip(body.joints, body.free, strict=True) if body else ()
+    held = {joint.name.rsplit("_", 1)[0] for joint, free in pairs if not free}
+    return "trunk, arms" if "trunk" in held else "arms" if held else "-"
+
+
+def _near(one: TrialResult) -> str:
+    """Return how near the markers of a trial are to the body, or why it was not followed."""
+    if one.fit is None:
+        refused = next((step.text for step in one.steps if step.status != "done"), "?")
+        return f"{one.name}: {refused[:160]}"
+    legs = one.fit.by_group.get("legs", np.nan)
+    return f"{one.name}: {1e3 * one.fit.total_rms:.1f} ({1e3 * legs:.1f})"
 
 
 _WRISTS = {side: (f"{side}WRA", f"{side}WRB") for side in "LR"}

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.marker_groups import marker_groups
+from biodance.body.human.optional_joints import marker_groups
 from biodance.lab.session.read import read_session
 from biodance.pipeline.body import body_of
 from biodance.pipeline.shown_joints import shown_joints

@@ -12,8 +12,9 @@ from hidden_sessions import Scenario, examined, session_folder
 from biodance.diagnosis.accept import residuals_of
 from biodance.identification.identification import standing_point
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.identification import KEPT_ROLES, trial_fit
+from biodance.pipeline.identification import KEPT_ROLES
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import trial_fit
 from biodance.records import Array
 
 

@@ -23,7 +23,7 @@ from hidden_causes import LEVELS, SINGLE, truth
 from hidden_sessions import CACHE, Scenario, examined
 from scipy.stats import t as student
 
-from biodance.diagnosis.diagnosis import _SIGMAS
+from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.uncertainty.tolerances import read_tolerances, shipped, to_toml
 
@@ -68,7 +68,7 @@ def shares(rows: list[tuple[str, float, float, float]]) -> dict[str, float]:
     for effect, value, sd, true in rows:
         excess[effect].append(max(0.0, (value - true) ** 2 - sd**2) / value**2)
     pooled = float(np.median([np.mean(some) for some in excess.values()]))
-    wide = {effect: student.ppf(0.975, len(some) + 1) / _SIGMAS for effect, some in excess.items()}
+    wide = {effect: student.ppf(0.975, len(some) + 1) / SIGMAS for effect, some in excess.items()}
     found = {
         effect: float(wide[effect] * np.sqrt((pooled + sum(some)) / (len(some) + 1)))
         for effect, some in sorted(excess.items())

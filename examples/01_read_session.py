@@ -1,6 +1,8 @@
 """Read one session as a laboratory left it, and look at what the force plates carried.
 
-python examples/01_read_session.py [SESSION_FOLDER [FIGURE.png]]      without a folder a session is simulated
+python examples/01_read_session.py [SESSION_FOLDER [FIGURE.png]]
+
+Without a folder a session is simulated; without a name the figure goes into the temporary folder.
 """
 
 import sys
@@ -38,4 +40,5 @@ def main(folder: Path | None, picture: Path) -> None:
 
 if __name__ == "__main__":
     arguments = sys.argv[1:]
-    main(Path(arguments[0]) if arguments else None, Path(arguments[1] if len(arguments) > 1 else "01_read_session.png"))
+    picture = arguments[1] if arguments[1:] else f"{tempfile.gettempdir()}/01_read_session.png"
+    main(Path(arguments[0]) if arguments else None, Path(picture))

@@ -1,6 +1,6 @@
 """Scale a body on the static trial of a session and let it follow the markers of a squat.
 
-python examples/02_scale_and_track.py [FIGURE.png]
+python examples/02_scale_and_track.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -40,4 +40,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "02_scale_and_track.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/02_scale_and_track.png"))

@@ -1,6 +1,6 @@
 """Read the force plates of a trial: corners, zero, and where the centre of pressure wandered under two feet.
 
-python examples/03_force_plates.py [FIGURE.png]
+python examples/03_force_plates.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -45,4 +45,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "03_force_plates.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/03_force_plates.png"))

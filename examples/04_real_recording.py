@@ -1,12 +1,13 @@
 """Read a child's real walk: what the reader decided about plates and labels, and where the ground pushed.
 
-python examples/04_real_recording.py [FIGURE.png]
+python examples/04_real_recording.py [FIGURE.png]      without a name the figure goes into the temporary folder
 
 BIODANCE_DATA names the folder that holds biomechzoo/HC030A (free on the web, MIT licence; not part of biodance).
 """
 
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -38,4 +39,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "04_real_recording.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/04_real_recording.png"))

@@ -1,6 +1,6 @@
 """Draw a real gait cycle: hip, knee and ankle of both legs, and how far they lie from the laboratory's own software.
 
-python examples/05_what_moved.py [FIGURE.png]
+python examples/05_what_moved.py [FIGURE.png]      without a name the figure goes into the temporary folder
 
 BIODANCE_DATA names the folder that holds biomechzoo/HC030A (free on the web, MIT licence; not part of biodance).
 """
@@ -38,4 +38,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "05_what_moved.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/05_what_moved.png"))

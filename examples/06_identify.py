@@ -1,6 +1,6 @@
 """Identify the segment parameters of a simulated person, beside the table and with intervals.
 
-python examples/06_identify.py [FIGURE.png]
+python examples/06_identify.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -30,4 +30,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "06_identify.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/06_identify.png"))

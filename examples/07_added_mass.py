@@ -4,7 +4,7 @@ Two virtual visits of one person: without a load, and with 4 kg on the left fore
 reference; the second one is identified against it. `search` says which segment is heavier, by how much, and how
 sure that is.
 
-python examples/07_added_mass.py [FIGURE.png]
+python examples/07_added_mass.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -37,4 +37,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "07_added_mass.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/07_added_mass.png"))

@@ -3,7 +3,7 @@
 A virtual visit is recorded on a plate whose vertical channel reads 5 % too much. The diagnosis does not know that.
 It names the cause and its size; the gain is measured on trials that were kept back.
 
-python examples/08_diagnose_and_accept.py [FIGURE.png]
+python examples/08_diagnose_and_accept.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -39,4 +39,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "08_diagnose_and_accept.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/08_diagnose_and_accept.png"))

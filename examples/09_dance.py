@@ -3,10 +3,11 @@
 Eight postures that make the left forearm and hand known. `verify_dance` judges the finished motion by code that the
 design did not use.
 
-python examples/09_dance.py [FIGURE.png]
+python examples/09_dance.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
+import tempfile
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -33,4 +34,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "09_dance.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/09_dance.png"))

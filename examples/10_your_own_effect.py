@@ -2,7 +2,7 @@
 
 The floor of this laboratory shakes at 5 Hz, which no effect of biodance describes: `ShakingFloor` does.
 
-python examples/10_your_own_effect.py [FIGURE.png]
+python examples/10_your_own_effect.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -56,4 +56,4 @@ def shake(trial: biodance.Trial) -> biodance.Trial:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "10_your_own_effect.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/10_your_own_effect.png"))

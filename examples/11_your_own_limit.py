@@ -4,10 +4,11 @@ The ceiling of this laboratory is low. `margins` tells the optimiser how much ro
 slopes; `check` tells it once more from the finished motion. Design, verification and the table of margins use the
 limit like all others.
 
-python examples/11_your_own_limit.py [FIGURE.png]
+python examples/11_your_own_limit.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,4 +55,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "11_your_own_limit.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/11_your_own_limit.png"))

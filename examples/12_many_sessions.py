@@ -1,6 +1,6 @@
 """Go through many visits: one row of a table for each, and those that fail say why.
 
-python examples/12_many_sessions.py [FIGURE.png]
+python examples/12_many_sessions.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -52,4 +52,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "12_many_sessions.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/12_many_sessions.png"))

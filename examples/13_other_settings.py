@@ -1,6 +1,6 @@
 """Examine a simulated visit in which the plate reads 6 % too much with other settings, and diagnose it once.
 
-python examples/13_other_settings.py [FIGURE.png]
+python examples/13_other_settings.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
@@ -27,4 +27,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "13_other_settings.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/13_other_settings.png"))

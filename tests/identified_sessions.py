@@ -15,9 +15,9 @@ from biodance.identification.loads import compact_load
 from biodance.identification.rival_bodies import weighing
 from biodance.motion.comparison import compare
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.identification import identify_trials, trial_fit
+from biodance.pipeline.identification import identify_trials
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import TrialResult, WrenchComparison, trial_fit
 from biodance.records import Motion, Session, Source, Subject, Trial, Wrench
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")

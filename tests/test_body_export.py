@@ -19,7 +19,7 @@ from biodance.lab.opensim.mot import read_mot, write_mot
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import regressor
-from biodance.pipeline.opensim_folder import opensim_coordinates
+from biodance.pipeline.program_folders import opensim_coordinates
 from biodance.records import Motion, Sip, Subject
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0, name="a woman & <co>"))

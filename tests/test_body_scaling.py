@@ -11,7 +11,9 @@ import pytest
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.joint_centres import (
+from biodance.body.human.limits import standing_tilt
+from biodance.body.human.measures import (
+    Measures,
     chord,
     davis_hip,
     elbow,
@@ -21,8 +23,6 @@ from biodance.body.human.joint_centres import (
     unit,
     wrist,
 )
-from biodance.body.human.limits import standing_tilt
-from biodance.body.human.measures import Measures
 from biodance.body.human.scaling import chain_angles, measure_static
 from biodance.body.human.static_centres import arm_centres, turn
 from biodance.body.inertia import smallest_eigenvalues

@@ -7,14 +7,20 @@ import pytest
 
 from biodance.body.human.human import human
 from biodance.body.human.limits import peak_torque
-from biodance.body.human.prior import disagreement, parameter_jacobian, primitive_covariance, scaled_lumps
+from biodance.body.human.prior import disagreement, primitive_covariance, scaled_lumps
 from biodance.body.human.skeleton import SEGMENTS, generic_skeleton
-from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, rigid_inertia, smallest_eigenvalues
-from biodance.body.tables.anthropometry import read_table
+from biodance.body.inertia import (
+    TENSOR,
+    RigidInertia,
+    inertial_parameters,
+    parameter_jacobian,
+    rigid_inertia,
+    smallest_eigenvalues,
+)
+from biodance.body.tables.anthropometry import COUNT, KINDS, read_table
 from biodance.body.tables.choice import measured_whole, reference, table_names
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.published import regression
-from biodance.body.tables.reference import COUNT, KINDS
 from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml

@@ -21,7 +21,7 @@ from biodance.pipeline.body import starting_from
 from biodance.pipeline.carry import known_body
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.front_dance import virtual_subject
-from biodance.pipeline.identification import trial_fit
+from biodance.pipeline.trial_result import trial_fit
 from biodance.records import Session, Subject
 from biodance.report.write import _accepted
 

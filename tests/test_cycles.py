@@ -9,14 +9,21 @@ from squatting import BODY as SQUATTER
 from squatting import squat
 
 from biodance.body.human.human import human
-from biodance.cycles.curves import CycleCurve, angle_curves, group_curves, lab_curves
+from biodance.cycles.curves import (
+    CycleCurve,
+    angle_curves,
+    group_curves,
+    lab_curves,
+    normal_curves,
+    normal_of,
+    normal_toml,
+)
 from biodance.cycles.cut import Cycle, gait_cycles, repetitions
 from biodance.cycles.events import agreement_of_events, joined_events, kinematic_events
 from biodance.cycles.file_outputs import compare_angles, compare_events
 from biodance.cycles.loads import load_curves
-from biodance.cycles.normal import normal_curves, normal_of, normal_toml
 from biodance.cycles.steps import mean_values, strides
-from biodance.lab.c3d.outputs import FileEvent, FileOutputs
+from biodance.lab.c3d.subject import FileEvent, FileOutputs
 from biodance.motion.contact.events import FootEvent
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques

@@ -40,6 +40,12 @@ def test_going_back_is_said_as_the_place_not_as_zero() -> None:
     assert calls(BODY, posture(trunk_flexion=40), REST) == ("bring the trunk upright",)
 
 
+def test_coming_up_half_way_is_not_said_as_going_down() -> None:
+    squat, half = (posture(right_knee_flexion=angle, left_knee_flexion=angle) for angle in (45.0, 15.0))
+    assert calls(BODY, squat, half) == ("bend both knees only by about 15°",)
+    assert calls(BODY, half, squat) == ("bend both knees by about 45°",)
+
+
 def test_of_a_standing_leg_only_the_knee_is_called() -> None:
     squat = posture(right_knee_flexion=45, right_hip_flexion=40, right_ankle_dorsiflexion=20)
     assert calls(BODY, REST, squat, ("right", "left")) == ("bend the right knee by about 45°",)

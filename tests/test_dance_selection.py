@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.postures.selection import SAMPLE_ERROR, SAMPLE_RATE, choose, learned
+from biodance.dance.postures.ordering import SAMPLE_ERROR, SAMPLE_RATE, choose, learned
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest

@@ -6,16 +6,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import RATE, about_plate, body, known, looks, motion
 from scipy.interpolate import make_interp_spline
+from scipy.signal import butter, filtfilt
 
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.engine import diagnose_trials
-from biodance.effects import Case, Effect, Parameter
+from biodance.diagnosis.evidence import evidence
+from biodance.diagnosis.naming import built
+from biodance.diagnosis.passing import with_passing
+from biodance.diagnosis.problem import problem
+from biodance.diagnosis.screening import screen
+from biodance.effects import Case, Effect, Parameter, effect
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.identification import standing_point
 from biodance.motion.kinematics import poses
-from biodance.records import Sip
+from biodance.records import Motion, Sip
 
 FAST = (
     "plate_gain",
@@ -158,6 +164,8 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
         return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
 
     examined = found(touched, chosen=(*FAST, "external_contact"))
+    steady = replace(examined.naming, found=examined.naming.bare, accepted=())
+    assert with_passing(steady, ("external_contact",)).found.named
     assert [(f.effect, f.target) for f in examined.diagnosis.findings] == [("external_contact", "left_forearm_hand")]
     assert examined.diagnosis.verdict in ("named, complete", "named, incomplete")
     size = [p.value for p in examined.diagnosis.findings[0].parameters]
@@ -170,6 +178,26 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
     case = Case(one, look.trial, look.motion, one.sip.phi, np.linspace(0, 0.25, look.motion.time.size))
     added = accept(case, examined.named).trial.wrench.value - look.trial.wrench.value
     assert added[look.motion.time == 5.0, 2] == pytest.approx(15.0, abs=3.0)
+
+
+def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkeypatch) -> None:
+    def quick(seed):
+        """A fifth of the way, three times as fast."""
+        slow = motion(seed)
+        mean = slow.q.mean(axis=0)
+        return Motion(slow.time / 3, mean + 0.2 * (slow.q - mean), 0.6 * slow.v, 1.8 * slow.a)
+
+    def filtered(wrench, session, moving):
+        return filtfilt(*butter(1, 2.5 / (1.5 * RATE)), wrench, axis=0, padlen=100)
+
+    monkeypatch.setattr("diagnosed_sessions.motion", quick)
+    put, causes = built(problem(body(), looks(1, hidden=filtered)), known(), ("filter_mismatch", "wobbling_mass"))
+    suspects = {one.cause.names[0]: one for one in reversed(screen(put, causes))}
+    one = suspects["filter_mismatch"]
+    assert one.score > suspects["wobbling_mass"].score
+    assert one.start[0] in effect("filter_mismatch").typical * effect("filter_mismatch").screened_at
+    near_none = evidence(*put.belief.score(put.white(one.cause.basis)), 1.0).log_bayes_factor
+    assert one.log_bayes_factor > 2 * near_none
 
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:

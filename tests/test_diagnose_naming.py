@@ -5,7 +5,8 @@ import pytest
 from diagnosed_sessions import known
 
 from biodance.diagnosis.candidates import Candidate
-from biodance.diagnosis.naming import Round, ScoredCandidate, suspicious
+from biodance.diagnosis.naming import Round, suspicious
+from biodance.diagnosis.screening import ScoredCandidate
 from biodance.effects import effect
 
 

@@ -12,7 +12,6 @@ from biodance.diagnosis.candidates import Candidate, candidates, changes, remove
 from biodance.diagnosis.evidence import believe, evidence, smallest
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
-from biodance.diagnosis.naming import screen
 from biodance.diagnosis.observability import (
     Visibility,
     after_calibration,
@@ -22,6 +21,7 @@ from biodance.diagnosis.observability import (
     visibility,
 )
 from biodance.diagnosis.problem import problem
+from biodance.diagnosis.screening import screen
 from biodance.effects import Effect, Parameter, effect
 from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 

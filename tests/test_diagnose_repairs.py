@@ -33,6 +33,12 @@ def test_a_joint_that_the_movement_puts_elsewhere_is_named_with_its_look_alikes(
     assert ("segment_length", "right_thigh") in {(other.effect, other.target) for other in one.set}
 
 
+def test_a_knee_elsewhere_may_be_the_marker_that_places_it() -> None:
+    (one,) = named(HIP._replace(joint="right_knee")).findings
+    assert {("marker_misplaced", "RKNE"), ("joint_centre", "right_hip")} <= {(o.effect, o.target) for o in one.set}
+    assert "marker_misplaced" not in {other.effect for other in named(HIP).findings[0].set}
+
+
 def test_it_is_not_complete_where_a_band_is_not_normal() -> None:
     loud = Adequacy("Fz", (0.04, 0.3), 4.9)
     assert named(HIP, replace(CLEAN, adequacy=(loud,))).verdict == "named, incomplete"

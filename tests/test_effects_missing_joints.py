@@ -137,6 +137,12 @@ def test_without_its_markers_there_is_no_target(name: str) -> None:
     assert not effect(name).columns(blind).any(), "a trial of a session in which others have the markers"
 
 
+def test_a_joint_that_markers_and_wrench_show_opposite_ways_is_none() -> None:
+    girdle = effect("shoulder_girdle")
+    assert girdle.possible(np.array([0.2, -0.1]))
+    assert not girdle.possible(np.array([0.04, -0.067]))
+
+
 def test_still_joint_adds_nothing() -> None:
     case, _ = person("head_joint", 0.0)
     found = effect("head_joint").at("", case)

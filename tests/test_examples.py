@@ -3,6 +3,7 @@
 import os
 import runpy
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -24,10 +25,15 @@ def test_example_runs_alone_and_makes_one_figure(
 ) -> None:
     if "BIODANCE_DATA" in path.read_text() and not os.environ.get("BIODANCE_DATA"):
         pytest.skip("this example reads a real recording: BIODANCE_DATA is not set")
-    monkeypatch.chdir(tmp_path)
+    here, temporary = tmp_path / "here", tmp_path / "temporary"
+    here.mkdir()
+    temporary.mkdir()
+    monkeypatch.chdir(here)
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setattr(sys, "argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")
-    made = [found for found in tmp_path.iterdir() if found.is_file()]
+    assert list(here.iterdir()) == [], "an example leaves nothing in the folder where it is run"
+    made = [found for found in temporary.iterdir() if found.is_file()]
     assert [found.name for found in made] == [f"{path.stem}.png"]
     assert made[0].read_bytes().startswith(b"\x89PNG")
     assert made[0].stat().st_size > 5000

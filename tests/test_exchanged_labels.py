@@ -16,7 +16,7 @@ from biodance.effects._base.wrists import back_of_hand
 from biodance.effects.labels_swapped import exchanges, renamed
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.c3d.relabel import write_relabelled
+from biodance.lab.c3d.results import write_relabelled
 from biodance.lab.session.read import read_session
 from biodance.records import Markers, Session, Source, Subject, Trial
 

@@ -15,8 +15,7 @@ from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.report.feedback.scene import scene_of
-from biodance.report.feedback.write import write_feedback
+from biodance.report.feedback.write import scene_of, write_feedback
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 

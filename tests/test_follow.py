@@ -14,7 +14,7 @@ from biodance.dance.expectation import expect
 from biodance.dance.telling import planned_shares, telling_of
 from biodance.records import Motion
 from biodance.report.feedback import write
-from biodance.report.feedback.follow import follow_scene
+from biodance.report.feedback.write import follow_scene
 
 BUILT = write.bundle() is not None
 SEEN = pytest.mark.skipif(not (BUILT and BROWSER), reason="no Chromium, or `make bundle` could not reach npm")

@@ -77,7 +77,8 @@ def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
     both = settle(found, start)
 
     def round_of(name):
-        from biodance.diagnosis.naming import Round, ScoredCandidate
+        from biodance.diagnosis.naming import Round
+        from biodance.diagnosis.screening import ScoredCandidate
 
         return Round((ScoredCandidate(one[name], 50.0, 50.0, np.zeros(1), 0.9),))
 

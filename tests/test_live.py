@@ -14,7 +14,7 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.diagnosis.watch import LiveWarning
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
-from biodance.identification.running import belief_before
+from biodance.identification.streaming import belief_before
 from biodance.pipeline.live import LiveSession, LiveState
 from biodance.pipeline.replay import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench

@@ -22,7 +22,7 @@ from biodance.lab.read import read_trial
 from biodance.lab.session.init import init_session
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
-from biodance.motion.upright import upright_trunk
+from biodance.motion.track import upright_trunk
 from biodance.records import Markers, Source, Subject, Trial
 
 PERSON = Subject(62.0, 1.70, "F", name="S01")

@@ -9,7 +9,7 @@ from squatting import BODY, squat
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.opensim.ground_forces import plates_of
 from biodance.lab.opensim.mot import read_mot
-from biodance.pipeline.opensim_folder import write_opensim_folder
+from biodance.pipeline.program_folders import write_opensim_folder
 from biodance.pipeline.trial_result import TrialResult
 
 

@@ -13,8 +13,7 @@ from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
 from biodance.body.changes import parts_as_segments
 from biodance.body.human.human import human
-from biodance.body.human.marker_groups import marker_groups
-from biodance.body.human.optional_joints import OPTIONAL_JOINTS, with_optional
+from biodance.body.human.optional_joints import OPTIONAL_JOINTS, marker_groups, with_optional
 from biodance.body.inertia import RigidInertia, inertial_parameters, shift_matter, smallest_eigenvalues
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.dynamics import joint_torques

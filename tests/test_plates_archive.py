@@ -14,13 +14,12 @@ sys.path.append(str(Path(__file__).parent.parent / "benchmarks"))
 from plate_archives import Step, draw
 
 from biodance.cli import run
+from biodance.diagnosis.archive.conditions import pool
 from biodance.diagnosis.archive.judge import judge
-from biodance.diagnosis.archive.pooling import pool
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, places
 from biodance.errors import FileRefused, SessionRefused
-from biodance.lab.session.archive import archive_folders, iso_date, visit_date
-from biodance.lab.session.index import read_index, read_plate_text
+from biodance.lab.session.archive import archive_folders, iso_date, read_index, read_plate_text, visit_date
 from biodance.pipeline.plates import judge_plates
 
 WEIGHT = 600.0

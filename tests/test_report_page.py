@@ -15,9 +15,9 @@ import pytest
 from example_results import full_session, refused_session
 
 from biodance.doctor import BROWSERS
-from biodance.pipeline.attention import without_path
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
+from biodance.records.attention import without_path
 from biodance.report.figures.session import marker_figure, wrench_figure
 from biodance.report.figures.vector import STEPS, envelope, round_ticks
 from biodance.report.pages.session import check_table, key_figures, page

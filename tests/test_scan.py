@@ -9,9 +9,8 @@ import pytest
 import trimesh
 from trimesh.triangles import mass_properties
 
-from biodance.body.clip import clip_surface, cut_section
 from biodance.body.human.prior import prior
-from biodance.body.human.scan import read_scan
+from biodance.body.human.scan import clip_surface, cut_section, read_scan
 from biodance.body.human.scan_parts import cut_scan
 from biodance.body.human.skeleton import SEGMENTS
 from biodance.body.tables.choice import reference

@@ -104,3 +104,25 @@ def mirror_inertia(lump: RigidInertia) -> RigidInertia:
     """Return the lump of the other body side: reflected at the plane z = 0."""
     flip = np.diag([1.0, 1.0, -1.0])
     return RigidInertia(lump.mass, flip @ lump.com, flip @ lump.inertia @ flip)
+
+
+def parameter_jacobian(lump: RigidInertia) -> Array:
+    """Return d phi / d [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (10, 10) at a lump."""
+    mass, com = lump.mass, lump.com
+    out = np.zeros((10, 10))
+    out[:, 0] = inertial_parameters(lump) / mass
+    out[1:4, 1:4] = mass * np.eye(3)
+    for row, (i, j) in enumerate(TENSOR, start=4):
+        for k in range(3):
+            shift = 2 * com[k] * (i == j) - com[i] * (j == k) - com[j] * (i == k)
+            out[row, 1 + k] = mass * shift
+    out[4:, 4:] = mass * np.eye(6)
+    return out
+
+
+def lump_from(row: Array) -> RigidInertia:
+    """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `primitives_of`."""
+    inertia = np.zeros((3, 3))
+    for value, (i, j) in zip(row[4:], TENSOR, strict=True):
+        inertia[i, j] = inertia[j, i] = row[0] * value
+    return RigidInertia(float(row[0]), row[1:4], inertia)

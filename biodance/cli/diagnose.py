@@ -7,9 +7,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.identify import diagnose_robot
 from biodance.cli.options import NO_ROBOT, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
 from biodance.cli.progress import progress
-from biodance.cli.robot import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
 
 
@@ -31,7 +31,7 @@ def foresee_command(
     """
     from rich.console import Console
 
-    from biodance.pipeline.diagnosis import foresee_dance
+    from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
     from biodance.report.pages.foresight import foresight_page, refuse_page
     from biodance.report.terminal import print_foresight

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.lab.c3d.outputs import FileOutputs
+from biodance.lab.c3d.subject import FileOutputs
 from biodance.motion.contact.events import FootEvent
 from biodance.records import Motion
 

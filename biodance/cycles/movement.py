@@ -15,7 +15,7 @@ from biodance.cycles.file_outputs import AngleComparison, EventComparison, compa
 from biodance.cycles.loads import load_curves
 from biodance.cycles.steps import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
-from biodance.lab.c3d.outputs import FileOutputs
+from biodance.lab.c3d.subject import FileOutputs
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.events import FootEvent, foot_events
 from biodance.motion.contact.soles import soles_from_body

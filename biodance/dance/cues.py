@@ -125,7 +125,7 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
         if pair:
             partner = changes.pop(other)
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
-        found.append(_Call(abs(end - start), _call(movement, "both" if pair else side, end)))
+        found.append(_Call(abs(end - start), _call(movement, "both" if pair else side, start, end)))
     return tuple(call.text for call in sorted(found, key=lambda call: -call.size))
 
 
@@ -184,14 +184,15 @@ def _is_leg(movement: str) -> bool:
     return movement.startswith(("hip", "knee", "ankle"))
 
 
-def _call(movement: str, side: str, angle: float) -> str:
+def _call(movement: str, side: str, start: float, angle: float) -> str:
     part, positive, negative, none = _WORDS[movement]
     whole = f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
     rounded = _STEP * round(abs(angle) / _STEP)
     if rounded == 0:
         return none.format(whole)
     size = "to a right angle" if rounded == 90 else f"by about {rounded:.0f}°"
-    return f"{(positive if angle > 0 else negative).format(whole)} {size}"
+    only = "only " if start * angle > 0 and abs(start) > abs(angle) else ""  # from a half squat 15° are less, not more
+    return f"{(positive if angle > 0 else negative).format(whole)} {only}{size}"
 
 
 def _sentence(said: tuple[str, ...]) -> str:

@@ -19,10 +19,9 @@ from biodance.dance.followable.mending import mended_dance
 from biodance.dance.followable.vocabulary import words_left_out
 from biodance.dance.followable.walk import NoWay, Walk
 from biodance.dance.limits import Limit
-from biodance.dance.postures.ordering import order_postures, support_sequence
+from biodance.dance.postures.ordering import choose, order_postures, support_sequence
 from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.postures.search import find_postures
-from biodance.dance.postures.selection import choose
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell

@@ -301,6 +301,6 @@ def _inside(dance: Dance, played: Playback) -> Array:
     point, owner = played.wrench.cop()[:, :2], _owner(dance, played.time)
     out = np.empty(len(point))
     for k in np.unique(owner):
-        normals, offsets = replace(dance.phases[k].stance, over=None).reduced(1.0)
+        normals, offsets = dance.phases[k].stance.whole.reduced(1.0)
         out[owner == k] = (point[owner == k] @ normals.T + offsets).min(axis=1)
     return out

@@ -15,8 +15,9 @@ from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
 from biodance.diagnosis.diagnosis import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import named_of, shared, taken
+from biodance.diagnosis.naming import named_of
 from biodance.diagnosis.problem import Problem
+from biodance.diagnosis.screening import shared, taken
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
 

@@ -26,7 +26,7 @@ from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.constancy import felt, hanging
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, less_one, name_causes, named_of, suspicious
+from biodance.diagnosis.naming import Naming, Round, causes_of, less_one, name_causes, named_of, suspicious
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.plate_axes import in_plate_axes
@@ -133,11 +133,12 @@ def _as_loud(
     """Return the naming under tolerances as loud as this laboratory is (`loudness` of what is left once the causes of
     the first try are named), and what is to be said of it. Standing still does not show how loud it is.
     """
+    every = causes_of(put, known, asked)
 
     def named(under: Tolerances) -> Naming:
         if not search:
-            return name_causes(put, under, asked, rounds=0)
-        return with_passing(name_causes(put, under, asked), asked)
+            return name_causes(put, under, asked, rounds=0, every=every)
+        return with_passing(name_causes(put, under, asked, every=every), asked)
 
     naming = named(known)
     louder = 1.0 if still else loudness(naming.found)

@@ -38,7 +38,7 @@ _ALIKE = 0.9
 class Testimony:
     """All ``observations`` of a session; ``traces`` of every cause: what one unit adds to each of them (n,);
     ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen;
-    ``seconds`` by trial that one foot stands alone on a plate.
+    ``seconds`` by trial that one foot stands alone on a plate; ``recorded``: what they looked at.
     """
 
     observations: tuple[Observation, ...]
@@ -46,6 +46,7 @@ class Testimony:
     traces: Mapping[tuple[str, str], Array]
     turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
+    recorded: tuple[SeenTrial, ...] = ()
 
     @property
     def counting(self) -> "Testimony":
@@ -57,6 +58,7 @@ class Testimony:
             {name: trace[kept] for name, trace in self.traces.items()},
             {name: value[kept] for name, value in self.turned.items()},
             self.seconds,
+            self.recorded,
         )
 
     @property
@@ -153,7 +155,29 @@ def hear(
         {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
         {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
         {one.trial.name: one.seconds for one in seen},
+        tuple(seen),
     )
+
+
+def put_right(heard: Testimony, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
+    """Return what putting causes right by their ``sizes`` adds to each observation (n,), NaN where it is then not seen,
+    and what one unit of each then adds (n, p): a step that begins 30 ms earlier is another part of the step.
+    """
+    added = np.full(len(heard.observations), np.nan)
+    slopes = np.zeros((added.size, len(sizes)))
+    single = all(len(one.trial.plates) == 1 for one in heard.recorded)
+    for one in heard.recorded:
+        here = [i for i, o in enumerate(heard.observations) if o.trial == one.trial.name]
+        found = tuple(heard.observations[i] for i in here)
+        known = {cause.names: cause for cause in possible_causes(one, single=single) if cause.names in sizes}
+        right = one
+        for names, cause in known.items():
+            right = cause.alter(right, -sizes[names])
+        added[here] = _again(right, found) - _again(one, found)
+        for k, names in enumerate(sizes):
+            if names in known:
+                slopes[here, k] = traces(right, found, known[names])
+    return added, slopes
 
 
 def _alike(found: tuple[Observation, ...]) -> tuple[Observation, ...]:

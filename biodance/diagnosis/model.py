@@ -17,6 +17,13 @@ from biodance.records import Array
 from biodance.uncertainty.joints import joint_of
 from biodance.uncertainty.tolerances import HABIT, Tolerances, in_state, key_of, mean_key, whitened
 
+_HEAVIER = 0.3
+"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
+_STALE = 0.03
+"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
+this share.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class NamedCause:
@@ -147,3 +154,20 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     both[:, -1] -= expected
     both = white(problem, tolerances, both, out=both)
     return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)
+
+
+def heavier(found: Model) -> bool:
+    """Return whether the data make any segment so much heavier that its kinematic errors grow with it."""
+    before = found.problem.prior.mass
+    return bool(np.any(found.phi[::10] - before > _HEAVIER * before))
+
+
+def stale(found: Model) -> bool:
+    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by
+    more than `_STALE`.
+    """
+    both = np.zeros(2)
+    for case in found.problem.cases:
+        wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
+        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
+    return bool(both[0] > _STALE**2 * both[1])

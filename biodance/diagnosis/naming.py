@@ -8,11 +8,11 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import STRAINED, strain
-from biodance.diagnosis.candidates import SCALE, Candidate, candidates, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.diagnosis import Alias
-from biodance.diagnosis.evidence import evidence
-from biodance.diagnosis.model import Model, NamedCause, model
+from biodance.diagnosis.model import Model, NamedCause, heavier, model, stale
 from biodance.diagnosis.problem import Problem
+from biodance.diagnosis.screening import ScoredCandidate, screen, taken
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
@@ -26,12 +26,6 @@ _NEAR = 12.0
 """Natural logarithm: causes this far behind the best one of the screening are refined."""
 TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
-HEAVIER = 0.3
-"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
-STALE = 0.03
-"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
-this share.
-"""
 SURE = 2.0
 """A name is taken back where its size is less than so many of its standard deviations; of several parameters
 together, where chance brings them as far as often.
@@ -43,24 +37,6 @@ declared mass still makes it 25 standard deviations.)
 """
 _STEPS = 5
 """Gauss-Newton steps at most."""
-
-
-@dataclass(frozen=True, eq=False)
-class ScoredCandidate:
-    """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets;
-    ``start`` (p,) parameters; ``visible`` share.
-    """
-
-    cause: Candidate
-    log_bayes_factor: float
-    score: float
-    start: Array
-    visible: float
-
-    @property
-    def alias(self) -> Alias:
-        """The cause with its evidence."""
-        return Alias(*self.cause.names, self.log_bayes_factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +73,19 @@ class Naming:
 
 
 def name_causes(
-    problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect] = None, *, rounds: int = _ROUNDS
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect] = None,
+    *,
+    rounds: int = _ROUNDS,
+    every: tuple[Candidate, ...] | None = None,
 ) -> Naming:
     """Return the causes that the session shows, at most ``rounds``; ``chosen`` limits or extends the family
-    (`effects`).
+    (`effects`). ``every`` cause with its columns, where they are known (`causes_of`).
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
-    first, first_causes = built(problem, tolerances, chosen)
+    first, first_causes = built(problem, tolerances, chosen, every)
     found, causes = first, first_causes
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
@@ -136,7 +117,7 @@ def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round,
     """
     while found.named:
         found = settle(found, found.named)
-        evidence_of = [_beside(found, i) for i in range(len(found.named))]
+        evidence_of = [more_probable(found, _without(found, i)) for i in range(len(found.named))]
         falls = [
             i
             for i, one in enumerate(accepted)
@@ -181,11 +162,14 @@ def stands(found: Model, one: NamedCause) -> bool:
     return sure and one.effect.possible_in(found.problem.cases[0], one.theta)
 
 
-def _beside(found: Model, index: int) -> float:
-    """Return the log Bayes factor of one named cause beside the others, which take up what they can without it."""
-    others = (*found.named[:index], *found.named[index + 1 :])
-    without = settle(found, others)
-    return found.log_likelihood - _penalty(found) - without.log_likelihood + _penalty(without)
+def _without(found: Model, index: int) -> Model:
+    """Return the model without one named cause; the others take up what they can."""
+    return settle(found, (*found.named[:index], *found.named[index + 1 :]))
+
+
+def more_probable(found: Model, other: Model) -> float:
+    """Return the log Bayes factor of the causes named in one model against those named in another."""
+    return found.log_likelihood - _penalty(found) - other.log_likelihood + _penalty(other)
 
 
 def _price(one: Round) -> float:
@@ -196,12 +180,6 @@ def _price(one: Round) -> float:
 def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
     """Return whether the most probable cause passes the threshold."""
     return bool(ranking.suspects) and ranking.suspects[0].score >= tolerances.threshold
-
-
-def heavier(found: Model) -> bool:
-    """Return whether the data make any segment so much heavier that its kinematic errors grow with it."""
-    before = found.problem.prior.mass
-    return bool(np.any(found.phi[::10] - before > HEAVIER * before))
 
 
 def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
@@ -215,23 +193,22 @@ def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tup
     return settle(fresh, found.named), causes
 
 
-def stale(found: Model) -> bool:
-    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by
-    more than `STALE`.
-    """
-    both = np.zeros(2)
-    for case in found.problem.cases:
-        wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
-        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
-    return bool(both[0] > STALE**2 * both[1])
-
-
-def built(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
+    """Return all causes to look for, and those that are not but keep their tolerance."""
     family = effects(chosen)
-    every = candidates(
+    return candidates(
         problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
     )
+
+
+def built(
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect],
+    every: tuple[Candidate, ...] | None = None,
+) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+    family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 
@@ -240,54 +217,16 @@ def named_of(one: NamedCause) -> tuple[str, str]:
     return one.effect.name, one.effect.target
 
 
-def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate, ...]:
-    """Return all causes with their evidence, most probable first."""
-    widths = [one.basis.shape[1] for one in causes]
-    named = taken(found)
-    Z = np.concatenate([one.basis for one in causes], axis=1)
-    Z = found.white(Z, out=Z)
-    s, G = found.belief.score(Z)
-    if named.shape[1]:
-        G = G - shared(found, named, Z)
-    targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
-    suspects, start = [], 0
-    for one, width in zip(causes, widths, strict=True):
-        cut = slice(start, start + width)
-        start += width
-        here = evidence(s[cut], G[cut, cut], float(np.sum(Z[:, cut] ** 2)))
-        score = here.log_bayes_factor - float(np.log(targets[one.names[0]]))
-        suspects.append(ScoredCandidate(one, here.log_bayes_factor, score, one.start(here.mean), here.visible))
-    return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
-
-
-def taken(found: Model) -> Array:
-    """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
-    parts = [
-        slopes(found.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
-        for one in found.named
-    ]
-    return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
-
-
-def shared(found: Model, named: Array, Z: Array) -> Array:
-    """Return (k, k): what of the information of ``Z`` (r, k) the sizes of the named causes may still absorb."""
-    both = np.concatenate([named, Z], axis=1)
-    _, G = found.belief.score(both)
-    n = named.shape[1]
-    return np.asarray(G[n:, :n] @ np.linalg.solve(np.eye(n) + G[:n, :n], G[:n, n:]))
-
-
 def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
     one named.
     """
-    near = _near(found, ranking)
+    near = _near(ranking)
     refined = []
-    before = found.log_likelihood - _penalty(found)
     for one in near:
         start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
         settled = settle(found, (*found.named, start))
-        gain = settled.log_likelihood - _penalty(settled) - before
+        gain = more_probable(settled, found)
         last = settled.named[-1]
         bayes = gain if last.effect.possible_in(found.problem.cases[0], last.theta) else -np.inf
         refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
@@ -296,18 +235,10 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     return Round((*(one for one, _ in refined), *rest)), refined[0][1]
 
 
-def _near(found: Model, ranking: Round) -> list[ScoredCandidate]:
-    """Return the causes worth fitting: the first ones of the screening, and of each effect that is not in proportion
-    to its size the first that passes the threshold, because a screening at one size makes too little of it.
-    """
+def _near(ranking: Round) -> list[ScoredCandidate]:
+    """Return the causes worth fitting: the first ones of the screening."""
     best = ranking.suspects[0].score
-    near = [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
-    passed = [one for one in ranking.suspects if one.score >= found.tolerances.threshold]
-    bent: dict[str, ScoredCandidate] = {}
-    for one in passed:
-        if not one.cause.effect.linear:
-            bent.setdefault(one.cause.names[0], one)
-    return near + [one for one in bent.values() if one not in near]
+    return [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
 
 
 def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:

@@ -11,9 +11,11 @@ import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
 from biodance.diagnosis.candidates import Candidate, local_basis
+from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.evidence import Evidence, believe, evidence
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, ScoredCandidate, needed, stands
+from biodance.diagnosis.naming import Naming, Round, more_probable, needed, stands
+from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
@@ -42,13 +44,14 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
     """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as
     it is.
 
-    It is tried instead of what was named, and beside it; what leaves less is kept.
+    It is tried instead of what was named, if it is more probable than all of that, and beside it; what leaves less is
+    kept.
     """
     if alarming(adequacy(naming.found)) <= LIMIT:
         return naming
-    best = naming
-    for base, accepted in ((naming.bare, ()), (naming.found, naming.accepted)):
-        tried = _with(naming, base, accepted, chosen)
+    best, steady = naming, more_probable(naming.found, naming.bare)
+    for base, accepted, than in ((naming.bare, (), steady), (naming.found, naming.accepted, 0.0)):
+        tried = _with(naming, base, accepted, chosen, than=than)
         if tried is not None and alarming(adequacy(tried.found)) < alarming(adequacy(best.found)):
             best = tried
         if not naming.found.named:
@@ -56,9 +59,11 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
     return best
 
 
-def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect]) -> Naming | None:
+def _with(
+    naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect], *, than: float
+) -> Naming | None:
     """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the
-    threshold.
+    threshold, and above the log Bayes factor ``than`` of what it stands for.
     """
     kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
     found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
@@ -69,14 +74,14 @@ def _with(naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chos
     if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
         return None
     seen, suspects = order[0].found, tuple(_suspect(one, score) for one in order)
-    if seen.log_bayes_factor - score < needed(base, seen.visible):
+    if seen.log_bayes_factor - score < max(than, needed(base, seen.visible)):
         return None
     if not one_sided(seen.mean.reshape(-1, len(order[0].effect.parameters))):
         return None
     best = _placed(base, order[0])
     belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
     touch = _named(base, best, belief.mean[-best.white.shape[1] :], order[0])
-    if not stands(base, touch):
+    if not (stands(base, touch) and matters(touch.effect, touch.theta)):
         return None
     named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)

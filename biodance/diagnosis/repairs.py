@@ -12,7 +12,7 @@ from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.discovery import Chosen
-from biodance.effects import Case, DiscreteEffect, Effect, effects
+from biodance.effects import Case, DiscreteEffect, Effect, Gate, effects
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
@@ -24,6 +24,8 @@ _ALIKE = {
     "elbow": (("segment_length", "upper_arm"), ("joint_centre", "shoulder")),
 }  # fmt: skip
 """What else looks like a joint that lies elsewhere."""
+_PLACED_BY = {"knee": "KNE", "ankle": "ANK", "shoulder": "SHO", "elbow": "ELB"}
+"""The marker by which the static trial places a joint: wrong there and in all trials, it is that joint elsewhere."""
 
 _EXPLAINS = 0.5
 """Share of the way that a joint seemed to have gone by which a marker beside it must have moved, to explain it."""
@@ -54,7 +56,7 @@ def repairs(cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Eff
         if error.spared and "marker_misplaced" in family:
             yield from _marker(family["marker_misplaced"], error, cases, known)
         elif error.contradicted and "joint_centre" in family:
-            yield _joint(family["joint_centre"], error)
+            yield _joint(family["joint_centre"], error, cases[0].body.markers.names)
 
 
 def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
@@ -71,14 +73,16 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
 
 
-def _joint(effect: Effect, error: JointError) -> Finding:
+def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Finding:
     """Return a joint that lies elsewhere: no surer than static trials place joints and than the movement shows it. A
-    bone of another length and its other joint look the same.
+    bone of another length, its other joint and the one of the ``markers`` that places it look the same.
     """
     sd = float(np.hypot(centre_sd(error.joint), error.centre))
     found = _named(replace(effect, target=error.joint), [("shift", error.moved)], sd)
     side, _, joint = error.joint.partition("_")
     alike = [Alias(kind, f"{side}_{name}", float("inf")) for kind, name in _ALIKE.get(joint, ())]
+    own = f"{side[:1].upper()}{_PLACED_BY.get(joint, '')}"
+    alike += [Alias("marker_misplaced", name, float("inf")) for name in markers if name == own]
     return replace(found, set=(*found.set, *alike))
 
 
@@ -87,3 +91,31 @@ def _named(effect: Effect, sizes: list[tuple[str, float]], sd: float) -> Finding
     parameters = tuple(Estimate(name, float(size), sd, "m") for name, size in sizes)
     cause = Alias(effect.name, effect.target, float("inf"))
     return Finding(effect.name, effect.target, parameters, (cause,), 1.0, advice=effect.advice)
+
+
+def by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None, *, suspicious: bool = False) -> Diagnosis:
+    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
+    recordings: of what the statistics ``left``, with something ``suspicious`` or not, no findings are taken.
+    """
+    findings = tuple(failed_check(gate) for gate in checks if not gate.ok)
+    note = (
+        "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
+        "recordings that are wrong."
+    )
+    clean = left is not None and left.verdict == "named, complete" and not suspicious
+    return Diagnosis(
+        verdict="named, complete" if clean else "named, incomplete",
+        findings=findings,
+        gates=checks,
+        adequacy=left.adequacy if left else (),
+        unobservable=left.unobservable if left else (),
+        limits=left.limits if left else (),
+        notes=(note, *(left.notes if left else ())),
+    )
+
+
+def failed_check(gate: Gate) -> Finding:
+    """Return a failed check as a finding."""
+    size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
+    cause = Alias(gate.effect, gate.target, float("inf"))
+    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {gate.advice}".strip())

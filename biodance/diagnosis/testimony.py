@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from biodance.diagnosis.candidates import SCALE
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.heard import Testimony
+from biodance.diagnosis.heard import Testimony, put_right
 from biodance.diagnosis.naming import TOGETHER
 from biodance.effects import Effect, causes
 from biodance.records import Array
@@ -28,6 +28,10 @@ _RARE = 3.0
 _RARER = {"plate_crosstalk": 1.0}
 """Natural logarithms: so much rarer than other faults are a channel of the wrong sign, and cross-talk that looks like a
 plate beside its place."""
+_BROAD = 10.0
+"""Typical sizes: that large ones are rare counts for a name; the size itself is told as the witnesses show it."""
+_AGAIN = 2
+"""Times that the witnesses are asked again about a recording with the named causes put right."""
 _ROUNDS = 3
 _STEPS = 30
 _SURE = 2.0
@@ -160,11 +164,28 @@ def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], 
 def _explained(
     heard: Testimony, value: Array, names: tuple[tuple[str, str], ...], known: Array | None = None
 ) -> Explanation:
+    Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
+    return _fitted(heard, value, Z, np.array([SCALE * _typical(*name) for name in names]), known)
+
+
+def _fitted(heard: Testimony, value: Array, Z: Array, size: Array, known: Array | None = None) -> Explanation:
     kept = np.ones(value.size, dtype=bool) if known is None else known.astype(bool)
     sd = np.array([one.sd for one in heard.observations])[kept]
-    Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
-    size = np.array([SCALE * _typical(*name) for name in names])
     return fit(value[kept], sd, heard.shared[kept], Z[kept], size)
+
+
+def _sized(heard: Testimony, value: Array, names: tuple[tuple[str, str], ...]) -> Explanation:
+    """Return the explanation by named causes with their sizes as the witnesses show them: where the causes are put
+    right, the witnesses are asked again, for what a cause adds is no straight line.
+    """
+    size = np.array([_BROAD * _typical(*name) for name in names])
+    Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
+    found = _fitted(heard, value, Z, size)
+    for _ in range(_AGAIN if heard.recorded and names else 0):
+        added, slopes = put_right(heard, dict(zip(names, map(float, found.theta), strict=True)))
+        again = value + added + slopes @ found.theta
+        found = _fitted(heard, np.nan_to_num(again), slopes, size, np.isfinite(again))
+    return found
 
 
 def _typical(effect: str, target: str) -> float:
@@ -188,7 +209,7 @@ def _matters(heard: Testimony, one: Hypothesis) -> bool:
 def _findings(heard: Testimony, value: Array, named: list[tuple[Hypothesis, tuple[Alias, ...]]]) -> tuple[Finding, ...]:
     """Return the named causes with their sizes, all fitted together."""
     sized = tuple(one.names for one, _ in named if one.names in heard.causes)
-    last, found = _explained(heard, value, sized), []
+    last, found = _sized(heard, value, sized), []
     for one, near in named:
         kind, visible = causes()[one.names[0]], 1.0
         estimates: tuple[Estimate, ...] = ()
@@ -207,7 +228,7 @@ def size_by(heard: Testimony, names: tuple[str, str]) -> tuple[float, float] | N
     if names not in counting.causes or not counting.seen_by(names):
         return None
     value = np.array([one.value - one.expected for one in counting.observations])
-    one = _explained(counting, value, (names,))
+    one = _sized(counting, value, (names,))
     return float(one.theta[0]), float(np.hypot(one.covariance[0, 0] ** 0.5, _ALIKE.get(names[0], 0.0)))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.identification.running import RunningBelief
+from biodance.identification.streaming import RunningBelief
 from biodance.records import CHANNELS, Array, Plate
 from biodance.spatial import wrench_about_point
 

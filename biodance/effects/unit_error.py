@@ -26,7 +26,7 @@ _NEAR = 0.06
 _EVEN = 0.15
 """Largest spread of the ratio within a trial, or somebody steps on and off."""
 _WORDS = {
-    "markers": r"can only be in (?:mm|cm|m), so lengths are",
+    "markers": r"UNITS is '[^']+'; .* can only be in (?:mm|cm|m), so lengths are",
     "corners": r"they were taken as (?:m|mm), the only unit",
     "origin": r"makes no sense in the file's unit and was taken in units of ([\d.e-]+) m",
     "moments": r"only when taken ([\d.]+) times as large as the file's units say",

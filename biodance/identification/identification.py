@@ -16,12 +16,12 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, TrialRefused, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.dilution import carried_away, undiluted
+from biodance.identification.calibration import discounted, give_back
 from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
-from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, mismatch, temper
+from biodance.identification.mismatch import Mismatch, Sizes, mismatch
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
@@ -35,11 +35,12 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_ROUNDS, _AGAIN = 2, 4
-"""How often the dilution is measured under the parameters of the fit before; rounds of learning the noise anew after
-it."""
 NOISE_ALONE = (
     "The intervals count the noise alone, not soft tissue, joint centres and plates: they are several times too short."
+)
+
+_TOO_SLOW = (
+    "Movement faster than {:g} Hz was left out: there is so little of it that it cannot be told from skin that slides."
 )
 
 
@@ -73,6 +74,8 @@ class Identification(Sendable):
         What a person should know.
     apart : bool
         Whether the prior takes the masses of right and left each on its own, by evidence.
+    diluted : bool
+        Whether noise in the kinematics takes from the parameters what cannot be given back.
 
     References
     ----------
@@ -97,6 +100,7 @@ class Identification(Sendable):
     known: tuple[Known, ...]
     notes: tuple[str, ...]
     apart: bool = False
+    diluted: bool = False
 
     def __repr__(self) -> str:
         return f"Identification({self.status}, {len(self.sip.segments)} segments from {', '.join(self.trials)})"
@@ -212,12 +216,31 @@ def identify_body(body: Body, fits: tuple[Fit, ...], *, prior: Sip | None = None
         There is no trial, or none has a usable frame.
     """
     used, about, notes = usable(body, fits)
-    total = statistics_together(body, used, layout_for(about))
-    noise, _ = learn_noise(total, may_carry(body, prior or widened(body.sip, body.joint_errors)))
-    found = conclude(
-        body, total, tuple(fit.name for fit in used), noise=noise, found=mismatch(body, used, noise), prior=prior
-    )
+    found = conclude_trials(body, statistics_together(body, used, layout_for(about)), used, prior=prior)
     return replace(found, notes=(*notes, *found.notes))
+
+
+@one_thread()
+def conclude_trials(
+    body: Body, total: Statistics, fits: tuple[Fit, ...], *, prior: Sip | None = None
+) -> Identification:
+    """Return the identification from the statistics ``total`` of the trials ``fits``, disturbances counted.
+
+    Where movement is so slow that what its fastest band shows cannot be told from noise in the kinematics (regression
+    dilution that cannot be given back, `dilution.carried_away`), that band is left out.
+    """
+    room = may_carry(body, prior or widened(body.sip, body.joint_errors))
+
+    def concluded(some: Statistics) -> Identification:
+        noise, _ = learn_noise(some, room)
+        names = tuple(fit.name for fit in fits)
+        return conclude(body, some, names, noise=noise, found=mismatch(body, fits, noise), prior=prior)
+
+    found = concluded(total)
+    if not found.diluted:
+        return found
+    slower = concluded(total.slower())
+    return replace(slower, notes=(*slower.notes, _TOO_SLOW.format(total.layout.bands.edges[-2])))
 
 
 def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, tuple[str, ...]]:
@@ -263,18 +286,10 @@ def conclude(
     """
     before = prior or widened(body.sip, body.joint_errors)
     room = before if machine else may_carry(body, before)
-    noise = noise or learn_noise(total, room)[0]
-    data, sizes = _discounted(total, noise, found, room)
-    as_measured = data, sizes, noise
-    for _ in range(_ROUNDS if found is not None and not machine else 0):
-        table = more_probable_table(data, before, body)[0] if prior is None else before
-        belief = posterior(data, table)
-        real = undiluted(total, belief.mean, body.segments)
-        noise = learn_noise(real, room, rounds=_AGAIN)[0]
-        data, sizes = _discounted(real, noise, found, room)
-        if carried_away(belief, posterior(data, table)):
-            data, sizes, noise = as_measured
-            break
+    got = discounted(total, noise or learn_noise(total, room)[0], found, room)
+    if found is not None and not machine:
+        got = give_back(body, total, got, found, before, open_table=prior is None)
+    data = got.data
     before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
     belief = posterior(data, before)
     fit = physical_fit(belief, body)
@@ -288,16 +303,9 @@ def conclude(
             first = from_true_centres(before, before, body.joint_errors)
         known = knowledge(fit.sip, first, belief)
         words += _notes(known, fit)
-    return Identification(body, belief, data, base, noise, sizes, fit, trials, data.frames, known, words, apart)
-
-
-def _discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Sip) -> tuple[Information, Sizes]:
-    """Return the whitened data less what twins and plates disturb, and how large that is by evidence."""
-    data = total.information(noise)
-    if found is None:
-        return data, Sizes(0.0, 1.0)
-    sizes = evident_sizes(data, found, room)
-    return temper(data, found, sizes), sizes
+    return Identification(
+        body, belief, data, base, got.noise, got.sizes, fit, trials, data.frames, known, words, apart, got.diluted
+    )
 
 
 def standing_point(fits: tuple[Fit, ...]) -> Array:

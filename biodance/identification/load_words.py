@@ -14,7 +14,12 @@ def say_load(search: LoadSearch) -> str:
 
 def _found(search: LoadSearch) -> str:
     x, y, z = (f"{1000 * value:.0f}" for value in search.best.place)
-    also = f" It may also sit on: {', '.join(map(_words, search.set[1:]))}." if search.set[1:] else ""
+    also = (
+        f" It may also sit on: {', '.join(map(_words, search.set[1:]))}. They are known together, not apart: what "
+        f"the plates measured fits a load on each."
+        if search.set[1:]
+        else ""
+    )
     return (
         f"Beyond {search.reference} the subject carries {_size(search)}; its centre is {x}, {y}, {z} mm "
         f"from the segment's proximal joint centre, along its x (forward), y (up) and z (right).{also}"

@@ -18,12 +18,11 @@ from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Sip
-from biodance.uncertainty.deviations import deviations
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
 from biodance.uncertainty.response import Response
 from biodance.uncertainty.source import ErrorSource
-from biodance.uncertainty.sources import of_markers, transpose
+from biodance.uncertainty.sources import deviations, of_markers, transpose
 
 EVERY = 8
 """Frames: one of so many is enough to predict the size of the marker residuals from."""

@@ -74,6 +74,11 @@ class Statistics:
             )
         return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
 
+    def slower(self) -> "Statistics":
+        """Return the statistics without their fastest band."""
+        bands = replace(self.layout.bands, edges=self.layout.bands.edges[:-1])
+        return Statistics(self.gram[:-1], self.count[:-1], layout_for(self.layout.about, bands))
+
     def information(self, noise: Noise) -> Information:
         """Return the R factor of the data whitened by ``noise`` (same bands)."""
         weight = np.linalg.inv(noise.covariance)

@@ -14,15 +14,59 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.identification import Identification, conclude
-from biodance.identification.knowledge import Known
+from biodance.identification.identification import Identification, conclude, conclude_trials
+from biodance.identification.knowledge import KNOWN, PARTLY, Knowability, Known
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
 from biodance.identification.mismatch import SHORTEST, Mismatch, mismatch, nothing
 from biodance.identification.statistics import Fit, Statistics, empty, layout_for, statistics
-from biodance.records import Array, Motion, Wrench
+from biodance.records import Array, Motion, Sip, Wrench
 from biodance.uncertainty.bands import BLOCK_SAMPLES
 from biodance.uncertainty.caution import widened
+
+
+@dataclass(frozen=True, eq=False)
+class RunningBelief:
+    """Gaussian belief: ``prior`` as given, ``mean`` (p,) and ``covariance`` (p, p) after the samples so far."""
+
+    prior: Sip
+    mean: Array
+    covariance: Array
+
+    def expected(self, W: Array) -> tuple[Array, Array]:
+        """Return the expected wrench (..., 6) N, N·m for regressors ``W`` (..., 6, p), and its variance from what is
+        not known of the parameters.
+        """
+        return W @ self.mean, np.einsum("...ij,jk,...ik->...i", W, self.covariance, W, optimize=True)
+
+    def updated(self, W: Array, wrench: Array, variance: Array) -> "RunningBelief":
+        """Return the belief after one sample: ``W`` (6, p), ``wrench`` (6,) N, N·m with noise of ``variance`` (6,).
+
+        Source: Kalman 1960, doi:10.1115/1.3662552, with a state that stays.
+        """
+        seen = self.covariance @ W.T
+        gain = np.linalg.solve(W @ seen + np.diag(variance), seen.T).T
+        covariance = self.covariance - gain @ seen.T
+        return replace(
+            self,
+            mean=self.mean + gain @ (wrench - W @ self.mean),
+            covariance=(covariance + covariance.T) / 2,
+        )
+
+    def verdicts(self) -> dict[str, Knowability]:
+        """Return for every segment how well its mass is known, as `knowledge` has it."""
+        first, now = np.diag(self.prior.covariance)[::10], np.diag(self.covariance)[::10]
+        share = 1 - np.divide(now, first, out=np.ones_like(now), where=first > 0)
+        return {
+            name: "known" if part >= KNOWN else "partly known" if part >= PARTLY else "cannot be known"
+            for name, part in zip(self.prior.segments, share, strict=True)
+        }
+
+
+def belief_before(prior: Sip) -> RunningBelief:
+    """Return the belief before the first sample."""
+    return RunningBelief(prior, np.array(prior.phi), np.array(prior.covariance))
+
 
 _ENOUGH = ("mass", "com x", "com y", "com z")
 """Quantities that must all be known before a segment is known well enough."""
@@ -113,10 +157,9 @@ class Stream:
         ``fits`` are the recorded trials, for the disturbances that twins and plates make over them (see `mismatch`);
         without them the intervals count the noise alone, and the notes say so.
         """
-        found = self.statistics
-        noise, _ = learn_noise(found, may_carry(self.body, widened(self.body.sip, self.body.joint_errors)))
-        disturbed = mismatch(self.body, fits, noise) if fits else None
-        return conclude(self.body, found, tuple(fit.name for fit in fits) or ("stream",), noise=noise, found=disturbed)
+        if fits:
+            return conclude_trials(self.body, self.statistics, fits)
+        return conclude(self.body, self.statistics, ("stream",))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from biodance.motion.base_seen import BaseSeen
 from biodance.motion.kinematics import poses
 from biodance.motion.smoothing import smooth
 from biodance.records import SIDES, Array, Motion, runs
-from biodance.records.encoders import Encoders
+from biodance.records.motion import Encoders
 
 UNDER = (0.02, 0.008)
 """Of the leg's length: how far the other sole may lie under the ground of the standing one (encoders, soft soles);

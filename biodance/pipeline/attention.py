@@ -5,24 +5,23 @@ or outside its limit, strongest first. Page, terminal and JSON show the same rec
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
 from biodance.diagnosis.heard import Testimony
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.identification.added_mass import LoadSearch
-from biodance.pipeline.looked_at import reasons_left_out, seconds_of
+from biodance.pipeline.looked_at import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
-from biodance.records.attention import Attention, Judged, Level, strongest_first
+from biodance.records.attention import Attention, Judged, Level, strongest_first, without_path
 
-_STATIC = "quiet standing tells nothing beside so much movement"
-_KEPT = "kept to measure what a finding gains"
-_NEVER = "it holds no measured ground contact"
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
+_EMPTY = "empty_plate"
+"""The witness that sees plates with nobody on them."""
+_WEIGHED = "kg are declared: check the mass"
+"""What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
 _ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
 EXPLAINS: dict[str, tuple[str, ...]] = {
     "mass on the plates": (
@@ -43,40 +42,6 @@ EXPLAINS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Causes that a check outside its limit may come from, by the beginning of the check's name."""
-
-
-def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged, ...]:
-    """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
-    is not.
-    """
-    seconds = {look.trial.name: seconds_of(look) for look in used}
-    why = reasons_left_out(result.trials)
-    kept = {look.trial.role for look in used if seconds[look.trial.name] > 0}
-    rows = []
-    for one in result.trials:
-        name, role = one.trial.name, one.trial.role
-        if seconds.get(name, 0.0) > 0:
-            rows.append(Judged(name, seconds[name]))
-        elif "fit" in kept and role not in ("fit", "static"):
-            rows.append(Judged(name, 0.0, _KEPT))
-        elif role == "static" and kept:
-            rows.append(Judged(name, 0.0, _STATIC))
-        else:
-            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or _NEVER, missed=True))
-    return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
-
-
-def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
-    """Return for every trial to identify from how many measured seconds it holds, or why none."""
-    used = set(result.identification.identification.trials) if result.identification else set()
-    rows = []
-    for one in result.trials:
-        if one.trial.role != "fit":
-            continue
-        here = one.comparison if one.name in used else None
-        seconds = float(here.used.sum() * np.median(np.diff(here.time))) if here and here.time.size > 1 else 0.0
-        rows.append(Judged(one.name, seconds, "" if seconds else " ".join(one.reasons) or _NEVER, missed=not seconds))
-    return tuple(rows)
 
 
 def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
@@ -136,7 +101,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
             "named, complete": f"{rest or 'With it accepted, '}nothing more is wrong.",
             "named, incomplete": _incomplete(one, rests_on),
         }.get(one.verdict, "")
-        text = f"Found: {names}. {more}{_sentence(beside)}"
+        text = f"Found: {names}. {_checks(one)}{more}{_sentence(beside)}"
     elif one.verdict == "nothing wrong":
         level = "warn" if beside else "note"
         text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
@@ -145,7 +110,8 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     elif one.doubt.startswith(_FITS):
         level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
     elif not (one.adequacy and rests_on):
-        level, where = "warn", f" in {rests_on}: no movement could be compared with a body" if rests_on else ""
+        whole = f" for {SHORTEST_RUN:g} s without a break" if any(TOO_SHORT in row.why_not for row in judged) else ""
+        level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
         text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt:
         level = "warn"
@@ -154,6 +120,13 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}"
         text += f" It resembles {like}, which is not enough." if like else ""
     return Attention(level, text.strip(), about=ABOUT)
+
+
+def _checks(one: Diagnosis) -> str:
+    """Return where the named causes that have no size were seen, as sentences: which labels, in which trials."""
+    bare = {(finding.effect, finding.target) for finding in one.findings if not finding.parameters}
+    said = [gate.text for gate in one.gates if not gate.ok and (gate.effect, gate.target) in bare]
+    return "".join(f"{_short(text)}. " for text in dict.fromkeys(said))
 
 
 def _doubtful(doubts: Sequence[str]) -> str:
@@ -187,25 +160,25 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [Attention("warn", text.removeprefix("Warning: "), "", "body") for text in result.doubts]
     for trial in result.trials:
         level: Level = "fail" if trial.status == "refused" else "warn"
-        found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in trial.reasons]
+        said = [text for text in trial.reasons if not (_WEIGHED in text and _cause_of("mass on the plates", findings))]
+        found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
     found += [_checked(check, findings) for check in result.all_checks if not check.inside]
     load = result.identification.search if result.identification else None
     return strongest_first([*found, *_load(load)])
 
 
-def without_path(reason: str, file: str) -> str:
-    """Return a refusal without the path of the ``file`` in front, where the file is named beside it anyway."""
-    path, colon, rest = reason.partition(": ")
-    return rest if colon and path.endswith(file) else reason
-
-
 def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
     """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
-    mine = next((causes for what, causes in EXPLAINS.items() if check.what.startswith(what)), ())
-    cause = next((in_words(finding) for finding in findings if finding.effect in mine), "")
+    cause = _cause_of(check.what, findings)
     then = f"{cause}, which was found, may explain it." if cause else check.advice
     text = f"{check.value}, should be {check.limit}. {then[:1].upper()}{then[1:]}".strip()
     return Attention("note" if cause else "warn", text, check.where, check.what)
+
+
+def _cause_of(checked: str, findings: Sequence[Finding]) -> str:
+    """Return the first finding that may explain a check of that name, in words; "" for none."""
+    mine = next((causes for what, causes in EXPLAINS.items() if checked.startswith(what)), ())
+    return next((in_words(finding) for finding in findings if finding.effect in mine), "")
 
 
 def _load(search: LoadSearch | None) -> list[Attention]:
@@ -232,7 +205,7 @@ def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     stepped_only = [row.trial for row in judged if row.missed and row.seconds > 0]
     for row in judged:
         if row.missed and not row.seconds > 0:
-            missed.setdefault(_short(row.why_not), []).append(row.trial)
+            missed.setdefault(_short(row.why_not).removeprefix(f"Trial {row.trial}: "), []).append(row.trial)
     parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
     parts += [f"; judged only by steps on plates: {_listed(stepped_only)}"] if stepped_only else []
     checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]
@@ -249,8 +222,8 @@ def _short(reason: str) -> str:
 
 
 def _heard(one: Diagnosis) -> str:
-    """Return that the witnesses were asked, as a sentence; "" where they saw nothing."""
-    trials = len({o.trial for o in one.witnesses.observations}) if one.witnesses else 0
+    """Return that the witnesses were asked, as a sentence; "" where they saw nobody on a plate."""
+    trials = len({o.trial for o in one.witnesses.observations if o.witness != _EMPTY}) if one.witnesses else 0
     return (
         f" Plates and clocks, judged alone, are as without fault in {trials} trial{'s' * (trials > 1)}."
         if trials

@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
-from biodance.cycles.normal import NormalCurve, normal_of
+from biodance.cycles.curves import NormalCurve, normal_of
 from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.ezc3d_object import write_trial

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from biodance.identification.validation import TrialValidation
 from biodance.pipeline.trial_result import Check, QuietStanding, TrialResult
 from biodance.records import Subject
 from biodance.settings import CheckLimits
@@ -136,3 +137,29 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
         advice = "See the trial's wrench figure: is it an offset, a delay or a scale?"
         found.append(_upper("force difference, worst axis", name, share, limits.force, "% of weight", advice))
     return found
+
+
+UNEXPLAINED = 0.5
+"""kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero
+allow.
+"""
+
+
+def unexplained_mass(fitted: tuple[TrialValidation, ...], gravity: float) -> float:
+    """Return how many kg more the plates carry than the identified body, in the mean over the fitted trials."""
+    beyond = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted])
+    return float(beyond.mean()) / gravity
+
+
+def weight_notes(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
+    """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the
+    declared mass.
+    """
+    missing = unexplained_mass(fitted, gravity)
+    if abs(missing) <= UNEXPLAINED:
+        return []
+    return [
+        f"The plates carry {abs(missing):.2f} kg {'more' if missing > 0 else 'less'} than the identified body, whose "
+        "total is tied to the declared mass: a load, or a wrong mass_kg. Until that is settled the masses of single "
+        "segments and their changes absorb it; see Added mass."
+    ]

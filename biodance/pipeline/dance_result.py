@@ -1,6 +1,8 @@
 """What came of designing a dance: the dance, its margins, what it tells, and the sentences that stand before it."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from biodance.dance.metrics import DanceMetrics
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
 from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
+
+if TYPE_CHECKING:
+    from biodance.diagnosis.foresight import Foresight
 
 _FAR, _NEW = 3.0, 0.9
 """Times its bound at which the static criterion is warned of; share of the table's standard deviation that is left of
@@ -165,3 +170,21 @@ class DanceResult:
 
 def _names(segments: tuple[str, ...]) -> str:
     return ", ".join(name.replace("_", " ") for name in segments)
+
+
+TRIAL_SECONDS = 20.0
+"""s: a designed dance is looked at as trials of about this length."""
+
+
+def foresee_dance(path: Path) -> "Foresight":
+    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`.
+
+    Raises
+    ------
+    FileRefused
+        The file is no dance.
+    """
+    from biodance.diagnosis.foresight import foresee, session_of
+
+    dance = Dance.load(path)
+    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))

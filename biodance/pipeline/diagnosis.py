@@ -4,31 +4,27 @@ and gains elsewhere.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain, Verdict
+from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
-from biodance.diagnosis.foresight import Foresight, foresee, session_of
 from biodance.diagnosis.heard import hear
 from biodance.diagnosis.joined import with_witnesses
 from biodance.diagnosis.plate_axes import with_plate_axes
-from biodance.diagnosis.repairs import with_repairs
+from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
 from biodance.diagnosis.testimony import weigh
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.rival_bodies import expect_unloaded
-from biodance.pipeline.attention import judged_trials, told
+from biodance.pipeline.attention import told
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
-from biodance.pipeline.looked_at import all_looks, cases_of, left_out, looked_at, own_tolerances
+from biodance.pipeline.looked_at import all_looks, cases_of, judged_trials, left_out, looked_at, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
 from biodance.threads import one_thread
@@ -43,8 +39,6 @@ _MORE_JOINTS = "its body moves at joints ({}) that the tolerances were not learn
 """Why what is left of a body with optional joints may be theirs."""
 _FEWER_JOINTS = "no marker shows what moves at {}, and the plates measure it all the same"
 """Why what is left of a part of a body may be the forces of the other part."""
-TRIAL_SECONDS = 20.0
-"""s: a designed dance is looked at as trials of about this length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +152,7 @@ def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagn
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*(_finding(gate) for gate in failed), *diagnosis.findings),
+        findings=(*(failed_check(gate) for gate in failed), *diagnosis.findings),
         gates=(*failed, *diagnosis.gates),
         notes=(note, *diagnosis.notes),
     )
@@ -180,7 +174,7 @@ def _diagnosed(
     failed = tuple(gate for gate in checks if not gate.ok)
     if result.body is None or not fitted:
         why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
-        return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
+        return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
     tell("looking for causes")
     own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
     try:
@@ -194,12 +188,12 @@ def _diagnosed(
             search=not failed,
         )
     except TrialRefused as why:
-        return SessionDiagnosis(_by_checks(checks) if failed else _cannot_tell(checks, str(why), *result.doubts))
+        return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, str(why), *result.doubts))
     examined = noted(
         examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes
     )
     if failed:
-        return SessionDiagnosis(_by_checks(checks, examined), examined)
+        return SessionDiagnosis(by_checks(checks, examined.diagnosis, suspicious=bool(examined.suspicious)), examined)
     if not own.believed:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
@@ -248,20 +242,6 @@ def diagnosed(
         return None
 
 
-def foresee_dance(path: Path) -> Foresight:
-    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`.
-
-    Raises
-    ------
-    FileRefused
-        The file is no dance.
-    """
-    from biodance.dance.dance import Dance
-
-    dance = Dance.load(path)
-    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
-
-
 def _cannot_tell(checks: tuple[Gate, ...], *notes: str) -> Diagnosis:
     """Return the diagnosis of a session of which nothing could be judged: its checks, and why."""
     return Diagnosis(verdict="unexplained", findings=(), gates=checks, notes=notes)
@@ -294,35 +274,6 @@ def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
         f"Session {reference.name} tells nothing of the body, so the table is what is known before. "
         f"{reference.identification.cause}",
     )
-
-
-def _by_checks(checks: tuple[Gate, ...], examined: Examined | None = None) -> Diagnosis:
-    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
-    recordings.
-    """
-    left = examined.diagnosis if examined else None
-    findings = tuple(_finding(gate) for gate in checks if not gate.ok)
-    note = (
-        "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
-        "recordings that are wrong."
-    )
-    clean = examined is not None and left is not None and left.verdict == "named, complete" and not examined.suspicious
-    return Diagnosis(
-        verdict="named, complete" if clean else "named, incomplete",
-        findings=findings,
-        gates=checks,
-        adequacy=left.adequacy if left else (),
-        unobservable=left.unobservable if left else (),
-        limits=left.limits if left else (),
-        notes=(note, *(left.notes if left else ())),
-    )
-
-
-def _finding(gate: Gate) -> Finding:
-    """Return a failed check as a finding."""
-    size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
-    cause = Alias(gate.effect, gate.target, float("inf"))
-    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {gate.advice}".strip())
 
 
 def _reasons(result: SessionResult) -> str:

@@ -14,14 +14,12 @@ from biodance.errors import SessionRefused, TrialRefused, UnknownName
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
-from biodance.pipeline.bids_folder import write_bids_folder
 from biodance.pipeline.kept import kept_body, kept_trials, read_kept
-from biodance.pipeline.opensim_folder import opensim_coordinates, write_opensim_folder
-from biodance.pipeline.rerun_recording import write_rerun
+from biodance.pipeline.program_folders import opensim_coordinates, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.results_c3d import results_into_c3d
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepare_trial
+from biodance.pipeline.trial_files import results_into_c3d, write_rerun
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Motion, Session, Trial
 

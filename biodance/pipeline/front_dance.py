@@ -271,7 +271,8 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
     """
     from biodance.dance.dance import Dance
     from biodance.dance.scoring import score_performance
-    from biodance.pipeline.identification import FITTED_ROLES, trial_fit
+    from biodance.pipeline.identification import FITTED_ROLES
+    from biodance.pipeline.trial_result import trial_fit
 
     one = dance if isinstance(dance, Dance) else Dance.load(dance)
     if result.body is None:

@@ -24,9 +24,9 @@ from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact.contact import foot_wrenches, ground_contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.checks import load_doubts
-from biodance.pipeline.trial_result import Check, TrialResult
-from biodance.records import ROLES, SIDES, Role, Sip, Wrench
+from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
+from biodance.pipeline.trial_result import Check, TrialResult, trial_fit
+from biodance.records import ROLES, SIDES, Role, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.plates import around_zero
 
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
 
     from biodance.dance.scoring import PerformanceScore
 
-UNEXPLAINED = 0.5
-"""kg between plates and identified body over the fit trials: more than the scale's uncertainty, shoes and a zero
-allow.
-"""
 FITTED_ROLES: tuple[Role, ...] = ("fit",)
 KEPT_ROLES: tuple[Role, ...] = ("validate", "check")
 
@@ -132,18 +128,6 @@ class SessionIdentification:
         return self.identification.table(quantity)
 
 
-def trial_fit(result: TrialResult) -> Fit | None:
-    """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to
-    compare.
-    """
-    found = result.comparison
-    if found is None or result.motion is None or not found.used.any():
-        return None
-    return Fit(
-        result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier
-    )
-
-
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
     """Whether any trial with role fit can be identified from."""
     return any(result.trial.role in FITTED_ROLES and trial_fit(result) is not None for result in results)
@@ -175,16 +159,14 @@ def identify_trials(
     if not fits:
         raise TrialRefused(
             f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be "
-            f"identified. "
-            "Record movement on the plates, or set roles in session.toml."
+            "identified. Record movement on the plates, or set roles in session.toml."
         )
     found = identify_body(body, fits, prior=prior)
     failures = {"segments": found.cause} if found.status == "failed" else {}
     if reference is not None and "segments" in reference.failures:
         failures["reference"] = (
             f"Session {reference.name} tells no body to compare with, so loads are looked for against the table and "
-            f"no change is told. "
-            f"{reference.failures['segments']}"
+            f"no change is told. {reference.failures['segments']}"
         )
         reference = None
     doubts = _doubts(results, checks, reference)
@@ -238,7 +220,7 @@ def _weights(one: SessionIdentification) -> tuple[float, float]:
     """Return the declared mass and what the plates carried over the fitted trials, kg."""
     gravity = -float(one.identification.body.gravity[2])
     body = float(one.identification.sip.mass.sum())
-    return float(one.identification.belief.prior.mass.sum()), body + _unexplained(one.fitted, gravity)
+    return float(one.identification.belief.prior.mass.sum()), body + unexplained_mass(one.fitted, gravity)
 
 
 def _changes(
@@ -268,7 +250,7 @@ def _predicted(
             "No trial was kept for validation, so the gain is not proven. Record squats, or give a trial the role "
             "validate."
         )
-    notes += _weight(fitted, -float(found.body.gravity[2]))
+    notes += weight_notes(fitted, -float(found.body.gravity[2]))
     torques = _torques(found, results)
     shown = next((one for one in results if torques and one.name == torques.trial), None)
     return replace(
@@ -296,28 +278,6 @@ def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueB
             ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
             return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
     return None
-
-
-def _unexplained(fitted: tuple[TrialValidation, ...], gravity: float) -> float:
-    """Return how many kg more the plates carry than the identified body, in the mean over the fitted trials."""
-    beyond = np.concatenate([(trial.measured.force - trial.identified.force)[trial.use, 2] for trial in fitted])
-    return float(beyond.mean()) / gravity
-
-
-def _weight(fitted: tuple[TrialValidation, ...], gravity: float) -> list[str]:
-    """Say it where the plates carry another weight than the identified body has: the table's total is pinned to the
-    declared mass.
-    """
-    missing = _unexplained(fitted, gravity)
-    if abs(missing) <= UNEXPLAINED:
-        return []
-    return [
-        f"The plates carry {abs(missing):.2f} kg {'more' if missing > 0 else 'less'} than the identified body, whose "
-        f"total is tied to the "
-        "declared mass: a load, or a wrong mass_kg. Until that is settled the masses of single segments and their "
-        "changes absorb it; see "
-        "Added mass."
-    ]
 
 
 def _at_origin(identified: Body, fit: Fit) -> Agreement:

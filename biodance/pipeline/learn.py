@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from biodance import display
-from biodance.cycles.curves import CurveGroup
-from biodance.cycles.normal import NormalCurve, normal_curves
+from biodance.cycles.curves import CurveGroup, NormalCurve, normal_curves
 from biodance.diagnosis.archive.norms import (
     Norm,
     Seen,

@@ -15,7 +15,7 @@ from biodance.diagnosis.watch import (
     said_of_markers,
     silent_plates,
 )
-from biodance.identification.running import RunningBelief
+from biodance.identification.streaming import RunningBelief
 from biodance.motion.ik.follow import Follower
 from biodance.records import Array, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point

@@ -12,8 +12,10 @@ from biodance.effects import Case
 from biodance.identification.identification import standing_point
 from biodance.identification.statistics import Fit
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
+from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Role, Trial, runs
+from biodance.records.attention import Judged
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import added_noise, with_own_noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
@@ -55,6 +57,8 @@ _SOFT = (
     "shown ",
 )
 """Keys of the tolerances that grow with it."""
+TOO_SHORT = f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
+"""Why a trial with measured contact is not looked at."""
 SWAYING = 0.3
 """Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
 UNREST = 1.5
@@ -118,9 +122,7 @@ def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
         if one.trial.name not in seen:
             why[one.trial.name] = " ".join(one.reasons)
         elif seen[one.trial.name] == 0:
-            why[one.trial.name] = (
-                f"no {SHORTEST_RUN:g} s in which the plates measure all ground contact without a break."
-            )
+            why[one.trial.name] = TOO_SHORT
     return why
 
 
@@ -213,3 +215,47 @@ def _fit(look: Look) -> Fit:
 def _thinned(body: Body, look: Look) -> tuple[Case, NDArray[np.bool_]]:
     time = np.linspace(look.start, look.end, look.motion.time.size)
     return thinned(Case(body, look.trial, look.motion, body.sip.phi, time), look.use)
+
+
+_STATIC = "quiet standing tells nothing beside so much movement"
+
+
+_KEPT = "kept to measure what a finding gains"
+
+
+_NEVER = "it holds no measured ground contact"
+
+
+def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged, ...]:
+    """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
+    is not.
+    """
+    seconds = {look.trial.name: seconds_of(look) for look in used}
+    why = reasons_left_out(result.trials)
+    kept = {look.trial.role for look in used if seconds[look.trial.name] > 0}
+    rows = []
+    for one in result.trials:
+        name, role = one.trial.name, one.trial.role
+        if seconds.get(name, 0.0) > 0:
+            rows.append(Judged(name, seconds[name]))
+        elif "fit" in kept and role not in ("fit", "static"):
+            rows.append(Judged(name, 0.0, _KEPT))
+        elif role == "static" and kept:
+            rows.append(Judged(name, 0.0, _STATIC))
+        else:
+            short = TOO_SHORT if one.comparison is not None and one.comparison.used.any() else _NEVER
+            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or short, missed=True))
+    return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
+
+
+def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
+    """Return for every trial to identify from how many measured seconds it holds, or why none."""
+    used = set(result.identification.identification.trials) if result.identification else set()
+    rows = []
+    for one in result.trials:
+        if one.trial.role != "fit":
+            continue
+        here = one.comparison if one.name in used else None
+        seconds = float(here.used.sum() * np.median(np.diff(here.time))) if here and here.time.size > 1 else 0.0
+        rows.append(Judged(one.name, seconds, "" if seconds else " ".join(one.reasons) or _NEVER, missed=not seconds))
+    return tuple(rows)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from biodance.effects import Gate, Recorded, gates
 from biodance.effects.labels_swapped import exchanges, renamed
-from biodance.lab.c3d.relabel import write_relabelled
+from biodance.lab.c3d.results import write_relabelled
 from biodance.pipeline.looked_at import all_looks, cases_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine

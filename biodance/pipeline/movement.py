@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.cycles.curves import NormalCurve
 from biodance.cycles.movement import TrialMovement, trial_movement
-from biodance.cycles.normal import NormalCurve
 from biodance.cycles.steps import STRIDE_UNITS
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.lab.c3d.outputs import FileOutputs, read_outputs
+from biodance.lab.c3d.subject import FileOutputs, read_outputs
 from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.results import SessionResult

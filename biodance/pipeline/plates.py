@@ -10,8 +10,14 @@ from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
 from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.session.archive import archive_folders, iso_date, visit_date
-from biodance.lab.session.index import IndexedTrial, read_index, read_plate_text
+from biodance.lab.session.archive import (
+    IndexedTrial,
+    archive_folders,
+    iso_date,
+    read_index,
+    read_plate_text,
+    visit_date,
+)
 from biodance.lab.session.read import read_session
 from biodance.records import Trial
 
@@ -66,7 +72,7 @@ class PlatesJudged:
         """
         import pandas as pd
 
-        from biodance.diagnosis.archive.daily import daily_rows
+        from biodance.diagnosis.archive.quantities import daily_rows
 
         return pd.DataFrame(daily_rows(self.observations))
 

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from biodance.lab.session.visit import visit_words
+from biodance.lab.session.read import visit_words
 from biodance.library import PACKAGE
 from biodance.pipeline.results import SessionResult
 from biodance.settings import Value

@@ -22,8 +22,7 @@ from biodance.records import Motion, Session, Trial
 from biodance.registration.alignment import Alignment, alignments
 from biodance.registration.pose import Forces, forces_of, registered_plates
 from biodance.registration.refinement import floor_of, refined, with_height
-from biodance.registration.registration import Limits, Registration, concluded, refused
-from biodance.registration.rivals import rival_delays
+from biodance.registration.registration import Limits, Registration, concluded, refused, rival_delays
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 

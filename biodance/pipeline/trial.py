@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.marker_groups import marker_groups
+from biodance.body.human.optional_joints import marker_groups
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.gaps import MarkerGaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set

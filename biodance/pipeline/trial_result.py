@@ -12,9 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
+from biodance.identification.statistics import Fit
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.optional_joints import JointGain
-from biodance.records import CHANNEL_TITLES, Array, Motion, Trial
+from biodance.records import CHANNEL_TITLES, Array, Motion, Trial, Wrench
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -219,3 +224,15 @@ class TrialResult:
         """The `reasons` and the checks outside their limits as one text; "" if there are none."""
         outside = [f"{one.what}: {one.value}, should be {one.limit}." for one in self.checks if not one.inside]
         return " ".join([*self.reasons, *(f"{said[:1].upper()}{said[1:]}" for said in outside)])
+
+
+def trial_fit(result: TrialResult) -> Fit | None:
+    """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to
+    compare.
+    """
+    found = result.comparison
+    if found is None or result.motion is None or not found.used.any():
+        return None
+    return Fit(
+        result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier
+    )

@@ -5,7 +5,7 @@ ground's action ON the subject, about the lab origin, force first; time is the f
 are copied, checked for shape at birth and read-only afterwards; change a record with ``dataclasses.replace``.
 """
 
-from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, by_name, frozen_array, runs
+from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, Mask, by_name, frozen_array, runs
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
 from biodance.records.session import ROLES, Role, Session, Source, Trial
@@ -22,6 +22,7 @@ __all__ = [
     "FootSizes",
     "Index",
     "Markers",
+    "Mask",
     "Motion",
     "Plate",
     "Role",

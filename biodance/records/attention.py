@@ -35,3 +35,9 @@ class Judged:
 def strongest_first(found: "tuple[Attention, ...] | list[Attention]") -> tuple[Attention, ...]:
     """Return the sentences by level, each once, in their order otherwise."""
     return tuple(sorted(dict.fromkeys(found), key=lambda one: LEVELS.index(one.level)))
+
+
+def without_path(reason: str, file: str) -> str:
+    """Return a refusal without the path of the ``file`` in front, where the file is named beside it anyway."""
+    path, colon, rest = reason.partition(": ")
+    return rest if colon and path.endswith(file) else reason

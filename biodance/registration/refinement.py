@@ -16,9 +16,8 @@ from biodance.motion.contact.footing import dilate, speeds
 from biodance.motion.contact.soles import Soles, soles_from_body
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Trial, runs
-from biodance.registration.evidence import PoseEvidence, feet_pull, together, wrench_pull
+from biodance.registration.evidence import PoseEvidence, feet_pull, plate_steps, together, wrench_pull
 from biodance.registration.pose import Forces, FramePose, with_forces_at
-from biodance.registration.steps import plate_steps
 from biodance.spatial import quaternion_matrix, zero_moment_point
 from biodance.uncertainty.tolerances import Tolerances
 

@@ -1,11 +1,13 @@
 """The pose of every plate and the delay of their clock with intervals, or the reason why they cannot be told."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from biodance import display
+from biodance.errors import TrialRefused
 from biodance.records import Array, Plate, frozen_array
 from biodance.registration.alignment import Alignment
 from biodance.registration.pose import Forces, FramePose
@@ -13,6 +15,36 @@ from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_NEARLY, _MOST = 0.85, 3
+"""Share of the best alignment's gain from which on another one is looked at, and how many of them."""
+_SAME = 0.03
+"""s between the delays of two refined poses that are one."""
+_CLEARLY = 10.0
+"""Natural logarithms by which the wrench must prefer one to the other."""
+
+
+def rival_delays(
+    hypotheses: tuple[Alignment, ...], found: Refined, refine: Callable[[FramePose], Refined]
+) -> tuple[Alignment, ...]:
+    """Return the hypotheses after the first, refined to ``found``, that are not clearly worse."""
+    near = [one for one in hypotheses[1:] if one.gain > _NEARLY * hypotheses[0].gain][:_MOST]
+    return tuple(one for one in near if _remains(one, found, refine))
+
+
+def _remains(one: Alignment, found: Refined, refine: Callable[[FramePose], Refined]) -> bool:
+    if found.rows < ENOUGH_ROWS:
+        return True
+    try:
+        other = refine(one.pose)
+    except TrialRefused:
+        return False
+    if abs(other.pose.delay - found.pose.delay) < _SAME:
+        return False
+    worse = 0.5 * min(found.rows, other.rows) * (other.fit - found.fit)
+    return other.rows >= ENOUGH_ROWS and not (np.isfinite(worse) and worse > _CLEARLY)
+
 
 _SURE = 1.645
 """Standard deviations that must fit into a limit. At the limit one in ten errs beyond it; most lie well below: of 24

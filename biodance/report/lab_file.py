@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from biodance.cycles.normal import normal_toml
+from biodance.cycles.curves import normal_toml
 from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.uncertainty.tolerances import shipped, to_toml

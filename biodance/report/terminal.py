@@ -9,10 +9,9 @@ from rich.table import Table
 
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
-from biodance.pipeline.attention import without_path
 from biodance.pipeline.results import SessionResult
-from biodance.records.attention import Attention
-from biodance.report.wording import format_number, millimetres, trial_and_subject
+from biodance.records.attention import Attention, without_path
+from biodance.report.wording import format_number, millimetres, size_seen, trial_and_subject
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
@@ -173,10 +172,7 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
     for heading in ("cause", "will be seen from", "and told from the others from", "typical"):
         table.add_column(heading)
     for row in found["limits"]:
-        cells = (
-            f"{row[key]:.3g} {row['unit']}" if row[key] is not None else "never"
-            for key in ("limit", "told_from", "typical")
-        )
+        cells = (size_seen(row, key) for key in ("limit", "told_from", "typical"))
         table.add_row(escape(f"{row['effect']} {row['target']}".strip()), *cells)
     console.print(table)
     for pair in found["confusions"]:

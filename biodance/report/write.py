@@ -6,13 +6,14 @@ from typing import Any
 from biodance.body.body_file import body_text
 from biodance.errors import BiodanceError
 from biodance.lab.corrections import PlateCorrection
-from biodance.pipeline.attention import identified_trials, session_attention
+from biodance.pipeline.attention import session_attention
 from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.kept import BODY, SCALED, keep_motions
+from biodance.pipeline.looked_at import identified_trials
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
@@ -20,8 +21,7 @@ from biodance.pipeline.session_frames import frames_of
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
-from biodance.report.documents.movement import movement_document
-from biodance.report.documents.session import plain_values, results_document, to_text
+from biodance.report.documents.session import movement_document, plain_values, results_document, to_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page

@@ -6,7 +6,6 @@ unit, a meaning and a legal range, which ``biodance settings`` prints. What the 
 of plates) is no choice: see `COP_FORCE` and `TOUCH_FORCE`. This is also the one place of standard gravity.
 """
 
-from biodance.settings.group import Setting, Value
 from biodance.settings.groups import (
     COP_FORCE,
     STANDARD_GRAVITY,
@@ -17,7 +16,9 @@ from biodance.settings.groups import (
     FilterSettings,
     GapSettings,
     Hip,
+    Setting,
     StandingRules,
+    Value,
 )
 from biodance.settings.settings import USUAL, Settings, assignments
 

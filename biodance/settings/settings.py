@@ -5,15 +5,20 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from biodance.errors import BiodanceError, UnknownName
-from biodance.settings.group import GENERAL, Group, Setting, Value, number_field, word_field
 from biodance.settings.groups import (
+    GENERAL,
     STANDARD_GRAVITY,
     CheckLimits,
     ContactRules,
     FilterSettings,
     GapSettings,
+    Group,
     Hip,
+    Setting,
     StandingRules,
+    Value,
+    number_field,
+    word_field,
 )
 
 

@@ -20,7 +20,8 @@ import numpy as np
 
 from biodance.discovery import Chosen, Family
 from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
-from biodance.witnesses._recording import ONSET, FootPath, FootStep, SeenTrial, recording
+from biodance.witnesses._feet import FootPath
+from biodance.witnesses._recording import ONSET, FootStep, SeenTrial, recording
 
 _TIME = re.compile(r" (at|from) [-\d.]+ s")
 """When a step was, as its name says it."""

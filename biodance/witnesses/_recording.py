@@ -10,15 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.errors import BiodanceError
-from biodance.lab.markers.sets import FAMILY, landmark, read_marker_set
+from biodance.lab.markers.sets import FAMILY
 from biodance.lab.weight import is_still
 from biodance.motion.contact.footing import inside
-from biodance.motion.contact.soles import OUTLINE
-from biodance.records import SIDES, Array, Index, Markers, Plate, Trial, Wrench, runs
-from biodance.records.arrays import rate_of
-from biodance.records.wrench import COP_FORCE
+from biodance.records import Array, Index, Plate, Trial, Wrench, runs
+from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
+from biodance.witnesses._feet import FootPath, feet_of, path_at, pelvis_path
 
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -28,8 +26,6 @@ _RAISED = 0.05
 """m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
-_LEVEL = 0.005
-"""m: plates side by side differ by less in height."""
 _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _BELT = 0.25
@@ -38,89 +34,8 @@ _LIFTED = 0.06
 """m of a foot above its lowest place in the trial from which it cannot stand."""
 _FLAT = 0.03
 """m of both markers above their lowest place of a foot that stands on a belt."""
-_UNSEEN = 0.05
-"""s over which a marker that was not seen is believed to go on straight."""
-
-
-_KEPT = 64
-"""Sets of times at which a foot's place is kept."""
-
-
-@dataclass(frozen=True, eq=False)
-class FootPath:
-    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen."""
-
-    side: str
-    time: Array
-    heel: Array
-    toe: Array
-    _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
-    _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
-
-    def at(self, time: Array) -> tuple[Array, Array]:
-        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
-
-        It is kept: witnesses are asked for the same times again and again, of recordings whose plates were altered.
-        """
-        key = time.tobytes()
-        if key not in self._known:
-            if len(self._known) >= _KEPT:
-                self._known.pop(next(iter(self._known)))
-            self._known[key] = _between(self.time, self.heel, time), _between(self.time, self.toe, time)
-        return self._known[key]
-
-    def outline(self, time: Array) -> Array:
-        """Return the sole (n, P, 2) m seen from above, from heel and toe marker."""
-        heel, toe = (path[:, :2] for path in self.at(time))
-        ahead = toe - heel
-        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-        return heel[:, None] + OUTLINE[:, :1] * ahead[:, None] + OUTLINE[:, 1:] * left[:, None]
-
-    def axes(self, time: float) -> Array:
-        """Return the horizontal unit vectors (2, 2) from heel to toe marker and outwards of it, at ``time`` s."""
-        heel, toe = (path[0, :2] for path in self.at(np.array([time])))
-        ahead = (toe - heel) / np.linalg.norm(toe - heel)
-        return np.stack([ahead, np.array([ahead[1], -ahead[0]]) * (1.0 if self.side == "right" else -1.0)])
-
-    def in_foot(self, time: Array, point: Array) -> tuple[Array, Array, Array]:
-        """Return how far ``point`` (n, 2) m lies ahead of the heel marker and outwards of the line to the toe marker,
-        m (n,), and the horizontal distance of the two markers (n,) m.
-        """
-        heel, toe = (path[:, :2] for path in self.at(time))
-        length = np.linalg.norm(toe - heel, axis=1)
-        ahead = (toe - heel) / length[:, None]
-        out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
-        return np.sum((point - heel) * ahead, axis=1), np.sum((point - heel) * out, axis=1), length
-
-    @property
-    def rate(self) -> float:
-        """Hz of the markers."""
-        return rate_of(self.time)
-
-    @cached_property
-    def velocity(self) -> Array:
-        """(T, 3) m/s of the middle between the two markers."""
-        if self.time.size < 2:
-            return np.zeros((self.time.size, 3))
-        return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
-
-    @cached_property
-    def pointing(self) -> Array:
-        """(3,) m from heel to toe marker, the median over the trial."""
-        return np.asarray(np.nanmedian(self.toe - self.heel, axis=0))
-
-    def drift(self, time: Array) -> Array:
-        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none. It is
-        kept, like the places.
-        """
-        key = time.tobytes()
-        if key not in self._drifts:
-            if len(self._drifts) >= _KEPT:
-                self._drifts.pop(next(iter(self._drifts)))
-            velocity = _between(self.time, self.velocity, time)
-            known = velocity[np.isfinite(velocity).all(axis=1)]
-            self._drifts[key] = np.median(known, axis=0) if len(known) else np.full(3, np.nan)
-        return self._drifts[key]
+_LEVEL = 0.005
+"""m: plates side by side differ by less in height."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +124,7 @@ class SeenTrial:
         """Return (n,) whether the other foot swings at some ``time`` (n,) s while this one stands."""
         other = next(foot for foot in self.feet if foot.side != step.side)
         belt = self.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))
-        off = np.linalg.norm(_between(other.time, other.velocity, time) - belt, axis=1)
+        off = np.linalg.norm(path_at(other.time, other.velocity, time) - belt, axis=1)
         return np.asarray(np.nan_to_num(off, nan=0.0) > _STILL)
 
     def belt(self, step: FootStep) -> Array | None:
@@ -227,7 +142,7 @@ class SeenTrial:
         """Return where (n, 3) m the pelvis is at times (n,) s; NaN where it was not seen."""
         if self.pelvis is None or self.trial.markers is None:
             return np.full((len(time), 3), np.nan)
-        return _between(self.trial.markers.time, self.pelvis, time)
+        return path_at(self.trial.markers.time, self.pelvis, time)
 
 
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
@@ -236,7 +151,7 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
     """
     known = tuple(dict.fromkeys(filter(None, (trial.marker_set, *FAMILY.files()))))
-    feet = _feet(trial.markers, known)
+    feet = feet_of(trial.markers, known)
     lowest = min((plate.height for plate in trial.plates), default=0.0)
     steps = tuple(
         step
@@ -244,54 +159,9 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
         for step in _steps(plate, trial.plates, feet, raised=plate.height > lowest + _RAISED)
         if feet
     )
-    pelvis = _pelvis(trial.markers, known)
+    pelvis = pelvis_path(trial.markers, known)
     steps = tuple(sorted(steps, key=lambda step: step.middle))
     return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial))
-
-
-def _between(known: Array, path: Array, time: Array) -> Array:
-    """Return a path (T, n) at other times, straight between frames; NaN where no frame near is known."""
-    seen = np.isfinite(path).all(axis=1)
-    if not seen.any():
-        return np.full((len(time), path.shape[1]), np.nan)
-    at, values = known[seen], path[seen]
-    out = np.stack([np.interp(time, at, column) for column in values.T], axis=1)
-    after = np.clip(np.searchsorted(at, time), 0, at.size - 1)
-    near = np.minimum(np.abs(time - at[after]), np.abs(time - at[np.maximum(after - 1, 0)]))
-    out[near > _UNSEEN] = np.nan
-    return out
-
-
-def _feet(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ...]:
-    """Return both feet by the landmarks heel and toe of the first of the ``known`` marker sets that has all four; ()
-    without.
-    """
-    if markers is None or not markers.time.size:
-        return ()
-    for name in known:
-        found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
-        places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
-        if len(places) == len(found):
-            return tuple(FootPath(s, markers.time, places[s, "heel"], places[s, "toe"]) for s in SIDES)
-    return ()
-
-
-def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
-    try:
-        return landmark(markers, read_marker_set(set_name), name)
-    except BiodanceError:
-        return None
-
-
-def _pelvis(markers: Markers | None, known: tuple[str, ...]) -> Array | None:
-    """Return the middle (T, 3) m of the front and back of the pelvis; None where no ``known`` set has them."""
-    for name in known if markers is not None else ():
-        assert markers is not None
-        right, left, back = (_landmark(markers, name, place) for place in ("right_asis", "left_asis", "mid_psis"))
-        if right is not None and left is not None and back is not None:
-            middle = ((right + left) / 2 + back) / 2
-            return middle if np.isfinite(middle).any() else None
-    return None
 
 
 def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
@@ -349,7 +219,7 @@ def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
 def _stands(foot: FootPath, time: Array) -> bool:
     """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
     drift = foot.drift(time)
-    off = np.linalg.norm(_between(foot.time, foot.velocity, time) - drift, axis=1)
+    off = np.linalg.norm(path_at(foot.time, foot.velocity, time) - drift, axis=1)
     known = np.isfinite(off)
     if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
         return False
@@ -364,7 +234,7 @@ def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:
     """
     with np.errstate(invalid="ignore"):
         near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
-        slow = np.linalg.norm(_between(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
+        slow = np.linalg.norm(path_at(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
         lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
     return bool((near & slow & (low < lowest + _LIFTED)).mean() >= 0.1)

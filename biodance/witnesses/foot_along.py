@@ -22,7 +22,7 @@ class FootAlong(Witness):
 
     name = "foot_along"
     sees = ("plate_position", "plate_crosstalk", "axis_error")
-    needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers."
+    needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
@@ -34,6 +34,7 @@ class FootAlong(Witness):
         part, found = step_course(seen, step), []
         if part is None:
             return []
+        counts = seen.foot(step.side).centred
         phases = {"middle": _MIDDLE} if step.beside else ALONG_PHASES
         for phase, (start, stop, share, sd, person, laboratory) in phases.items():
             norms = {
@@ -42,7 +43,9 @@ class FootAlong(Witness):
             }
             value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
             what, expected = f"{step.name}, {phase}", share * part.length
-            found.append(Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms))
+            found.append(
+                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, counts)
+            )
         return found
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array
 from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
@@ -16,7 +17,9 @@ _SHORTEST = 0.4
 
 
 class StandingForce(Witness):
-    """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N)."""
+    """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N), in which no zero can
+    be told from a plate that is not level.
+    """
 
     name = "standing_force"
     sees = ("body_mass", "plate_gain", "plate_offset")
@@ -38,9 +41,18 @@ class StandingForce(Witness):
         found = [Observation(self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms)]
         sd = _SWAY * weight / max(1.0, (total.time[-1] - total.time[0])) ** 0.5
         for axis, channel in enumerate(("Fx", "Fy")):
-            value = float(force[axis])
-            found.append(Observation(self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where))
+            value, own = float(force[axis]), {f"plate level along {'xy'[axis]}": _level(axis) * weight}
+            found.append(Observation(self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where, own))
         return tuple(found)
+
+
+def _level(axis: int) -> float:
+    """Return the share of the weight (one sd) that a usual laboratory puts into a horizontal channel in every trial
+    alike: its vertical and its plate lean about the other axis, and Fz leaks into the channel.
+    """
+    about, channel = "yx"[axis], ("Fx", "Fy")[axis]
+    lean = error_size("lab_tilt", about), error_size("plate_rotation", about)
+    return float(np.linalg.norm([*lean, error_size("plate_crosstalk", f"Fz->{channel}")]))
 
 
 def mean_force(force: Array) -> Array:

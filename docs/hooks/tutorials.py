@@ -4,6 +4,7 @@
 """
 
 import ast
+import os
 import shutil
 import subprocess
 import sys
@@ -79,7 +80,8 @@ def run(script: Path) -> None:
         return
     KEPT.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
-        done = subprocess.run([sys.executable, script], cwd=scratch, capture_output=True, text=True, check=True)
+        place = {**os.environ, "TMPDIR": scratch}  # where a figure without a name goes
+        done = subprocess.run([sys.executable, script], env=place, capture_output=True, text=True, check=True)
         shutil.move(Path(scratch) / f"{script.stem}.png", KEPT / f"{script.stem}.png")
     (KEPT / f"{script.stem}.txt").write_text(done.stdout)
 

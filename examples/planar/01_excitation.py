@@ -3,10 +3,11 @@
 Left from the paper's start (all joints move in proportion, W_b is singular), right from seeded via points. Joint
 ranges, masses and ends of the motions are assumed (see series.py); the dots are the values that the paper prints.
 
-python examples/planar/01_excitation.py [FIGURE.png]
+python examples/planar/01_excitation.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -49,4 +50,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "01_excitation.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/01_excitation.png"))

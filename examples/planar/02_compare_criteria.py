@@ -1,10 +1,11 @@
 """All excitation criteria on one body: each designs a motion, each judges all of them, and what would be known
 afterwards.
 
-python examples/planar/02_compare_criteria.py [FIGURE.png]
+python examples/planar/02_compare_criteria.py [FIGURE.png]      without a name the figure goes into the temporary folder
 """
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -38,4 +39,4 @@ def main(picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "02_compare_criteria.png"))
+    main(Path(sys.argv[1] if sys.argv[1:] else f"{tempfile.gettempdir()}/02_compare_criteria.png"))

@@ -5,22 +5,61 @@ stack of stadium solids over that of the mean person's: density and the place of
 between people. Its standard deviation: that of the mean of the tables, of the solid, of the tape.
 """
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.human.fractions import MAN, WOMAN, mean_fraction
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
 from biodance.body.inertia import RigidInertia
-from biodance.body.tables.anthropometry import read_table, row_numbers
+from biodance.body.tables.anthropometry import Reference, Sex, read_table, row_numbers
+from biodance.body.tables.choice import reference, studies
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import parts as table_parts
 from biodance.body.tables.error_sizes import error_size
-from biodance.body.tables.reference import Reference, Sex
+from biodance.body.tables.published import study_masses
 from biodance.errors import SessionRefused
 from biodance.lab.girths import legal_girths, usual_girths
 from biodance.records import Array, Subject
+
+WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")
+LIVING = ("adult", "older")
+_OWN_CUT = ("chen_2011", "ma_2011", "pavol_2002")
+
+
+def published_fractions(kind: str, who: Subject) -> list[float]:
+    """Return the fractions by all tables and studies of living adults of one sex; for the trunk only those that cut
+    the pelvis themselves (Zatsiorsky's data are de Leva's; Winter's fractions count once, as the man's).
+    """
+    living = [
+        name for name, group in studies(who.sex).items() if group in LIVING and name != "zatsiorsky_seluyanov_1979"
+    ]
+    own = [name for name in living if kind not in ("pelvis", "trunk_head") or name in _OWN_CUT]
+    masses = _studied(who.sex)
+    return [one.segments[kind].mass for one in published_people(who.sex)] + [masses[name][kind] for name in own]
+
+
+@functools.cache
+def published_people(sex: Sex) -> tuple[Reference, ...]:
+    """Return the reference people of the published tables for one sex (Winter's counts once, as the man's)."""
+    who = WOMAN if sex == "F" else MAN
+    tables = ("de_leva_1996", "dumas_2018", *(("winter_2009",) if sex == "M" else ()))
+    return tuple(reference(name, who) for name in tables)
+
+
+@functools.cache
+def _studied(sex: Sex) -> Mapping[str, dict[str, float]]:
+    """Return the mass fractions of every kind of segment by study of living adults."""
+    who = WOMAN if sex == "F" else MAN
+    return {name: study_masses(name, who) for name, group in studies(sex).items() if group in LIVING}
+
+
+def mean_fraction(kind: str, who: Subject) -> tuple[float, float]:
+    """Return the mean of the published fractions and its standard error, relative."""
+    found = published_fractions(kind, who)
+    return float(np.mean(found)), float(np.std(found, ddof=1) / np.mean(found) / np.sqrt(len(found)))
+
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
 

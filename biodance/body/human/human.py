@@ -8,11 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.feet import sole_corners, usual_outline
 from biodance.body.human.limits import joint_limits
-from biodance.body.human.opinions import body_opinions, told_by
-from biodance.body.human.prior import child_widening, com_sd, cut_at_joint, is_child, prior
-from biodance.body.human.skeleton import SEGMENTS, Skeleton, generic_skeleton, joint_tree, kind_of, side_of
+from biodance.body.human.opinions import body_opinions, sole_corners, told_by, usual_outline
+from biodance.body.human.prior import child_widening, com_sd, is_child, prior
+from biodance.body.human.skeleton import (
+    SEGMENTS,
+    Skeleton,
+    cut_at_joint,
+    generic_skeleton,
+    joint_tree,
+    kind_of,
+    side_of,
+)
 from biodance.body.parts import Foot, SegmentMarkers
 from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.choice import measured_whole, reference, studies, trunk_joint

@@ -12,6 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import Cut, with_axis, with_part
+from biodance.body.human.skeleton import kind_of
 from biodance.body.inertia import RigidInertia, inertial_parameters
 from biodance.body.parts import Joint
 from biodance.body.tables.anthropometry import read_table, row_numbers
@@ -184,3 +185,24 @@ def _ranged(body: Body) -> Body:
             joint = replace(joint, positive=row["positive"])
         joints.append(joint)
     return replace(body, joints=tuple(joints), limits=replace(body.limits, lower=lower, upper=upper))
+
+
+_ARMS = ("upper_arm", "forearm_hand", "hand")
+_TRUNK = ("trunk_head", "clavicle")
+
+
+def marker_groups(body: Body) -> tuple[str, ...]:
+    """Return the group of every marker of the body (K): "legs" (with the pelvis), "trunk", "arms" or "head".
+
+    The head's are those on a head of its own, or on the trunk above the neck.
+    """
+    places = neck_and_vertex(body)
+    neck = np.inf if places is None else float(places[0][1])
+    worn = zip(body.markers.segment, body.markers.position[:, 1], strict=True)
+    return tuple(_group(kind_of(body.links[s]), y > neck) for s, y in worn)
+
+
+def _group(kind: str, above_neck: bool) -> str:
+    if kind == "head" or (kind == "trunk_head" and above_neck):
+        return "head"
+    return "arms" if kind in _ARMS else "trunk" if kind in _TRUNK else "legs"

@@ -10,17 +10,25 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from biodance.body.human.fractions import MAN, WOMAN, published_fractions, published_people
+from biodance.body.human.girths import MAN, WOMAN, published_fractions, published_people
 from biodance.body.human.opinions import Opinion, body_opinions, primitives_of, told_by
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
-from biodance.body.inertia import TENSOR, RigidInertia, inertial_parameters, mirror_inertia, turn_inertia
-from biodance.body.tables.choice import measured_whole, reference
+from biodance.body.inertia import (
+    TENSOR,
+    RigidInertia,
+    inertial_parameters,
+    lump_from,
+    mirror_inertia,
+    parameter_jacobian,
+    turn_inertia,
+)
+from biodance.body.tables.anthropometry import Reference, proportion
+from biodance.body.tables.choice import measured_whole
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
 from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.published import regression, study_masses
-from biodance.body.tables.reference import Reference, proportion
 from biodance.records import Array, Sip, Subject
 
 _AXES = ("sagittal", "longitudinal", "transverse")
@@ -156,15 +164,7 @@ def _weigh(
         keep[:, row] -= column
     theta = theta + gain @ (np.concatenate([one.value for one in opinions]) - theta[where])
     theta[::10] *= total / theta[::10].sum()
-    return tuple(_lump(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
-
-
-def _lump(row: Array) -> RigidInertia:
-    """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `primitives_of`."""
-    inertia = np.zeros((3, 3))
-    for value, (i, j) in zip(row[4:], TENSOR, strict=True):
-        inertia[i, j] = inertia[j, i] = row[0] * value
-    return RigidInertia(float(row[0]), row[1:4], inertia)
+    return tuple(lump_from(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
 
 
 CHILD_AGE, CHILD_STATURE = 18.0, 1.50
@@ -189,7 +189,7 @@ def child_widening(subject: Subject) -> float:
 
 @functools.cache
 def _boys_widening() -> float:
-    adult, boy = reference("de_leva_1996", MAN), study_masses("jensen_1986_12y", MAN)
+    adult, boy = reference_of("de_leva_1996", MAN), study_masses("jensen_1986_12y", MAN)
     limbs = ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
     apart = np.array([boy[kind] / adult.segments[kind].mass - 1.0 for kind in limbs])
     spread = np.array([table_spread(kind).mass for kind in limbs])
@@ -220,14 +220,6 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
             lump = replace(lump, com=lump.com + np.array([ahead, 0.0, 0.0]))
         lumps.append(lump if side_of(segment) > 0 else mirror_inertia(lump))
     return tuple(lumps)
-
-
-def cut_at_joint(skeleton: Skeleton) -> Skeleton:
-    """Return the skeleton of which the table cuts pelvis from trunk at the joint: the trunk's matter goes along with
-    the joint, the pelvis reaches up to it.
-    """
-    pelvis = float(np.linalg.norm(skeleton.origins["trunk"]))
-    return replace(skeleton, cut={}, lengths={**skeleton.lengths, "pelvis": pelvis})
 
 
 def _upright_to(point: Array) -> Array:
@@ -303,17 +295,3 @@ def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
         for i, j in TENSOR
     ]
     return np.array([kind.mass * lump.mass, *(kind.com * length), *tensor])
-
-
-def parameter_jacobian(lump: RigidInertia) -> Array:
-    """Return d phi / d [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (10, 10) at a lump."""
-    mass, com = lump.mass, lump.com
-    out = np.zeros((10, 10))
-    out[:, 0] = inertial_parameters(lump) / mass
-    out[1:4, 1:4] = mass * np.eye(3)
-    for row, (i, j) in enumerate(TENSOR, start=4):
-        for k in range(3):
-            shift = 2 * com[k] * (i == j) - com[i] * (j == k) - com[j] * (i == k)
-            out[row, 1 + k] = mass * shift
-    out[4:, 4:] = mass * np.eye(6)
-    return out

@@ -19,8 +19,8 @@ from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
 from biodance.body.human.unseen import widen_unseen, with_unseen_parts
 from biodance.body.parts import Joint, SegmentMarkers
+from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
-from biodance.body.tables.reference import proportion
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.settings import STANDARD_GRAVITY, Hip
 

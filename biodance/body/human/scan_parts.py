@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.clip import clip_surface, cut_section
-from biodance.body.human.scan import Scan
+from biodance.body.human.scan import Scan, clip_surface, cut_section
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
 from biodance.body.inertia import RigidInertia, combine_inertias, turn_inertia
 from biodance.body.tables.anthropometry import read_table

@@ -1,13 +1,12 @@
 """The joint tree of the human from its sizes: where each joint sits and how its axes turn."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from biodance.body.parts import Joint
-from biodance.body.tables.anthropometry import read_table, row_numbers
-from biodance.body.tables.reference import KINDS, Reference, proportion
+from biodance.body.tables.anthropometry import KINDS, Reference, proportion, read_table, row_numbers
 from biodance.records import SIDES, Array, Subject
 
 SEGMENTS = (
@@ -101,3 +100,11 @@ def joint_tree(skeleton: Skeleton) -> tuple[Joint, ...]:
         if last:
             tip[row["child"]] = i
     return tuple(joints)
+
+
+def cut_at_joint(skeleton: Skeleton) -> Skeleton:
+    """Return the skeleton of which the table cuts pelvis from trunk at the joint: the trunk's matter goes along with
+    the joint, the pelvis reaches up to it.
+    """
+    pelvis = float(np.linalg.norm(skeleton.origins["trunk"]))
+    return replace(skeleton, cut={}, lengths={**skeleton.lengths, "pelvis": pelvis})

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from biodance.body.human.joint_centres import (
+from biodance.body.human.measures import (
+    Measures,
     chord,
     davis_hip,
     elbow,
@@ -15,7 +16,6 @@ from biodance.body.human.joint_centres import (
     unit,
     wrist,
 )
-from biodance.body.human.measures import Measures
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.joint_centres import harrington_hip, pelvis_frame, unit
+from biodance.body.human.measures import harrington_hip, pelvis_frame, unit
 from biodance.body.human.standing import StaticPosture
 from biodance.body.human.static_centres import SIGN, UP
 from biodance.body.tables.error_sizes import error_size

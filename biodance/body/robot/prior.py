@@ -4,8 +4,7 @@ come without any.
 
 import numpy as np
 
-from biodance.body.human.prior import parameter_jacobian
-from biodance.body.inertia import RigidInertia
+from biodance.body.inertia import RigidInertia, parameter_jacobian
 from biodance.records import Array
 
 RELATIVE_MASS_SD, RELATIVE_INERTIA_SD = 0.15, 0.30

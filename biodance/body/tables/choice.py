@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from biodance.body.inertia import RigidInertia, inertial_parameters, smallest_eigenvalues
+from biodance.body.tables.anthropometry import COUNT, KINDS, Reference, normalised_person
 from biodance.body.tables.de_leva import de_leva
 from biodance.body.tables.published import dumas, study, winter, zatsiorsky
-from biodance.body.tables.reference import COUNT, KINDS, Reference, normalised_person
 from biodance.body.tables.segment_data import FAMILY, SegmentTable, read_segment_table
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 from biodance.records import Array, Subject

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from biodance.body.inertia import RigidInertia, combine_inertias
-from biodance.body.tables.reference import Reference, Sex, normalised_person, proportion
+from biodance.body.tables.anthropometry import Reference, Sex, normalised_person, proportion
 from biodance.body.tables.segment_data import SegmentTable, read_segment_table
 from biodance.records import Subject
 

@@ -13,9 +13,8 @@ from itertools import islice
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.followable.naming import name_of
 from biodance.dance.followable.plain import other_ways
-from biodance.dance.followable.reach import DanceStep
+from biodance.dance.followable.reach import DanceStep, name_of
 from biodance.dance.followable.walk import Walk, walked_dance
 from biodance.dance.performers import PERFORMER_COUNT, Rehearsed, perform_with
 from biodance.dance.transitions.move import Move

@@ -1,7 +1,7 @@
 """Which known posture may follow on which: by what must be called, and by where the dance must go next.
 
 From the last posture others are within reach if at most so many instructions lead there and one or two parts of the
-body change, or if it is the mirror image. Whoever must change feet in so many steps (`steps_to`) is only asked for what
+body change, or if it is the mirror image. Whoever must change feet in so many steps (`leads`) is only asked for what
 can be undone until then: a trunk that is twisted and a heel that is up behind need one posture more before the foot
 is put down.
 """
@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 
 from biodance.dance.cues import MIRROR_CALL, instructions
 from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.vocabulary import Word, read_vocabulary, words_for
+from biodance.dance.followable.vocabulary import Word, read_vocabulary, singular, words_for
 from biodance.dance.problem.stance import Stance
 from biodance.dance.transitions.context import DesignContext
 from biodance.records import Array
 
 _PARTS = 2
 """Parts of the body that change at a time."""
-UNREACHED = 99
-"""Steps to feet that cannot be reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,8 @@ class Reach:
     work: DesignContext
     can: Callable[[DanceStep, DanceStep], bool]
     _catalogues: dict[str, Catalogue] = field(default_factory=dict)
-    _steps: dict[tuple[str, str], NDArray[np.intp]] = field(default_factory=dict)
+    _around: dict[tuple[str, int, int], NDArray[np.intp]] = field(default_factory=dict)
+    _going: dict[tuple[str, int, str], bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.words = read_vocabulary()
@@ -95,26 +94,35 @@ class Reach:
         said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
         return DanceStep(catalogue, s, said) if len(said) <= most else None
 
-    def steps_to(self, catalogue: Catalogue, goal: Catalogue) -> NDArray[np.intp]:
-        """Return how many steps (S,) lead from each posture of a catalogue to one of ``goal``, the arms at rest;
-        `UNREACHED` where none do.
+    def leads(self, catalogue: Catalogue, s: int, goal: Catalogue, steps: int) -> bool:
+        """Return whether posture ``s`` of a catalogue leads in so many ``steps`` at most to one of ``goal``, the arms
+        at rest.
         """
-        key = feet_key(catalogue.stance), feet_key(goal.stance)
-        if key not in self._steps:
-            still, steps = catalogue.arms_at_rest, dict[int, int]()
-            rows = np.unique(still)
-            reached = [s for s in rows if self._follows(s, catalogue, goal, np.unique(goal.arms_at_rest))]
-            while reached:
-                steps |= dict.fromkeys(reached, 1 + max(steps.values(), default=0))
-                some = np.array([s for s in rows if s in reached])
-                reached = [s for s in rows if s not in steps and self._follows(s, catalogue, catalogue, some)]
-            self._steps[key] = np.array([steps.get(s, UNREACHED) for s in still])
-        return self._steps[key]
+        return any(self._goes(int(row), catalogue, goal) for row in self._within(catalogue, s, steps - 1))
 
-    def _follows(self, s: int, catalogue: Catalogue, goal: Catalogue, some: NDArray[np.intp]) -> bool:
-        last = DanceStep(catalogue, s, ())
-        steps = (self._called(last, goal, t) for t in np.intersect1d(_near(last, goal), some))
-        return any(step is not None and (goal is catalogue or self.can(last, step)) for step in steps)
+    def _within(self, catalogue: Catalogue, s: int, steps: int) -> NDArray[np.intp]:
+        """Return the postures that are so many ``steps`` at most from ``s``, on the same feet, the arms at rest."""
+        key = feet_key(catalogue.stance), int(catalogue.arms_at_rest[s]), steps
+        if key not in self._around:
+            found = np.array([key[1]])
+            if steps:
+                rows, near = np.unique(catalogue.arms_at_rest), self._within(catalogue, s, steps - 1)
+                found = np.array([t for t in rows if t in near or any(self._steps(int(k), catalogue, t) for k in near)])
+            self._around[key] = found
+        return self._around[key]
+
+    def _steps(self, s: int, catalogue: Catalogue, t: int) -> bool:
+        return self.link(DanceStep(catalogue, s, ()), catalogue, t) is not None
+
+    def _goes(self, s: int, catalogue: Catalogue, goal: Catalogue) -> bool:
+        """Return whether a posture of ``goal``, the arms at rest, can follow on posture ``s`` of a catalogue."""
+        key = feet_key(catalogue.stance), s, feet_key(goal.stance)
+        if key not in self._going:
+            last = DanceStep(catalogue, s, ())
+            near = np.intersect1d(_near(last, goal), np.unique(goal.arms_at_rest))
+            steps = (self._called(last, goal, int(t)) for t in near)
+            self._going[key] = any(step is not None and self.can(last, step) for step in steps)
+        return self._going[key]
 
 
 def _near(last: DanceStep | None, catalogue: Catalogue) -> list[int]:
@@ -133,3 +141,27 @@ def _near(last: DanceStep | None, catalogue: Catalogue) -> list[int]:
 def feet_key(stance: Stance) -> str:
     """Return what a foot configuration is known by."""
     return f"{stance.name} {stance.planted} {stance.over} {stance.ankle.tobytes().hex()}"
+
+
+def name_of(step: DanceStep) -> str:
+    """Return what a posture is called: the words of all parts that do not rest; of arms that do the same, once."""
+    words = step.words
+    out = []
+    for part, word in words.items():
+        if part.endswith("_arm") or part.endswith("_hanging"):
+            continue
+        if not word.rest or part.endswith("_lifted"):
+            out.append(word.text)
+    for kind in ("arm", "hanging"):
+        pair = [words[f"{side}_{kind}"] for side in ("right", "left") if f"{side}_{kind}" in words]
+        out += _pair_words(pair)
+    return ", ".join(out) or ("sit" if "right_hanging" in words else "stand")
+
+
+def _pair_words(pair: list[Word]) -> list[str]:
+    if not pair or all(word.rest for word in pair):
+        return []
+    if pair[0].key == pair[1].key:
+        return [pair[0].text.format("both")]
+    sides = zip(("the right", "the left"), pair, strict=True)
+    return [singular(word.text.format(side)) for side, word in sides if not word.rest]

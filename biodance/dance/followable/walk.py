@@ -7,18 +7,17 @@ also for people who copy it imprecisely (`catalogue`).
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise
 
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.followable.naming import name_of
 from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
-from biodance.dance.followable.reach import UNREACHED, DanceStep, Reach, feet_key
+from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
 from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.selection import learned
+from biodance.dance.postures.ordering import learned
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import DesignContext
@@ -119,7 +118,7 @@ class Walk:
             if feet_key(pair[0]) == feet_key(pair[1]):
                 continue
             was, now = (self.reach.catalogue(stance) for stance in pair)
-            if self.reach.steps_to(was, now).min() >= UNREACHED:
+            if not any(self.reach.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
@@ -174,30 +173,32 @@ class Walk:
         stance, catalogue = stances[len(steps)], self.reach.catalogue(stances[len(steps)])
         last = steps[-1] if steps else None
         used, late = {step.s for step in steps if step.catalogue is catalogue}, self._late(len(steps), stances)
-        found = [step for step in self.reach.after(last, catalogue) if step.s not in used and not late[step.s]]
+        found = [step for step in self.reach.after(last, catalogue) if step.s not in used]
         if not found:
             return
         if stance.over is not None:
-            yield from sorted(found, key=lambda step: (len(step.said), step.s))
+            least = sorted(found, key=lambda step: (len(step.said), step.s))
+            yield from (step for step in least if not late(step))
             return
         cost = self._seconds(found)
         told = self._gains(belief, self._white(catalogue.standing[[step.s for step in found]]), cost)
-        order = np.argsort(-told, kind="stable")
-        first = [found[k] for k in order[:_LOOKED_AT]]
+        on = (found[k] for k in np.argsort(-told, kind="stable") if not late(found[k]))
+        first = list(islice(on, _LOOKED_AT))
         worth = [
             float(np.sum((self.scale @ learned(belief, self._told(last, step)).T) ** 2)) / seconds
             for step, seconds in zip(first, self._seconds(first), strict=True)
         ]
         yield from (first[k] for k in np.argsort(-np.array(worth), kind="stable"))
-        yield from (found[k] for k in order[_LOOKED_AT:])
+        yield from on
 
-    def _late(self, number: int, stances: tuple[Stance, ...]) -> Array:
-        """Return which postures (S,) in place ``number`` cannot be undone before the feet must change."""
-        catalogue = self.reach.catalogue(stances[number])
-        left = next((k for k, one in enumerate(stances[number:]) if feet_key(one) != feet_key(stances[number])), 0)
+    def _late(self, number: int, stances: tuple[Stance, ...]) -> Callable[[DanceStep], bool]:
+        """Return what says whether a posture in place ``number`` cannot be undone before the feet must change."""
+        feet = feet_key(stances[number])
+        left = next((k for k, one in enumerate(stances[number:]) if feet_key(one) != feet), 0)
         if not left or np.isinf(self.work.plan.instructions):
-            return np.zeros(len(catalogue.index), dtype=bool)
-        return np.asarray(self.reach.steps_to(catalogue, self.reach.catalogue(stances[number + left])) > left)
+            return lambda step: False
+        goal = self.reach.catalogue(stances[number + left])
+        return lambda step: not self.reach.leads(step.catalogue, step.s, goal, left)
 
     def _seconds(self, steps: list[DanceStep]) -> Array:
         """Return what each step costs, s."""

@@ -1,7 +1,7 @@
 """What a limit demands of people who copy a dance imprecisely, and a copy of it as such a limit sees it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -64,7 +64,7 @@ class Copied:
         """
         point, out = self.zero_moment_point, np.full(len(self.q), np.inf)
         for k in np.unique(self.on):
-            normals, offsets = replace(self.stances[k], over=None).reduced(share)
+            normals, offsets = self.stances[k].whole.reduced(share)
             out[self.on == k] = (point[self.on == k] @ normals.T + offsets).min(axis=1)
         return out
 

@@ -53,7 +53,7 @@ class Balance(Limit):
 
     def for_imprecise(self) -> ForImprecise:
         """Nobody leaves the whole support."""
-        return ForImprecise(_left, 0.0, "balance_m", "kept the weight {} cm inside the feet")
+        return ForImprecise(_left, 0.0, "balance_m", "kept the weight {} cm inside the edge of feet or stool")
 
 
 LIMIT = Balance

@@ -108,7 +108,11 @@ def _boxes(state: State, near: float) -> Margins:
 
 def _on(ends: Array, share: Array) -> Array:
     """Return the points (..., 3) at ``share`` (...) of the way between two ends (..., 2, 3)."""
-    return np.asarray(ends[..., 0, :] + share[..., None] * (ends[..., 1, :] - ends[..., 0, :]))
+    return np.asarray(ends[..., 0, :] + share[..., None] * _along(ends))
+
+
+def _along(ends: Array) -> Array:
+    return np.asarray(ends[..., 1, :] - ends[..., 0, :])
 
 
 def outside(point: Array, half: Array) -> tuple[Array, Array]:
@@ -126,9 +130,15 @@ def outside(point: Array, half: Array) -> tuple[Array, Array]:
 
 def _depth(over: Array) -> Array:
     """Return the signed distance (...) from a box of points that lie ``over`` (..., 3) its three pairs of sides."""
-    x, y, z = (np.maximum(over[..., k], 0.0) for k in range(3))
+    return _depth_of(*np.moveaxis(over, -1, 0))
+
+
+def _depth_of(x: Array, y: Array, z: Array) -> Array:
+    """Return the same of what lies over each pair of sides (...)."""
+    inner = np.maximum(np.maximum(x, y), z)
+    x, y, z = (np.maximum(part, 0.0) for part in (x, y, z))
     beyond = np.sqrt(x * x + y * y + z * z)
-    return np.where(beyond > 0, beyond, over.max(axis=-1))
+    return np.where(beyond > 0, beyond, inner)
 
 
 def deepest(ends: Array, half: Array) -> Array:
@@ -139,9 +149,11 @@ def deepest(ends: Array, half: Array) -> Array:
     enclose the minimum.
     """
     start, width = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
+    first, along = (np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in (ends[..., 0, :], _along(ends)))
     for _ in range(_ROUNDS):
         share = start + width * SAMPLES[:, None, None]
-        best = np.argmin(_depth(np.abs(_on(ends[None], share)) - half), axis=0)
+        over = [np.abs(first[k] + share * along[k]) - half[..., k] for k in range(3)]  # far faster than (..., 3)
+        best = np.argmin(_depth_of(*over), axis=0)
         start = np.clip(start + width * (best - 1) / (len(SAMPLES) - 1), 0.0, 1.0)
         width = np.minimum(width * 2 / (len(SAMPLES) - 1), 1.0 - start)
     return start + width / 2
@@ -158,37 +170,45 @@ def surface_distances(body: Body, pose: Poses, *, near: float = _CLOSE) -> tuple
     """
     solids = Solids.of(body)
     ends = np.stack([pose.points(list(range(len(body.segments))), solids.axis[:, k]) for k in (0, 1)], axis=2)
-    limbs, boxes = zip(solids.first, solids.second, strict=True), zip(solids.limb, solids.box, strict=True)
-    out, names = [], []
-    for i, j in limbs:
-        out.append(_limbs_apart(ends[:, i], ends[:, j], near) - solids.radius[i] - solids.radius[j])
-        names.append(f"{body.segments[i]} - {body.segments[j]}")
-    for i, j in boxes:
-        low, high = body.boxes[j]
-        local = (ends[:, i] - pose.position[:, j, None]) @ pose.rotation[:, j] - (low + high) / 2
-        out.append(_box_apart(local, (high - low) / 2, near) - solids.radius[i])
-        names.append(f"{body.segments[i]} - {body.segments[j]}")
-    return np.stack(out, axis=1), tuple(names)
+    low, high = np.swapaxes(body.boxes[solids.box], 0, 1)
+    turn, middle = pose.rotation[:, solids.box], (low + high) / 2
+    local = (ends[:, solids.limb] - pose.position[:, solids.box, None]) @ turn - middle[:, None]
+    apart = [
+        _limbs_apart(ends[:, solids.first], ends[:, solids.second], near) - solids.radius[solids.second],
+        _boxes_apart(local, (high - low) / 2, near),
+    ]
+    pairs = list(zip([*solids.first, *solids.limb], [*solids.second, *solids.box], strict=True))
+    names = tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in pairs)
+    return np.concatenate(apart, axis=1) - solids.radius[[i for i, _ in pairs]], names
 
 
 def _limbs_apart(a: Array, b: Array, enough: float) -> Array:
-    """Return the distances (T,) of lines ``a`` from lines ``b`` (T, 2, 3)."""
-    reach = sum(np.linalg.norm(line[:, 1] - line[:, 0], axis=1) / 2 for line in (a, b))
-    out = np.asarray(np.linalg.norm(a.mean(axis=1) - b.mean(axis=1), axis=1) - reach)
+    """Return the distances (T, K) of lines ``a`` from lines ``b`` (T, K, 2, 3)."""
+    out = _length(_middle(a) - _middle(b)) - _length(_along(a)) / 2 - _length(_along(b)) / 2
     near = out < enough
-    s, t = nearest(a[near], b[near])
-    out[near] = np.linalg.norm(_on(a[near], s) - _on(b[near], t), axis=1)
+    a, b = a[near], b[near]
+    s, t = nearest(a, b)
+    out[near] = _length(_on(a, s) - _on(b, t))
     return out
 
 
-def _box_apart(line: Array, half: Array, enough: float) -> Array:
-    """Return the signed distances (T,) of lines (T, 2, 3) from a box about the origin with half sides ``half`` (3,)."""
-    reach = np.linalg.norm(line[:, 1] - line[:, 0], axis=1) / 2
-    out = np.asarray(_depth(np.abs(line.mean(axis=1)) - half) - reach)
+def _boxes_apart(line: Array, half: Array, enough: float) -> Array:
+    """Return the signed distances (T, K) of lines (T, K, 2, 3) from boxes about the origin with half sides ``half`` (K,
+    3).
+    """
+    out = _depth(np.abs(_middle(line)) - half) - _length(_along(line)) / 2
     near = out < enough
-    share = deepest(line[near][:, None], half[None])
-    out[near] = _depth(np.abs(_on(line[near][:, None], share)) - half)[:, 0]
+    line, half = line[near], np.broadcast_to(half, (*out.shape, 3))[near]
+    out[near] = _depth(np.abs(_on(line, deepest(line[None], half)[0])) - half)
     return out
+
+
+def _length(way: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", way, way)))
+
+
+def _middle(ends: Array) -> Array:
+    return np.asarray(ends[..., 0, :] + ends[..., 1, :]) / 2
 
 
 def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:

@@ -105,6 +105,11 @@ class Stance(Sendable):
         return normals, -np.einsum("ij,ij->i", normals, corners)
 
     @cached_property
+    def whole(self) -> "Stance":
+        """The same feet, wherever above them the weight is."""
+        return self if self.over is None else replace(self, over=None)
+
+    @cached_property
     def sole_centres(self) -> Array:
         """(2, 3) m middle of each sole on the ground."""
         return self.soles.mean(axis=1)

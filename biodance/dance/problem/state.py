@@ -9,7 +9,7 @@ spatial velocity and acceleration of link k, x the spatial cross product. For li
 (derivation: docs/derivations.md section 12). Forces come from pinocchio's RNEA derivatives.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,7 @@ _Index = list[int] | NDArray[np.intp]
 @dataclass(frozen=True, eq=False)
 class State:
     """``x``, ``v``, ``a`` (T, n) coordinates of the chain and their derivatives; ``stance`` the feet, the same in all
-    samples.
+    samples. All slopes are zero where it is not ``sloped``: a motion that is only judged needs none.
     """
 
     chain: Chain
@@ -35,6 +35,7 @@ class State:
     x: Array
     v: Array
     a: Array
+    sloped: bool = True
 
     @cached_property
     def _frames(self) -> tuple[Array, Array, Array]:
@@ -85,6 +86,8 @@ class State:
         """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T,
         K, 3).
         """
+        if not self.sloped:
+            return np.zeros((*place.shape[:2], self.chain.size))
         wrench = wrench_of_force(direction, place)
         return (wrench @ np.swapaxes(self.twists, 1, 2)) * self.chain.ancestors[np.array(self.chain.carriers)[segment]]
 
@@ -98,8 +101,11 @@ class State:
     def _dynamics(self) -> tuple[Array, Array]:
         pin = load_pinocchio()
         model, data, n = self.chain.model, self.chain.data, self.chain.size
-        force, slopes = np.empty((len(self.x), n)), np.empty((3, len(self.x), n, n))
+        force, slopes = np.empty((len(self.x), n)), np.zeros((3, len(self.x), n, n))
         for t, (x, v, a) in enumerate(zip(self.x, self.v, self.a, strict=True)):
+            if not self.sloped:
+                force[t] = pin.rnea(model, data, x, v, a)
+                continue
             slopes[0, t], slopes[1, t], slopes[2, t] = pin.computeRNEADerivatives(model, data, x, v, a)
             force[t] = data.tau
         return force, slopes
@@ -122,6 +128,8 @@ class State:
     @cached_property
     def wrench_slopes(self) -> Array:
         """(3, T, 6, n) derivative of the wrench with respect to x, v, a."""
+        if not self.sloped:
+            return self._dynamics[1][:, :, :ROOT]
         inner = self._dynamics[1][:, :, :ROOT].copy()
         inner[0, :, :, :ROOT] -= self.moved_twists(list(range(ROOT)), self.wrench)[:, :, :ROOT]
         return np.asarray(np.linalg.solve(self.twists[None, :, :ROOT], inner))
@@ -138,9 +146,16 @@ class State:
     def alone(self) -> "State":
         """The same motion with everything on the foot over which the weight is."""
         assert self.stance.over is not None
-        other = State(self.chain, self.stance.on(self.stance.over), self.x, self.v, self.a)
+        other = replace(self, stance=self.stance.on(self.stance.over))
         shared = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes")
         other.__dict__.update({name: self.__dict__[name] for name in shared if name in self.__dict__})
+        return other
+
+    @property
+    def judged(self) -> "State":
+        """The same motion without slopes."""
+        other = replace(self, sloped=False)
+        other.__dict__.update({name: self.__dict__[name] for name in ("_frames",) if name in self.__dict__})
         return other
 
     @cached_property
@@ -162,6 +177,8 @@ class State:
     @cached_property
     def torque_slopes(self) -> Array:
         """(3, T, n - 6, n) derivative of the joint torques with respect to x, v, a."""
+        if not self.sloped:
+            return self._dynamics[1][:, :, ROOT:]
         slopes = self._dynamics[1].copy()
         for side in self.stance.planted:
             columns = self.chain.leg_columns[side]

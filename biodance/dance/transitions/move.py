@@ -225,7 +225,7 @@ def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     """
     time = task.grid(CHECK)
     problem = task.problem(via, [], time, reserve=BETWEEN, objective=_nothing)
-    found = Evaluation(problem, problem.state(np.empty(0)))
+    found = Evaluation(problem, problem.state(np.empty(0)).judged)
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)
     dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])

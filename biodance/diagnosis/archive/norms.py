@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.diagnosis.archive.pooling import pool
+from biodance.diagnosis.archive.conditions import pool
 from biodance.records import Array, Trial
 from biodance.uncertainty.session_noise import camera_noise, plate_noise
 from biodance.uncertainty.tolerances import InstrumentNoise

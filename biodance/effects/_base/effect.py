@@ -55,6 +55,10 @@ class Effect:
     """Whether it is named only alone: several at once (cross-talks of a plate that lies elsewhere) are what a cause
     looks like that nobody described.
     """
+    screened_at: ClassVar[tuple[float, ...]] = ()
+    """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
+    from proportion to its size.
+    """
     advice: ClassVar[str] = ""
     """What to do in the laboratory to settle it, and how it is mended."""
 

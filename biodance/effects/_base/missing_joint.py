@@ -84,6 +84,10 @@ class MissingJoint(Effect, ABC):
         angle = self.shown(*cases)[0]
         return np.array([angle, theta.sum() - angle])
 
+    def possible(self, theta: Array) -> bool:
+        """Return whether markers and wrench show a movement the same way: the joint turns by the sum of both."""
+        return bool(theta.sum() > 0)
+
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked with the body that has the joint."""
         body = self.loosened(case)

@@ -8,7 +8,7 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.plain_text import refuse_special
 from biodance.records import Array
-from biodance.records.encoders import Encoders
+from biodance.records.motion import Encoders
 
 ENCODER_TABLES = (".csv", ".parquet")
 _TIMES = ("time", "t", "time_s", "timestamp")

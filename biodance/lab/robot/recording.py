@@ -17,7 +17,7 @@ from biodance.lab.read import read_head, read_trial, sniffed
 from biodance.lab.robot.encoders import ENCODER_TABLES, column_names, heading, read_encoders
 from biodance.library import read_toml
 from biodance.records import ROLES, Markers, Role, Wrench
-from biodance.records.encoders import Encoders
+from biodance.records.motion import Encoders
 from biodance.spatial import wrench_about_point
 
 _FILE = "recording.toml"

@@ -1,13 +1,179 @@
 """What lies in the archive of a laboratory: session folders, and tables that tell whose recordings lie beside them."""
 
+import csv
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
 
-from biodance.errors import BiodanceError, SessionRefused
+import numpy as np
+
+from biodance.errors import BiodanceError, FileRefused, SessionRefused
+from biodance.lab.plain_text import cells, parse_number, read_bytes, read_text, sha256
+from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
+from biodance.lab.readers import extensions
 from biodance.lab.session.file import read_session_file
-from biodance.lab.session.index import index_of
 from biodance.lab.session.recordings import recordings_in
+from biodance.records import CHANNELS, Array, Plate, Source, Trial, Wrench
+
+NAMES = ("trials.csv", "recordings.csv", "index.csv")
+"""Files that are looked for."""
+_TRIAL = ("trial", "recording", "file", "filename")
+_PERSON = ("person", "subject", "participant", "patient", "subject_id", "id")
+_DATE = ("date", "datetime", "day", "recorded")
+_MASS = ("mass_kg", "weight_kg", "body_mass_kg", "mass", "weight")
+_VISIT = ("visit", "session")
+_KINDS = 6
+"""Different values up to which a column names conditions."""
+_CHANNEL = re.compile(r"\s*\"?(time|t|[FM][xyz])\s*[\[(]?\s*([\w·.]*)\s*[\])]?", flags=re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class IndexedTrial:
+    """One row: the ``path`` of its recording, ``person``, ``visit``, ``date`` as written ("" = not said), declared
+    ``mass`` kg (NaN = not said), ``conditions``.
+    """
+
+    path: Path
+    person: str
+    visit: str
+    date: str
+    mass: float
+    conditions: Mapping[str, str] = field(default_factory=dict)
+
+
+def index_of(folder: Path) -> Path | None:
+    """Return the table of a folder, None without one: a file of a known name with columns for trial and person."""
+    for name in NAMES:
+        path = folder / name
+        if path.is_file():
+            header = {cell.strip().lower() for cell in _rows(path)[0]}
+            if header & set(_TRIAL) and header & set(_PERSON):
+                return path
+    return None
+
+
+def read_index(path: Path) -> tuple[IndexedTrial, ...]:
+    """Return the rows of a table in their order; rows whose recording is not there are left out.
+
+    Raises
+    ------
+    FileRefused
+        It is no table, lacks a column, or no recording that it names is there.
+    """
+    header, *rows = _rows(path)
+    names = [cell.strip().lower() for cell in header]
+    table = [dict(zip(names, (cell.strip() for cell in row), strict=False)) for row in rows if any(row)]
+    found = {kind: next((n for n in some if n in names), "") for kind, some in _COLUMNS.items()}
+    trials = []
+    for row in table:
+        recording = _recording(path.parent, row.get(found["trial"], ""))
+        if recording is None:
+            continue
+        person, said = row.get(found["person"], ""), row.get(found["date"], "")
+        visit = row.get(found["visit"], "") or " ".join(filter(None, (person, said[:16])))
+        mass = row.get(found["mass"], "")
+        trials.append((IndexedTrial(recording, person, visit, said, _number(mass)), row))
+    if not trials:
+        raise FileRefused(
+            f"{path}: names no recording that lies beside it. Check the column {found['trial'] or 'trial'}."
+        )
+    differing = _conditions(trials, [name for name in names if name not in found.values()])
+    return tuple(
+        IndexedTrial(one.path, one.person, one.visit, one.date, one.mass, {name: row[name] for name in differing})
+        for one, row in trials
+    )
+
+
+_COLUMNS = {"trial": _TRIAL, "person": _PERSON, "date": _DATE, "mass": _MASS, "visit": _VISIT}
+
+
+def _rows(path: Path) -> list[list[str]]:
+    rows = list(csv.reader(read_text(path).splitlines()))
+    return rows or [[]]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def _recording(folder: Path, name: str) -> Path | None:
+    """Return the recording that a table calls ``name``, with or without its extension; None if it is not there."""
+    if not name or Path(name).name != name:
+        return None
+    return next((path for ending in ("", *extensions()) if (path := folder / f"{name}{ending}").is_file()), None)
+
+
+def _conditions(trials: list[tuple[IndexedTrial, dict[str, str]]], names: list[str]) -> list[str]:
+    """Return the columns that name kinds of trial: few values, and different ones within a visit."""
+    chosen = []
+    for name in names:
+        values = {row.get(name, "") for _, row in trials}
+        visits: dict[str, set[str]] = {}
+        for one, row in trials:
+            visits.setdefault(one.visit, set()).add(row.get(name, ""))
+        if 1 < len(values) <= _KINDS and any(len(some) > 1 for some in visits.values()):
+            chosen.append(name)
+    return chosen
+
+
+def read_plate_text(path: Path) -> Trial:
+    """Return a recording of one plate in its own axes, turned so that a load pushes the person up; its corners, which
+    the text does not tell, are NaN.
+
+    Raises
+    ------
+    FileRefused
+        The header does not name six channels with units that are known, or a cell is no number.
+    """
+    lines = [line for line in read_text(path).splitlines() if line.strip()]
+    columns: dict[str, tuple[int, float]] = {}
+    for i, cell in enumerate(_cells(lines[0])):
+        name = _CHANNEL.fullmatch(cell)
+        if name:
+            key = "time" if name[1].lower() in ("time", "t") else name[1].capitalize()
+            columns.setdefault(key, (i, _factor(key, name[2], path)))
+    if lacking := [name for name in ("time", *CHANNELS) if name not in columns]:
+        raise FileRefused(
+            f"{path}: its header does not name {', '.join(lacking)}. Write a first line such as Time[s], Fx[N], Fy[N], "
+            f"Fz[N], Mx[Nm], My[Nm], Mz[Nm]."
+        )
+    raw = np.array([_values(line, path, number) for number, line in enumerate(lines[1:], start=2)])
+    time, *value = (raw[:, i] * factor for i, factor in (columns[name] for name in ("time", *CHANNELS)))
+    plate = _plate(np.asarray(time), np.column_stack(value))
+    return Trial(
+        path.stem, "fit", None, (plate,), Source(path, sha256(read_bytes(path)), "text"), history=plate.decisions
+    )
+
+
+def _plate(time: Array, value: Array) -> Plate:
+    sign = -1.0 if value[:, 2].mean() < 0 else 1.0
+    said = "Signs as written" if sign > 0 else "All signs turned, so that a load pushes the person up"
+    how = f"{said}; the table does not tell where the plate lies: axes and origin are the plate's own."
+    return Plate("plate1", 0, np.full((4, 3), np.nan), Wrench(time, sign * value), (how,))
+
+
+def _cells(line: str) -> list[str]:
+    return cells(line) if "," not in line and ";" not in line else [cell.strip() for cell in re.split("[,;]", line)]
+
+
+def _values(line: str, path: Path, number: int) -> list[float]:
+    return [parse_number(cell, f"{path}, line {number}") for cell in _cells(line)]
+
+
+def _factor(channel: str, unit: str, path: Path) -> float:
+    """Return what a channel's numbers are multiplied with: to s, N, N·m."""
+    legal = {"s": 1.0, "ms": 1e-3} if channel == "time" else FORCE if channel[0] == "F" else MOMENT
+    usual = {"t": "s", "F": "N", "M": "Nm"}[channel[0]]
+    try:
+        return float(legal[unit or usual] if channel == "time" else legal[plain_unit(unit or usual)])
+    except KeyError:
+        raise FileRefused(f"{path}: the unit {unit!r} of {channel} is not known. Legal: {', '.join(legal)}.") from None
+
 
 _PART_FOLDERS = re.compile(
     r"static|straight|turn|cal|dynamic|trials?|fit|validat|squat|walk|movement|recordings?|markerdata|forcedata|id$",
@@ -19,7 +185,7 @@ _IN_NAME = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]
 
 
 def archive_folders(archive: str | Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
-    """Return the session folders of an archive at any depth, and the tables (`biodance.lab.session.index`) of folders
+    """Return the session folders of an archive at any depth, and the tables (`biodance.lab.session.archive`) of folders
     whose recordings say nothing by themselves, both sorted.
 
     A folder with recordings, or with parts such as ``static`` and ``dynamic`` that hold them, is a session.

@@ -10,10 +10,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.contact.belts import belts
 from biodance.motion.contact.footing import (
     Footing,
     Surfaces,
@@ -21,16 +19,58 @@ from biodance.motion.contact.footing import (
     dilate,
     find_surfaces,
     footing,
+    inside,
     resting,
     speeds,
 )
 from biodance.motion.contact.soles import Soles
 from biodance.motion.contact.support import carried_elsewhere, flight
 from biodance.motion.dynamics import distribute
-from biodance.records import SIDES, Array, Trial, Wrench
+from biodance.records import SIDES, Array, Mask, Trial, Wrench
 from biodance.settings import ContactRules
 
-_Mask = NDArray[np.bool_]
+_SLOWEST = 0.2
+"""m/s: a slower belt is none; feet creep that much in standing and at the edges of stance."""
+_RIGID = 0.25
+"""m/s: a sole whose points move more evenly than this lies flat on something."""
+_LOW = 0.03
+"""m over its lowest height in which a sole stands."""
+_EVEN = 0.15
+"""m/s around the median in which most flat soles move on a belt of constant speed."""
+_MOST = 0.6
+_FEWEST = 10
+"""Frames of flat soles that tell a belt."""
+
+
+def belts(trial: Trial, soles: Soles, load: Mask) -> tuple[Array, tuple[str, ...]]:
+    """Return the velocity (P, 3) m/s of what the feet stand on, per plate, and a sentence for each belt; zero where it
+    does not move.
+
+    ``load`` (T, P) True where a plate is loaded. A belt is what nearly all flat, low soles on a loaded plate move with;
+    its speed is taken as constant.
+    """
+    found, notes = np.zeros((len(trial.plates), 3)), []
+    if soles.time.size < _FEWEST:
+        return found, ()
+    velocity = np.gradient(soles.outline, soles.time, axis=0)
+    spread = np.linalg.norm(velocity - velocity.mean(axis=2, keepdims=True), axis=-1).max(axis=2)
+    height = soles.outline[..., 2].mean(axis=2)
+    flat = (spread < _RIGID) & (height < np.nanmin(height, axis=0, initial=np.inf) + _LOW)
+    for index, plate in enumerate(trial.plates):
+        over = inside(plate, soles.centre) > 0
+        here = flat & over & load[:, index, None]
+        moving = velocity.mean(axis=2)[here]
+        if len(moving) < _FEWEST:
+            continue
+        middle = np.median(moving, axis=0)
+        same = np.linalg.norm(moving - middle, axis=1) < _EVEN
+        if np.linalg.norm(middle) > _SLOWEST and same.mean() >= _MOST:
+            found[index] = moving[same].mean(axis=0)
+            notes.append(
+                f"The soles on {plate.name} move with it at {np.linalg.norm(found[index]):.2f} m/s: a belt; contact is "
+                f"judged by the speed relative to it."
+            )
+    return found, tuple(notes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +85,12 @@ class Contact:
     """
 
     time: Array
-    touching: _Mask
-    on_plate: _Mask
-    measured: _Mask
+    touching: Mask
+    on_plate: Mask
+    measured: Mask
     cop_outside: Array
     notes: tuple[str, ...]
-    told: _Mask
+    told: Mask
 
 
 def ground_contact(
@@ -108,7 +148,7 @@ def ground_contact(
     return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told)
 
 
-def _told(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Mask) -> _Mask:
+def _told(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> Mask:
     """Return (T, 2) where a foot is off the ground, or stands wholly over plates that the other foot is not on."""
     shared = np.any(np.all(place.on_plate, axis=1), axis=1)
     silent = np.any(place.on_plate & rests[..., None] & ~load[:, None], axis=2)
@@ -117,7 +157,7 @@ def _told(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Ma
     return np.asarray(known[:, None] & ~place.unseen & (~touching | place.covered) & ~silent)
 
 
-def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRules) -> _Mask:
+def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRules) -> Mask:
     """Return (T, 2) where a foot may touch: low and slow, or not seen, widened in time."""
     height = soles.outline[..., 2] - surfaces.offset
     near = np.abs(height[..., None] - np.array(surfaces.levels)).min(axis=-1) < rules.height
@@ -128,9 +168,9 @@ def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRule
     return dilate(found, frames) | unseen
 
 
-def _faults(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _Mask) -> list[tuple[str, _Mask]]:
+def _faults(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> list[tuple[str, Mask]]:
     """Return every reason why frames are not fully measured, with its frames (T,)."""
-    faults: list[tuple[str, _Mask]] = [
+    faults: list[tuple[str, Mask]] = [
         ("no plate is loaded", ~load.any(axis=1) & ~flight(trial, touching, load)),
         ("a plate's force is unknown", np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))),
     ]
@@ -161,7 +201,7 @@ def _faults(trial: Trial, place: Footing, touching: _Mask, rests: _Mask, load: _
     return faults
 
 
-def _notes(measured: _Mask, faults: list[tuple[str, _Mask]]) -> tuple[str, ...]:
+def _notes(measured: Mask, faults: list[tuple[str, Mask]]) -> tuple[str, ...]:
     counts = Counter({text: int(mask.sum()) for text, mask in faults if mask.any()})
     first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
     return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
@@ -178,7 +218,7 @@ def _unplaced(trial: Trial) -> tuple[str, ...]:
     )
 
 
-def _cop_notes(trial: Trial, outside: Array, measured: _Mask, rules: ContactRules) -> tuple[str, ...]:
+def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules) -> tuple[str, ...]:
     """Return a sentence for every plate whose centre of pressure lies outside the soles on it, as a median over the
     measured frames.
     """

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.motion.contact.soles import Soles
-from biodance.records import SIDES, Array, Plate, Trial, runs
+from biodance.records import SIDES, Array, Mask, Plate, Trial, runs
 from biodance.settings import COP_FORCE
 
-_Mask = NDArray[np.bool_]
 RIM = 0.005
 """m of the outline's edge that carry nothing: a sole is rounded, and broadest above the ground."""
 REACH = 0.09
@@ -34,10 +32,10 @@ class Footing:
     ``unseen`` (T, 2) not seen.
     """
 
-    on_plate: _Mask
+    on_plate: Mask
     share: Array
-    covered: _Mask
-    unseen: _Mask
+    covered: Mask
+    unseen: Mask
 
 
 def inside(plate: Plate, points: Array) -> Array:
@@ -51,7 +49,7 @@ def inside(plate: Plate, points: Array) -> Array:
     return np.asarray(np.min(points[..., :2] @ inward - (x * inward[0] + y * inward[1]), axis=-1))
 
 
-def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: _Mask) -> Footing:
+def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: Mask) -> Footing:
     """Return which plates the touching feet (T, 2) are over, and whether they can touch anything else."""
     spread = _spread_over(plates, soles)
     low = (soles.outline[..., 2] - surfaces.offset).min(axis=2)
@@ -70,7 +68,7 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
     return Footing(on_plate, share, covered & ~unseen, unseen)
 
 
-def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> _Mask:
+def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> Mask:
     """Return (P, T, 2, S) which points all over the soles are over each plate, seen from above; of a plate of unknown
     place, all that are seen of a foot that presses it.
     """
@@ -84,7 +82,7 @@ def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> _Mask:
     return np.concatenate(parts, axis=1)
 
 
-def _pressed(plate: Plate, soles: Soles) -> _Mask:
+def _pressed(plate: Plate, soles: Soles) -> Mask:
     """Return (T, 2) which soles carry what a plate of unknown place measures: its centre of pressure lies under this
     foot, else under both.
     """
@@ -109,7 +107,7 @@ def _samples(outline: Array) -> Array:
     return np.concatenate([narrow, np.stack(middles, axis=2)], axis=2)
 
 
-def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: _Mask) -> Array:
+def cop_outside(plates: tuple[Plate, ...], soles: Soles, place: Footing, pressed: Mask) -> Array:
     """Return the distance (T, P) m of every plate's centre of pressure from the soles on it; 0 inside, NaN without foot
     or not ``pressed``.
 
@@ -144,7 +142,6 @@ def distance_to_hull(point: Array, points: Array) -> Array:
     return distance
 
 
-_Mask2 = NDArray[np.bool_]
 SAME_LEVEL = 0.05
 """m: heights closer than this are one surface."""
 MARKER_HEIGHT = 0.20
@@ -180,7 +177,7 @@ def speeds(soles: Soles, plates: tuple[Plate, ...] = (), moving: Array | None = 
     return np.linalg.norm(velocity, axis=-1)
 
 
-def resting(speed: Array, time: Array, *, still: float, lasting: float) -> _Mask2:
+def resting(speed: Array, time: Array, *, still: float, lasting: float) -> Mask:
     """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for at least ``lasting`` s (or the
     whole trial).
     """
@@ -193,7 +190,7 @@ def resting(speed: Array, time: Array, *, still: float, lasting: float) -> _Mask
     return found
 
 
-def dilate(mask: _Mask2, frames: int) -> _Mask2:
+def dilate(mask: Mask, frames: int) -> Mask:
     """Return ``mask`` (T, ...) widened by ``frames`` before and after every True."""
     wide = mask.copy()
     for shift in range(1, min(frames, len(mask) - 1) + 1):
@@ -202,7 +199,7 @@ def dilate(mask: _Mask2, frames: int) -> _Mask2:
     return wide
 
 
-def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, weight: float) -> Surfaces:
+def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight: float) -> Surfaces:
     """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N (NaN =
     unknown).
     """
@@ -239,7 +236,7 @@ def find_surfaces(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2, *, we
     return Surfaces(offset, tuple(sorted({*plates, *bare})), tuple(bare), tuple(notes))
 
 
-def _over(trial: Trial, centre: Array, load: _Mask2) -> bool:
+def _over(trial: Trial, centre: Array, load: Mask) -> bool:
     """Return whether a resting sole's ``centre`` (n, 3) is over a plate that is loaded meanwhile."""
     middle = np.median(centre, axis=0)
     return any(
@@ -247,7 +244,7 @@ def _over(trial: Trial, centre: Array, load: _Mask2) -> bool:
     )
 
 
-def _offsets(trial: Trial, soles: Soles, rests: _Mask2, load: _Mask2) -> Array:
+def _offsets(trial: Trial, soles: Soles, rests: Mask, load: Mask) -> Array:
     """Return the standing height (2, P) m of each point: low percentile while the foot rests on a loaded plate.
 
     A foot that never does takes the other's; if neither does, its lowest resting (or lowest) height is taken for the

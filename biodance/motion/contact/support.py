@@ -3,11 +3,9 @@ them.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from biodance.records import Array, Trial, runs
+from biodance.records import Array, Mask, Trial, runs
 
-_Mask = NDArray[np.bool_]
 _SHORTEST_FLIGHT = 0.05
 """s: in less the parabola of the markers cannot be seen."""
 _FALLS = (0.6, 1.4)
@@ -28,7 +26,7 @@ _NEAR = 0.03
 """... within this."""
 
 
-def flight(trial: Trial, touching: _Mask, load: _Mask) -> _Mask:
+def flight(trial: Trial, touching: Mask, load: Mask) -> Mask:
     """Return (T,) where the person flies: no plate is loaded and the markers fall freely, for as long as no foot may
     touch, or for as long as no plate is loaded (the foot that has just left a belt is low and slow).
 
@@ -60,7 +58,7 @@ def _falls(trial: Trial, start: int, stop: int) -> bool:
     return bool(straight and _FALLS[0] <= -2 * curve[0] / trial.settings.gravity <= _FALLS[1])
 
 
-def carried_elsewhere(trial: Trial, *, weight: float) -> _Mask:
+def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
     """Return (T,) where something beside the plates carries a good part of the ``weight`` (N; NaN = unknown, then
     nowhere): a chair, a rail.
 
@@ -86,7 +84,7 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> _Mask:
 
 def _mean_speed(time: Array, xyz: Array) -> Array:
     """Return the speed (T,) m/s of the mean of the markers that are seen throughout; infinite without one."""
-    whole = np.isfinite(xyz).all(axis=(0, 2))
+    whole: Mask = np.asarray(np.isfinite(xyz).all(axis=(0, 2)))
     if not whole.any():
         return np.full(time.size, np.inf)
     return np.asarray(np.linalg.norm(np.gradient(xyz.mean(axis=1, where=whole[None, :, None]), time, axis=0), axis=1))

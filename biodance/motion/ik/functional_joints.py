@@ -3,8 +3,7 @@ prior.
 
 Every choice of the unknowns is a body that meets the static markers exactly. Sought is the most probable one: marker
 distances over postures of the moving trials, each at its own best inverse kinematics, plus the squared distance from
-the static answer. The postures are eliminated frame by frame (variable projection: Golub and Pereyra 1973, DOI
-10.1137/0710036; docs/derivations.md).
+the static answer (`joint_fit`). What the movement contradicts is found on the way (`elsewhere`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,30 +12,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
-from biodance.errors import TrialRefused
-from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
+from biodance.motion.ik.elsewhere import elsewhere
+from biodance.motion.ik.joint_fit import CalibrationState, evaluate_joints, fit_joints, marker_slopes, spread_postures
 from biodance.motion.ik.joint_unknowns import (
     HINGES,
     SIZE,
     JointUnknowns,
-    contradicted,
     doubted,
     excited,
     own_centre,
     own_turn,
     own_unknowns,
 )
-from biodance.motion.kinematics import chains, place_jacobian, poses
+from biodance.motion.kinematics import chains
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
 
-_POSTURES = 150
-"""Postures taken evenly from all moving trials together."""
 _ALIKE = 8.0
 """s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike.
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
@@ -46,12 +41,8 @@ NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
 deviations, which are then those of 12 virtual dances.
 """
-_FAR = 4.5
-"""Standard deviations from the static trial's place beyond which a joint is not believed (5 sessions without fault: 1.5
-at most): a marker has moved since then, and pulls the joint along.
-"""
-_STEPS, _SMALLEST = 8, 5e-4
-"""Most Gauss-Newton steps; m or rad below which a step ends the search."""
+_FAULTS = 3
+"""Joints that lie elsewhere and markers that have moved, at most, in one session."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,59 +61,43 @@ class FunctionalJoints:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationState:
-    """A choice ``theta`` (37,) of the unknowns with its postures ``q`` (T, nq); ``cost``, its ``gradient`` (37,) and
-    ``information`` (37, 37), movement and prior together; ``rms`` m, weighted marker distance.
-    """
-
-    theta: Array
-    q: Array
-    cost: float
-    gradient: Array
-    information: Array
-    rms: float
-
-
 @one_thread()
 def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> FunctionalJoints:
     """Return ``scaling`` with joint centres and hinge axes from the moving ``trials`` (labels as in the marker set).
+
+    A joint that these contradict is placed by them alone; a marker that has moved since the static trial does not
+    count.
 
     Raises
     ------
     TrialRefused
         The trials show no marker of the body, or no frame determines a posture.
     """
-    body = scaling.body()[0]
-    postures = spread_postures(trials, body.markers.names)
+    postures = spread_postures(trials, scaling.body()[0].markers.names)
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
-    placed, (joint, far) = _placed(scaling, postures, seconds)
-    if far <= _FAR:
-        return placed
-    near, left_out, better = _FAR, "", placed
-    for name in _beside(body, joint):
-        try:
-            tried, (_, left) = _placed(scaling, _without(postures, name), seconds)
-        except TrialRefused:  # this marker cannot be spared
-            continue
-        if left <= near:
-            near, left_out, better = left, name, tried
-    if not left_out:
-        return placed
-    note = (
-        f"Warning: the marker {left_out} does not count in placing the joints: with it the {joint.replace('_', ' ')} "
-        f"would lie "
-        f"{1e3 * placed.moved[joint]:.0f} mm from the static trial's place. It seems to have moved since that trial."
-    )
-    errors = tuple(
-        one._replace(spared=left_out, moved=placed.moved[joint]) if one.joint == joint else one for one in better.errors
-    )
-    without = replace(
-        better.scaling,
-        notes=(*better.scaling.notes, note),
-        centres=replace(better.scaling.centres, errors=errors),
-    )
-    return replace(better, scaling=without, errors=errors, notes=(*better.notes, note))
+    skin = error_size("soft_tissue", "marker")
+    fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
+    alike = max(1.0, postures.time.size * _ALIKE / seconds)
+    noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
+    start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
+    shown = excited(scaling.centres, start.theta, start.information)
+    found = fit_joints(scaling, postures, start, shown, noise=noise)
+    spared: dict[str, tuple[str, float]] = {}
+    for _ in range(_FAULTS):
+        slopes = marker_slopes(scaling, postures, found, noise=noise)
+        wrong = elsewhere(scaling, found.theta, (found.gradient, found.information), slopes, shown)
+        if wrong is None:
+            break
+        if wrong.marker:
+            joint = _pulled(scaling, found, wrong.marker)
+            spared[joint] = wrong.marker, float(np.linalg.norm(found.theta[own_centre(joint)]))
+            postures = _without(postures, wrong.marker)
+        else:
+            scaling = replace(scaling, centres=doubted(scaling.centres, (*scaling.centres.contradicted, wrong.joint)))
+            shown[own_unknowns(wrong.joint)] = True
+        again = evaluate_joints(scaling, postures, found.theta, found.q, noise=noise)
+        found = fit_joints(scaling, postures, again, shown, noise=noise)
+    return _told(scaling, start, found, shown, spared)
 
 
 def _without(postures: Markers, name: str) -> Markers:
@@ -132,143 +107,42 @@ def _without(postures: Markers, name: str) -> Markers:
     return replace(postures, xyz=xyz)
 
 
-def _placed(scaling: Scaling, postures: Markers, seconds: float) -> tuple[FunctionalJoints, tuple[str, float]]:
-    """Return the joints that ``postures`` from so many ``seconds`` of movement show or contradict, and the joint that
-    then lies farthest from its place.
-    """
-    skin = error_size("soft_tissue", "marker")
-    fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
-    alike = max(1.0, postures.time.size * _ALIKE / seconds)
-    noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
-    start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
-    shown = excited(scaling.centres, start.theta, start.information)
-    found = fit_joints(scaling, postures, start, shown, noise=noise)
-    wrong = contradicted(found.information, found.gradient, shown)
-    if wrong:
-        scaling = replace(scaling, centres=doubted(scaling.centres, wrong))
-        for joint in wrong:
-            shown[own_unknowns(joint)] = True
-        found = fit_joints(
-            scaling, postures, evaluate_joints(scaling, postures, found.theta, found.q, noise=noise), shown, noise=noise
-        )
-    return _told(scaling, start, found, shown), _farthest(scaling, found)
-
-
-def _farthest(scaling: Scaling, found: CalibrationState) -> tuple[str, float]:
-    """Return the joint that lies farthest from the static trial's place, in its standard deviations, and how far."""
-    off = JointUnknowns(scaling.centres).prior(found.theta)[0]
-    far = {joint: float(np.linalg.norm(off[own_centre(joint)])) for joint in JOINTS}
-    return max(far.items(), key=lambda pair: pair[1])
-
-
-def _beside(body: Body, joint: str) -> tuple[str, ...]:
-    """Return the markers on the two segments that meet in a joint."""
-    chain = next(one for one in chains(body) if body.joints[one[0]].name.startswith(f"{joint}_"))
-    parent = body.joints[chain[0]].parent
-    meet = {0 if parent < 0 else body.joints[parent].segment, body.joints[chain[-1]].segment}
-    return tuple(
-        name for name, segment in zip(body.markers.names, body.markers.segment, strict=True) if segment in meet
-    )
-
-
-def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:
-    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
-    marker.
-    """
-    parts = [
-        np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials
-    ]
-    xyz = np.concatenate(parts) if parts else np.empty((0, len(names), 3))
-    xyz = xyz[np.isfinite(xyz).any(axis=(1, 2))]
-    if not len(xyz):
-        raise TrialRefused(
-            "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
-        )
-    chosen = np.linspace(0, len(xyz), min(_POSTURES, len(xyz)), endpoint=False).astype(int)
-    return Markers(names, np.arange(len(chosen)) / 100.0, xyz[chosen])
-
-
-def evaluate_joints(
-    scaling: Scaling, postures: Markers, theta: Array, guess: Array | None, *, noise: float
-) -> CalibrationState:
-    """Return the state at ``theta``: the postures of its body that come nearest to the markers, cost and derivatives.
-
-    ``guess`` (T, nq) where to look for the postures; ``noise`` m per axis, standard deviation of a marker of weight 1
-    if all postures were independent.
-    """
-    unknowns = JointUnknowns(scaling.centres)
-    body, stand = replace(scaling, centres=unknowns.moved(theta)).body()
-    found = solve_ik(body, postures, guess=guess)
-    solved = found.status == FrameStatus.SOLVED
-    q = found.q[solved]
-    pose, segment = poses(body, q), list(body.markers.segment)
-    points = pose.points(segment, body.markers.position)
-    apart = points - postures.xyz[solved]
-    seen = np.isfinite(apart)
-    weight = np.sqrt(body.markers.weight)[:, None] * seen / noise
-    rows = weight.reshape(len(q), -1)
-    residual = rows * np.where(seen, apart, 0.0).reshape(len(q), -1)
-    coordinates = rows[..., None] * place_jacobian(body, pose, segment, points) * _free(body, q)[:, None]
-    free = _left_open(coordinates, rows[..., None] * unknowns.slope(body, stand, pose, points, theta))
-    prior, prior_slope = unknowns.prior(theta)
-    gradient = np.einsum("trp,tr->p", free, residual) + prior_slope.T @ prior
-    information = np.einsum("trp,trs->ps", free, free, optimize=True) + prior_slope.T @ prior_slope
-    cost = 0.5 * float(np.sum(residual**2) + prior @ prior)
-    rms = float(np.sqrt(3 * np.sum(residual**2) / np.sum(rows**2)))
-    return CalibrationState(theta, found.q, cost, gradient, information, rms)
-
-
-def _free(body: Body, q: Array) -> NDArray[np.bool_]:
-    """Return (T, nv) False where a joint is at a limit."""
-    angle = q[:, body.nq - len(body.joints) :]
-    inside = (angle > body.limits.lower) & (angle < body.limits.upper)
-    return np.concatenate([np.ones((len(q), body.n_root), dtype=bool), inside], axis=1)
-
-
-def _left_open(coordinates: Array, slope: Array) -> Array:
-    """Return what of ``slope`` (T, r, p) no change of the ``coordinates`` (T, r, nv) can undo, frame by frame."""
-    transposed = np.swapaxes(coordinates, 1, 2)
-    square = transposed @ coordinates
-    size = np.einsum("tii->t", square)[:, None, None] / square.shape[1]
-    return np.asarray(
-        slope - coordinates @ np.linalg.solve(square + 1e-9 * size * np.eye(square.shape[1]), transposed @ slope)
-    )
-
-
-def fit_joints(
-    scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float
-) -> CalibrationState:
-    """Return the minimum over the ``shown`` unknowns: Gauss-Newton, steps halved where the cost would rise."""
-    at, chosen = start, np.flatnonzero(shown)
-    if not chosen.size:
-        return at
-    for _ in range(_STEPS):
-        step = np.zeros(SIZE)
-        step[chosen] = -np.linalg.solve(at.information[np.ix_(chosen, chosen)], at.gradient[chosen])
-        while np.abs(step).max() > _SMALLEST:
-            new = evaluate_joints(scaling, postures, at.theta + step, at.q, noise=noise)
-            if new.cost < at.cost:
-                break
-            step = step / 2
-        else:
-            break
-        at = new
-    return at
+def _pulled(scaling: Scaling, found: CalibrationState, marker: str) -> str:
+    """Return the joint of the marker's segment that it has pulled farthest, in its standard deviations."""
+    body, off = scaling.body()[0], JointUnknowns(scaling.centres).prior(found.theta)[0]
+    segment = body.markers.segment[body.markers.names.index(marker)]
+    meet = []
+    for chain in chains(body):
+        parent = body.joints[chain[0]].parent
+        above = 0 if parent < 0 else body.joints[parent].segment
+        name = body.joints[chain[0]].name.rsplit("_", 1)[0]
+        if segment in (above, body.joints[chain[-1]].segment) and name in JOINTS:
+            meet.append(name)
+    return max(meet, key=lambda joint: float(np.linalg.norm(off[own_centre(joint)])))
 
 
 def _told(
-    scaling: Scaling, start: CalibrationState, found: CalibrationState, shown: NDArray[np.bool_]
+    scaling: Scaling,
+    start: CalibrationState,
+    found: CalibrationState,
+    shown: NDArray[np.bool_],
+    spared: Mapping[str, tuple[str, float]],
 ) -> FunctionalJoints:
-    """Return the result with its notes."""
+    """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
+    far that would lie with them.
+    """
     deviation = np.sqrt(np.diag(np.linalg.inv(found.information)))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
     wrong = scaling.centres.contradicted
-    errors = tuple(
-        JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far)
-        for joint, far in moved.items()
-    )
+    placed_errors = []
+    for joint in (joint for joint in JOINTS if joint in moved or joint in spared):
+        marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
+        placed_errors.append(
+            JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far, marker)
+        )
+    errors = tuple(placed_errors)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
     notes = []
     if moved:
@@ -282,6 +156,7 @@ def _told(
         names = ", ".join(joint.replace("_", " ") for joint in kept)
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
+    notes += [_moved_since(joint, *own) for joint, own in spared.items()]
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
     return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
@@ -292,6 +167,14 @@ def _contradiction(joint: str, far: float) -> str:
     return (
         f"Warning: the movement contradicts the static trial about the {joint.replace('_', ' ')}: it turns about a "
         f"point {1e3 * far:.0f} mm away, and is placed there. Check the markers from which the static trial placed it."
+    )
+
+
+def _moved_since(joint: str, marker: str, far: float) -> str:
+    """Return what is said of a marker that has moved and would pull a joint ``far`` m along."""
+    return (
+        f"Warning: the marker {marker} does not count in placing the joints: with it the {joint.replace('_', ' ')} "
+        f"would lie {1e3 * far:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
 
 

@@ -12,7 +12,7 @@ from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.motion.kinematics import Poses, below, chains, poses
-from biodance.records import SIDES, Array, Index
+from biodance.records import SIDES, Array
 from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
@@ -26,9 +26,10 @@ the bone above it.
 """
 
 
-_CONTRADICTED = 3.0
-"""Times its standard deviation by which a centre that the movement contradicts may be off: such an error is a fault,
-and faults are as rare and as large as the diagnosis takes them (`biodance.diagnosis.candidates.SCALE`).
+FAULTY = 3.0
+"""Times its standard deviation by which a centre that the movement contradicts may be off, or a marker that has moved:
+such an error is a fault, and faults are as rare and as large as the diagnosis takes them
+(`biodance.diagnosis.candidates.SCALE`).
 """
 
 
@@ -38,7 +39,7 @@ def centre_sd(joint: str, *, contradicted: bool = False) -> float:
     ``contradicted`` that place.
     """
     usual = hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
-    return _CONTRADICTED * usual if contradicted else usual
+    return FAULTY * usual if contradicted else usual
 
 
 def hinge_sd() -> float:
@@ -93,20 +94,22 @@ class JointUnknowns:
 
     def _sides(self, theta: Array) -> tuple[Array, Array]:
         """Return by how many standard deviations the limbs of ``_LIMBS`` are longer on the right (2,), and the slope
-        (2, 37).
+        (2, 37); of a limb that ends at a joint which the movement contradicts, only as far as such a joint is known.
         """
         more, slope = np.zeros(len(_LIMBS)), np.zeros((len(_LIMBS), SIZE))
+        sd = np.full(len(_LIMBS), error_size("side_length", "limb"))
         for row, (upper, lower) in enumerate(_LIMBS):
             for side, sign in (("right", 1.0), ("left", -1.0)):
                 ends = [f"{side}_{joint}" for joint in (upper, lower)]
+                wrong = [centre_sd(end, contradicted=True) for end in ends if end in self.centres.contradicted]
+                sd[row] = np.linalg.norm([sd[row], *wrong])
                 above, below = (self.centres.place[end] + theta[own_centre(end)] for end in ends)
                 length = np.linalg.norm(below - above)
                 along = sign * (below - above) / length
                 more[row] += sign * length
                 slope[row, own_centre(ends[0])] -= along
                 slope[row, own_centre(ends[1])] += along
-        sd = error_size("side_length", "limb")
-        return more / sd, slope / sd
+        return more / sd, slope / sd[:, None]
 
     def axis(self, hinge: str, theta: Array) -> tuple[Array, Array]:
         """Return the unit flexion axis z (3,) of a hinge in the lab, static posture, and its slope (3, 37): square to
@@ -168,11 +171,6 @@ EXCITED = 0.3
 """Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
 kept, because what little the markers say of such a joint is soft tissue.
 """
-_MORE_PROBABLE = 10.0
-"""Natural logarithm by which freeing a kept joint must make the markers more probable: the movement then contradicts
-the static trial's place, though it would hardly have shown a joint near it (26 sessions of 14 persons with hips and
-ankles near their places: 1.8 at most; a hip 81 mm off, two persons: 53 and 61).
-"""
 
 
 def excited(centres: Centres, theta: Array, information: Array) -> NDArray[np.bool_]:
@@ -200,25 +198,3 @@ def doubted(centres: Centres, wrong: tuple[str, ...]) -> Centres:
 def own_unknowns(joint: str) -> list[int]:
     """Return the unknowns of a joint: its centre, of a hinge also its axis."""
     return [*range(SIZE)[own_centre(joint)], *([own_turn(joint)] if joint in HINGES else [])]
-
-
-def contradicted(information: Array, gradient: Array, shown: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Return the joints kept in a fit of the ``shown`` (37,) unknowns that the markers contradict, from the
-    ``information`` (37, 37) and ``gradient`` (37,) of the cost there: to first order, freeing one makes them more
-    probable by `_MORE_PROBABLE` (natural logarithm) or more.
-
-    A joint that lies far off makes the movement look poor in information about it, so that it would be kept and the
-    joints beside it moved in its place.
-    """
-    free, found = np.flatnonzero(shown), []
-    for joint in JOINTS:
-        own: Index = np.array(own_unknowns(joint))
-        if shown[own].any():
-            continue
-        across = information[np.ix_(free, own)]
-        shared: Array = np.asarray(np.linalg.solve(information[np.ix_(free, free)], across), dtype=float)
-        left: Array = information[np.ix_(own, own)] - across.T @ shared
-        pull: Array = gradient[own] - shared.T @ gradient[free]
-        if 0.5 * float(pull @ np.linalg.solve(left, pull)) >= _MORE_PROBABLE:
-            found.append(joint)
-    return tuple(found)

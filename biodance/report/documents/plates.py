@@ -4,8 +4,7 @@ from typing import Any
 
 from biodance.diagnosis.archive.changes import Change, Stranger
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.findings import PlateFinding, PlateLevel, said
-from biodance.diagnosis.archive.judge import PlateCard
+from biodance.diagnosis.archive.judge import PlateCard, PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.pipeline.plates import PlatesJudged
 

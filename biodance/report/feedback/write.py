@@ -6,12 +6,201 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from biodance.body.body import Body
+from biodance.body.solids import segment_solids
+from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
+from biodance.dance.problem.stance import Stance, stance_words
+from biodance.dance.telling import telling_of
 from biodance.errors import BiodanceError
-from biodance.report.feedback.follow import follow_scene
-from biodance.report.feedback.scene import scene_of
-from biodance.report.three import three_js
+from biodance.motion.kinematics import poses
+from biodance.records import SIDES
+from biodance.report.pages.template import three_js
 from biodance.version import __version__
+
+_POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
+"""Segment -> the point at its origin."""
+_WRISTS = ("{}WRA", "{}WRB")
+_NUMBERS = {"shoulder": 5, "elbow": 7, "wrist": 9, "hip": 11, "knee": 13, "ankle": 15}
+"""Of the left point among the 17 of MoveNet (order of COCO); the right one comes next."""
+_ASKED = {"elbow": 1.0, "wrist": 1.0, "knee": 1.0, "shoulder": 0.8}
+"""Points that a person is asked to correct, and how readily; the others follow them."""
+_LIMBS, _TRUNK = 0.6, 0.25
+"""rad, standard deviation of a joint angle about the plan: what the camera does not tell stays near it."""
+
+
+def follow_scene(dance: Dance) -> dict[str, Any] | None:
+    """Return what the page needs to follow a person through ``dance`` as plain values; None for a body whose joints the
+    camera does not know, such as a robot's.
+    """
+    body, points = dance.body, _points(dance.body)
+    if not points or not body.n_root:
+        return None
+    told = telling_of(dance)
+    return {
+        "rate": told.rate,
+        "plan": _packed(dance.motion(told.rate).q),
+        "root": _packed(told.root),
+        "weights": told.weights.tolist(),
+        "edges": list(told.edges),
+        "still": told.still.tolist(),
+        "about": told.about.tolist(),
+        "gravity": body.gravity.tolist(),
+        "segments": [_called(name) for name in body.segments],
+        "carriers": list(body.segment_joint),
+        "joints": [
+            {
+                "parent": joint.parent,
+                "rotation": joint.rotation.ravel().tolist(),
+                "translation": joint.translation.tolist(),
+                "axis": joint.axis.tolist(),
+                "free": _TRUNK if joint.name.startswith("trunk") else _LIMBS,
+            }
+            for joint in body.joints
+        ],
+        "points": points,
+        "phases": [
+            {
+                "kind": phase.kind,
+                "posture": phase.posture,
+                "start": phase.start,
+                "end": phase.end,
+                "planted": [body.feet[SIDES[side]].segment for side in phase.stance.planted],
+            }
+            for phase in dance.phases
+        ],
+    }
+
+
+def _called(segment: str) -> str:
+    return segment.replace("_head", " and head").replace("_hand", " and hand").replace("_", " ")
+
+
+def _packed(values: "np.ndarray[Any, Any]") -> str:
+    return b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def _points(body: Body) -> list[dict[str, Any]]:
+    """Return the points of the body that the camera finds: ``name``, ``number`` among those of MoveNet, ``segment`` and
+    ``place`` m in its frame, ``asks`` how readily it is corrected; none when the body lacks one.
+    """
+    out = []
+    for second, side in enumerate(("left", "right")):
+        for part, name in _POINTS.items():
+            if f"{side}_{part}" not in body.segments:
+                return []
+            out.append((f"{side} {name}", body.segment_index(f"{side}_{part}"), np.zeros(3), name, second))
+        wrist = [
+            body.markers.names.index(n) for one in _WRISTS if (n := one.format(side[0].upper())) in body.markers.names
+        ]
+        if not wrist:
+            return []
+        place = body.markers.position[wrist].mean(axis=0)
+        out.append((f"{side} wrist", body.markers.segment[wrist[0]], place, "wrist", second))
+    return [
+        {
+            "name": called,
+            "number": _NUMBERS[name] + second,
+            "segment": int(segment),
+            "place": place.tolist(),
+            "asks": _ASKED.get(name, 0.0),
+        }
+        for called, segment, place, name, second in out
+    ]
+
+
+_RATE = 15.0
+"""Hz of the poses; the page turns and shifts evenly between two."""
+_FACTOR = 1e4
+"""Steps a metre: positions are whole numbers of 0.1 mm."""
+
+
+def scene_of(dance: Dance) -> dict[str, Any]:
+    """Return what the page shows of a dance, as plain values.
+
+    Returns
+    -------
+    dict
+        ``name``, ``duration_s``, ``rate_hz``, ``frames``; ``segments`` with ``name``, ``side``, ``vertices`` (V, 3)
+        float32 m in the segment's frame and ``faces`` (F, 3) uint16; ``poses`` (frames, segments, 7) int16: position in
+        0.1 mm of the lab, z up, and quaternion x, y, z, w in steps of 1/32767; arrays little-endian in base64;
+        ``cues``, one a posture (`_cues`).
+
+    Raises
+    ------
+    BiodanceError
+        The dance leaves the room of 3.2 m about the lab origin that the page can show.
+    """
+    solids = segment_solids(dance.body)
+    motion = dance.motion(_RATE)
+    pose = poses(dance.body, motion.q)
+    chosen = [k for k, name in enumerate(dance.body.segments) if name in solids]
+    place = _FACTOR * pose.position[:, chosen]
+    if not np.abs(place).max() < 32767:
+        raise BiodanceError(
+            f"The dance goes {np.abs(place).max() / _FACTOR:.1f} m from the lab origin; the page shows 3.2 m about it."
+        )
+    turn = Rotation.from_matrix(pose.rotation[:, chosen].reshape(-1, 3, 3)).as_quat().reshape(*place.shape[:2], 4)
+    packed = np.round(np.concatenate([place, 32767 * turn], axis=2)).astype("<i2")
+    return {
+        "name": dance.protocol,
+        "duration_s": dance.duration,
+        "rate_hz": _RATE,
+        "frames": len(packed),
+        "segments": [
+            {
+                "name": name,
+                "side": next((side for side in SIDES if name.startswith(side)), ""),
+                "vertices": _text(np.asarray(solids[name].vertices).astype("<f4")),
+                "faces": _text(np.asarray(solids[name].faces).astype("<u2")),
+            }
+            for name in (dance.body.segments[k] for k in chosen)
+        ],
+        "poses": _text(packed),
+        "cues": _cues(dance),
+    }
+
+
+def _text(values: "np.ndarray[Any, Any]") -> str:
+    return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def _cues(dance: Dance) -> list[dict[str, Any]]:
+    """Return of every posture: ``number`` as on the cue sheet, ``move_s`` when to begin to move, ``hold_s`` from when
+    and ``end_s`` until when to stand still, ``calls`` what to do, ``stance`` in words, ``feet``
+    the outlines of the planted soles (P, 2) m.
+    """
+    said = dance_instructions(dance)
+    holds = {phase.posture: phase for phase in dance.phases if phase.kind == "hold"}
+    moves = {phase.posture: phase for phase in dance.phases if phase.kind == "move"}
+    out = []
+    for p, stance in enumerate(dance.stances):
+        start = moves[p].start if p in moves else 0.0
+        held = holds[p].start if p in holds else moves[p].end
+        out.append(
+            {
+                "number": p + 1,
+                "move_s": start,
+                "hold_s": held,
+                "end_s": holds[p].end if p in holds else held,
+                "calls": list(said[p]),
+                "stance": stance_words(stance),
+                "feet": [_outline(stance, side) for side in stance.planted],
+            }
+        )
+    return out
+
+
+def _outline(stance: Stance, side: int) -> list[list[float]]:
+    """Return the outline of a planted sole on the floor, (P, 2) m, in order about its middle."""
+    points = stance.soles[side][:, :2]
+    from_middle = points - points.mean(axis=0)
+    order = np.argsort(np.arctan2(from_middle[:, 1], from_middle[:, 0]))
+    return [[round(float(x), 4), round(float(y), 4)] for x, y in points[order]]
+
 
 _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json", "weights": "movenet.bin"}
 """What follows a person: parts of the bundle that `make bundle` writes beside this module."""

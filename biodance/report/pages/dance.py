@@ -3,11 +3,57 @@
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
+from biodance.body.body import Body
+from biodance.body.solids import box_solid, shape_parts
 from biodance.dance.cues import dance_instructions
 from biodance.dance.problem.stance import stance_words
+from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult
-from biodance.report.figures.mannequin import mannequin_svg
+from biodance.records import Array
+from biodance.report.figures.style import SIDE_COLOURS
+
+_VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
+"""Where the eye is in the horizontal plane, for a person who faces lab x."""
+_TALL, _GAP, _LABEL = 150.0, 12.0, 70.0
+"""Height of the picture in its own units, what is left between the views, and the room that their words take."""
+_MIDDLE = "#8d99a6"
+
+
+def mannequin_svg(body: Body, q: Array, title: str) -> str:
+    """Return the picture of the posture ``q`` (nq,): from the front (the person's right is on the left) and from the
+    right; ``title`` is read to those who cannot see it.
+    """
+    pose = poses(body, q)
+    solids = []
+    for segment, box in shape_parts(body):
+        points = np.asarray(box_solid(box).vertices) @ pose.rotation[0, segment].T + pose.position[0, segment]
+        solids.append((body.segments[segment], points))
+    height = max(float(points[:, 2].max()) for _, points in solids)
+    scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
+    for words, (x, y) in _VIEWS:
+        across = np.array([-y, x, 0.0])
+        flat = [(name, points @ across, points[:, 2], points @ np.array([x, y, 0.0])) for name, points in solids]
+        low = min(float(u.min()) for _, u, _, _ in flat)
+        wide = scale * max(float(u.max()) - low for _, u, _, _ in flat)
+        room = max(wide, _LABEL)
+        for name, u, z, _ in sorted(flat, key=lambda one: float(one[3].mean())):
+            corners = np.column_stack([left + (room - wide) / 2 + scale * (u - low), _TALL - scale * z])
+            hull = corners[ConvexHull(corners).vertices]
+            path = " ".join(f"{a:.1f},{b:.1f}" for a, b in hull)
+            drawn.append(f'<polygon points="{path}" fill="{_colour(name)}"/>')
+        drawn.append(f'<text x="{left + room / 2:.0f}" y="{_TALL + 14:.0f}">{words}</text>')
+        left += room + _GAP
+    return (
+        f'<svg role="img" aria-label="{title}" viewBox="-3 -6 {left:.0f} {_TALL + 22:.0f}" stroke="#fff" '
+        f'stroke-width="0.8">{"".join(drawn)}</svg>'
+    )
+
+
+def _colour(segment: str) -> str:
+    side = segment.partition("_")[0]
+    return SIDE_COLOURS[side][0] if side in SIDE_COLOURS and side != "middle" else _MIDDLE
 
 
 def cards_page(result: DanceResult) -> str:

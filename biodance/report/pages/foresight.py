@@ -6,6 +6,7 @@ from typing import Any
 from biodance.errors import BiodanceError
 from biodance.pipeline.provenance import now
 from biodance.report.pages.template import render
+from biodance.report.wording import size_seen
 from biodance.version import __version__
 
 _NAMED = 6
@@ -23,7 +24,14 @@ def refuse_page(path: Path, *, force: bool) -> None:
 def foresight_page(document: dict[str, Any], name: str) -> str:
     """Return the page (HTML) of what `foresight_document` says of the movement ``name``."""
     return render(
-        "foresight.html.j2", found=document, movement=name, version=__version__, created=now(), words=_words, some=_some
+        "foresight.html.j2",
+        found=document,
+        movement=name,
+        version=__version__,
+        created=now(),
+        words=_words,
+        some=_some,
+        size_seen=size_seen,
     )
 
 

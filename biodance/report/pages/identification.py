@@ -1,15 +1,188 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
-from biodance.identification.knowledge import QUANTITIES
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from biodance.display import BLACK, BLUE, GREY, RED
+from biodance.identification.identification import Identification
+from biodance.identification.impact import Impact
+from biodance.identification.knowledge import QUANTITIES, mass_interval
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
+from biodance.identification.torques import TorqueBands
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.documents.identification import information_share, segment_rows, torques_document
-from biodance.report.figures.identification import drawn_joints, forest_figure, impact_figure, torque_figure
-from biodance.report.figures.sessions import changes_figure, excitation_figure
+from biodance.report.figures.curves import Curve, CurveFigure, Strip
+from biodance.report.figures.session import bar_list
+from biodance.report.figures.vector import (
+    LEFT_SIDE,
+    MIDDLE_SIDE,
+    RIGHT_SIDE,
+    Axis,
+    Frame,
+    Stroke,
+    around,
+    panel,
+    points,
+    rule,
+    segments,
+    shade,
+)
 from biodance.report.pages.template import render
 from biodance.report.wording import format_number
+
+if TYPE_CHECKING:
+    from biodance.dance.scoring import PerformanceScore
+    from biodance.identification.sessions import Difference
+
+
+_PANELS = (("mass", 1.0, "mass (kg)"), ("com y", 1000.0, "centre of mass along the segment (mm)"))
+"""Quantity, factor and title of each panel of the changes."""
+
+
+def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference, ...]") -> str:
+    """Return what changed in every segment, later less earlier, with 95 % intervals: red what is ``certain``, open
+    where nothing is known.
+    """
+    names = list(dict.fromkeys(row.segment for row in changes))
+    ticks = tuple((len(names) - 1.0 - i, name.replace("_", " ")) for i, name in enumerate(names))
+    y, drawn = Axis(-0.6, len(names) - 0.4, "", ticks), []
+    for quantity, factor, title in _PANELS:
+        rows = [row for row in changes if row.quantity == quantity]
+        ends = factor * np.array([[*row.interval, row.value] for row in rows])
+        x = around(np.append(ends, 0.0), label=title)
+        marks = [rule(x, 0.0, upright=True, look=Stroke(BLACK, "", 0.8))]
+        for (at, _), row in zip(ticks, rows, strict=True):
+            look = Stroke(RED if row in certain else BLUE if row.known else GREY, "", 1.6)
+            marks.append(segments(x, y, np.array([[factor * end, at] for end in row.interval]), look))
+            inside = "" if row.known else "#fff"
+            marks.append(points(x, y, np.array([factor * row.value]), np.array([at]), look, inside=inside))
+        drawn.append(panel(x, y, marks, title, frame=Frame(height=17.0 * len(names), left=112.0, above=4.0)))
+    return f'<div class="cells">{"".join(drawn)}</div>'
+
+
+def excitation_figure(found: "PerformanceScore") -> str:
+    """Return the share of the table's variance that a dance removes, planned (tick) and reached (bar), by segment."""
+    rows = [
+        (row.segment.replace("_", " "), 100 * row.reached, 100 * row.planned, f"{100 * row.reached:.0f} %")
+        for row in found.excitation
+    ]
+    return bar_list(rows, "Share of the table's variance removed, reached (bar) and planned (tick)")
+
+
+LIGHT = 5.0
+"""kg: segments below are drawn in a panel of their own, or their intervals could not be seen beside the trunk's."""
+_INSIDE = {"known": "", "partly known": "#f2b08a", "cannot be known": "#fff"}
+_ROW = 19.0
+"""px of a segment's row."""
+
+
+def forest_figure(found: Identification) -> str:
+    """Return the mass of every segment: table (grey) and identified (filled = known, pale = partly known, open = not
+    known), with 95 % intervals.
+    """
+    masses = [mass_interval(known) for known in found.known if known.quantity == "mass"]
+    groups = ([k for k in masses if k.before[0] >= LIGHT], [k for k in masses if k.before[0] < LIGHT])
+    drawn = []
+    for rows in filter(None, groups):
+        ends = np.array([value for row in rows for value in (*row.before, *row.after)])
+        room = 0.04 * float(np.ptp(ends))
+        x = Axis(max(0.0, float(ends.min()) - room), float(ends.max()) + room, "mass (kg), 95 % intervals")
+        ticks = tuple((len(rows) - 1.0 - i, row.name.replace("_", " ")) for i, row in enumerate(rows))
+        y = Axis(-0.6, len(rows) - 0.4, "", ticks)
+        marks = []
+        for (at, _), row in zip(ticks, rows, strict=True):
+            edge = BLACK if row.known == "cannot be known" else RED
+            for up, (value, low, high), colour, inside, wide in (
+                (at + 0.17, row.before, GREY, "#fff", 1.0),
+                (at - 0.17, row.after, edge, _INSIDE[row.known], 1.8),
+            ):
+                marks.append(segments(x, y, np.array([[low, up], [high, up]]), Stroke(colour, "", wide)))
+                marks.append(points(x, y, np.array([value]), np.array([up]), Stroke(colour), inside=inside, size=6.5))
+        frame = Frame(height=_ROW * len(rows), left=112.0, above=4.0)
+        drawn.append(panel(x, y, marks, "mass of every segment, table and identified", frame=frame))
+    words = ("grey ring: table", "red point: identified, known", "pale: partly known", "black ring: cannot be known")
+    legend = "".join(f"<span>{word}</span>" for word in words)
+    return f'<div class="legend">{legend}</div><div class="cells">{"".join(drawn)}</div>'
+
+
+_RANKED = 15
+"""Quantities that the figure of pulls and impacts shows."""
+
+
+def impact_figure(found: Sequence[Impact]) -> str:
+    """Return the quantities with the largest impact: left the pull from the prior with what is left of its standard
+    deviation, right what that does to the moments of knee (blue) and hip (red ring).
+    """
+    rows = list(found[:_RANKED])
+    ticks = tuple(
+        (len(rows) - 1.0 - i, f"{row.segment} {row.quantity}".replace("_", " ")) for i, row in enumerate(rows)
+    )
+    y = Axis(-0.6, len(rows) - 0.4, "", ticks)
+    far = max(2.0, *(abs(row.pull) + row.left for row in rows))
+    pulled = Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior sd)")
+    largest = max(max(row.knee, row.hip) for row in rows)
+    moment = Axis(0.0, 1.08 * largest, "moment that one sd left adds (N·m RMS)")
+    left = [shade(pulled, -1.0, 1.0, kind="certain"), rule(pulled, 0.0, upright=True)]
+    right = []
+    for (at, _), row in zip(ticks, rows, strict=True):
+        ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
+        left += [segments(pulled, y, ends, Stroke(BLACK)), _point(pulled, y, row.pull, at, Stroke(BLACK))]
+        knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
+        right += [segments(moment, y, knee, Stroke(BLUE, "", 2.0)), segments(moment, y, hip, Stroke(RED, "4 2", 2.0))]
+        right += [_point(moment, y, row.knee, at + 0.16, RIGHT_SIDE)]
+        right += [_point(moment, y, row.hip, at - 0.16, LEFT_SIDE, inside="#fff")]
+    frame = Frame(height=_ROW * len(rows), left=138.0, above=4.0)
+    drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
+    drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
+    words = ("grey: one prior standard deviation", "blue point: knee flexion", "red ring: hip flexion")
+    legend = "".join(f"<span>{word}</span>" for word in words)
+    return f'<div class="legend">{legend}</div><div class="cells">{drawn}</div>'
+
+
+def _point(x: Axis, y: Axis, across: float, up: float, look: Stroke, *, inside: str = "") -> str:
+    return points(x, y, np.array([across]), np.array([up]), look, inside=inside)
+
+
+_SHOWN = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion", "trunk_flexion", "shoulder_flexion", "elbow_flexion")
+"""Joints drawn, right and left in one panel."""
+_SIDES = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "": MIDDLE_SIDE}
+
+
+def drawn_joints(bands: TorqueBands) -> list[tuple[str, list[tuple[int, str]]]]:
+    """Return what is drawn: title, and index and side ("right", "left", "") of the joints in one panel."""
+    found = []
+    for kind in _SHOWN:
+        named = [
+            (bands.joints.index(name), side)
+            for side in _SIDES
+            if (name := f"{side}_{kind}".lstrip("_")) in bands.joints
+        ]
+        if named:
+            found.append((kind.replace("_", " "), named))
+    return found
+
+
+def torque_figure(bands: TorqueBands) -> str:
+    """Return the torques of the large joints: line identified, band its 95 % interval, grey the table's."""
+    cells = []
+    for title, joints in drawn_joints(bands):
+        curves = []
+        for joint, side in joints:
+            torque, half, table = (
+                np.where(bands.use, column[:, joint], np.nan)
+                for column in (bands.torque, bands.half_width, bands.table)
+            )
+            look = _SIDES[side]
+            curves.append(Curve(f"{side or 'trunk'} identified", torque, look, half))
+            curves.append(Curve(f"{side or 'trunk'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
+        cells.append([Strip(f"{title} (N·m)", curves, 4.0)])
+    about = "Torques of the large joints; the largest values are in the table below"
+    return CurveFigure(bands.time, cells, about, bands.use, bands.trial).html()
+
 
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
 LISTED = "Cannot be known"

@@ -2,16 +2,94 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from biodance.diagnosis.archive.findings import said
+import numpy as np
+
+from biodance.diagnosis.archive.changes import ALL, History
+from biodance.diagnosis.archive.conditions import ConditionEffect
+from biodance.diagnosis.archive.judge import said
+from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
+from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
 from biodance.report.documents.plates import plates_document
 from biodance.report.documents.session import plain_values, to_text
-from biodance.report.figures.plates import QUANTITY_TITLES, condition_figure, plate_figure
-from biodance.report.figures.style import svg_address
+from biodance.report.figures.style import figure, look, svg_address
 from biodance.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%"), "N": (1.0, "N")}
+QUANTITY_TITLES = {
+    "place_x": "place along x",
+    "place_y": "place along y",
+    "gain": "weighs too much",
+    "offset_x": "offset Fx",
+    "offset_y": "offset Fy",
+    "offset_z": "offset Fz",
+    "delay": "delay of the forces",
+}
+
+
+def plate_figure(plate: str, histories: tuple[History, ...]) -> "Figure":
+    """Draw every quantity of one plate over the visits, with its level and its changes."""
+    own = [one for one in histories if plate in one.series.plates]
+    with look():
+        drawn = figure(1.5 * len(own) + 0.4)
+        for axes, one in zip(np.atleast_1d(drawn.subplots(len(own), 1, sharex=True)), own, strict=True):
+            _draw(axes, plate, one)
+        _label(axes, own[-1])
+    return drawn
+
+
+def _draw(axes: "Axes", plate: str, one: History) -> None:
+    """Draw one quantity: points with 95 % of the visit's own error, steps of the level, people who stand out."""
+    series, (factor, unit) = one.series, _SHOWN[PLATE_QUANTITIES[one.series.quantity].unit]
+    rows = series.design[:, series.plates.index(plate)] != 0
+    at, value, sd = series.visit[rows], factor * series.value[rows], factor * series.sd[rows]
+    axes.errorbar(at, value, 1.96 * sd, fmt="o", color=BLUE, markersize=3.5, linewidth=0.8)
+    strange = [i for i, v in enumerate(at) if any(s.visit == series.visits[v].name for s in one.strangers)]
+    axes.plot(at[strange], value[strange], "o", markersize=9, markerfacecolor="none", markeredgecolor=RED)
+    level = factor * one.level_over_time(plate)
+    axes.step(np.arange(level.size), level, where="mid", color=BLACK, linewidth=1.2)
+    for change in one.changes:
+        if change.plate in (plate, ALL):
+            first, last = (series.visits.index(v) for v in (change.earliest, change.latest))
+            axes.axvspan(first - 0.5, last - 0.45, color=RED, alpha=0.15, linewidth=0)
+    axes.axhline(0, color=GREY, linewidth=0.6)
+    axes.set_ylabel(f"{QUANTITY_TITLES[series.quantity]}\n({unit})")
+
+
+def _label(axes: "Axes", one: History) -> None:
+    """Write dates, else names, of as many visits as fit."""
+    visits = one.series.visits
+    chosen = np.unique(np.linspace(0, len(visits) - 1, min(len(visits), 9)).round().astype(int))
+    axes.set_xticks(chosen, [visits[i].date[:10] or visits[i].name[-12:] for i in chosen], rotation=25, ha="right")
+
+
+def condition_figure(one: ConditionEffect) -> "Figure":
+    """Draw what a kind of trial reads more in every person, and what all share."""
+    factor, unit = _SHOWN[PLATE_QUANTITIES[one.quantity].unit]
+    names = [visit.person for visit in one.visits]
+    with look():
+        drawn = figure(0.9 + 0.22 * len(names), width=5.4)
+        axes = drawn.subplots()
+        axes.errorbar(
+            factor * one.shared.own, range(len(names)), xerr=1.96 * factor * one.shared.own_sd, fmt="o", color=BLUE
+        )
+        low, high = (factor * x for x in one.shared.interval)
+        axes.axvspan(low, high, color=GREY, alpha=0.25, linewidth=0, label="all persons, 95 %")
+        axes.axvline(0, color=BLACK, linewidth=0.8)
+        axes.set_yticks(range(len(names)), [f"person {name}" for name in names])
+        axes.set_xlabel(
+            f"{one.factor} {one.level} less {one.factor} {one.base}: {QUANTITY_TITLES[one.quantity]} ({unit})"
+        )
+        axes.legend(loc="best")
+    return drawn
 
 
 def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:

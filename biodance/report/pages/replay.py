@@ -9,8 +9,7 @@ import numpy as np
 from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.records import Array
 from biodance.report.figures.still import FORCE_SCALE, RESIDUAL_SCALE
-from biodance.report.pages.template import template_text
-from biodance.report.three import three_js
+from biodance.report.pages.template import template_text, three_js
 
 _UNKNOWN = -32768
 """Whole number of a place that is not known."""

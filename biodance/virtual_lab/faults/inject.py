@@ -13,8 +13,7 @@ from biodance.errors import BiodanceError
 from biodance.lab.c3d.layout import Layout, read_layout
 from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header, read_parameters
 from biodance.lab.c3d.raw import RawC3d, read_raw
-from biodance.lab.c3d.units import metres_per_unit
-from biodance.lab.c3d.vertical import turn_to_z_up
+from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import PlateRecording
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters, unit_factors
@@ -68,10 +67,10 @@ def inject(path_in: Path, path_out: Path, fault: Fault) -> Path:
     raw = read_raw(path_in)
     header = read_header(bytes(content), str(path_in))
     layout = read_layout(len(content), header, read_parameters(bytes(content), header, str(path_in)), str(path_in))
-    metres = metres_per_unit(raw.parameters, raw.points, where=str(path_in))[0]
+    metres, turn = file_frame(raw)
     names = _names(raw)
     seen = Markers(names, np.arange(len(raw.points)) / raw.rate, metres * raw.points)
-    axes = _Axes(metres, turn_to_z_up(raw, seen)[0])
+    axes = _Axes(metres, turn)
     plates = _plates(raw, axes)
     markers = replace(seen, xyz=axes.lab(raw.points))
     before = Recording(path_in.stem, "fit", markers, tuple(plate.recording for plate in plates), raw.analog_rate, {})

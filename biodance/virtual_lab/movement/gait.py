@@ -9,10 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from biodance.records import SIDES, Array, Wrench
 from biodance.virtual_lab.movement.choreography import WIDTH, Curves
-from biodance.virtual_lab.movement.gaits import GAITS, Gait
 from biodance.virtual_lab.movement.performance import MARGIN, Performance
 from biodance.virtual_lab.movement.posing import Z, take_stance, turn_about
-from biodance.virtual_lab.movement.protocol import TrialPlan
+from biodance.virtual_lab.movement.protocol import GAITS, Gait, TrialPlan
 from biodance.virtual_lab.movement.steps import BeltFoot
 from biodance.virtual_lab.movement.stride import STRIDE_RATE, FoundStride, find_stride
 from biodance.virtual_lab.person.person import Person

@@ -11,7 +11,7 @@ import numpy as np
 from biodance.body.parts import GRAVITY
 from biodance.records import Array
 from biodance.virtual_lab.movement.choreography import septic
-from biodance.virtual_lab.movement.gaits import Gait
+from biodance.virtual_lab.movement.protocol import Gait
 
 G = float(np.linalg.norm(GRAVITY))
 HEEL, TOE = -0.27, 0.73

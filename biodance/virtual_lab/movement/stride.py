@@ -17,10 +17,9 @@ from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import Leg
 from biodance.records import SIDES, Array
-from biodance.virtual_lab.movement.gaits import Gait
 from biodance.virtual_lab.movement.performance import motion_through
 from biodance.virtual_lab.movement.posing import turn_about
-from biodance.virtual_lab.movement.protocol import STAND
+from biodance.virtual_lab.movement.protocol import STAND, Gait
 from biodance.virtual_lab.movement.steps import Aim, BeltFoot, G
 from biodance.virtual_lab.person.person import Person
 

@@ -111,9 +111,10 @@ Fault = Callable[[Recording], Recording]
 
 @dataclass(frozen=True, eq=False)
 class LabVisit:
-    """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew),
-    the ``laboratory``, the ``tolerances`` of everything (None = the laboratory's), and ``faults`` that change each
-    recording (markers, raw analog samples, parameters) before it is written.
+    """The day of a session: its ``number`` (another day: markers glued, postures performed, plates zeroed and cameras
+    levelled anew; the plates stay as they are installed), the ``laboratory``, the ``tolerances`` of everything (None =
+    the laboratory's), and ``faults`` that change each recording (markers, raw analog samples, parameters) before it is
+    written.
 
     ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the
     person beside gravity and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the
@@ -151,20 +152,27 @@ class Instruments:
 
 
 def set_up(person: Person, visit: LabVisit) -> Instruments:
-    """Draw the instruments of one visit."""
-    laboratory, tolerances, session = visit.laboratory, visit.tolerances, visit.number
-    rng = stream(person.seed, "instruments", str(session))
+    """Set up the instruments of one visit: plates as installed, zeros and level of the cameras as of the day."""
+    laboratory, tolerances = visit.laboratory, visit.tolerances
+    (_, installed), (tilt, today) = (_draw(person, visit, day) for day in (FIRST_VISIT.number, visit.number))
+    return Instruments(
+        visit,
+        tuple(replace(plate, offset=one.offset) for plate, one in zip(installed, today, strict=True)),
+        frozen_array(small_rotation(tilt), (3, 3), "tilt"),
+        draw_soft_tissue(person, visit.number, tolerances, laboratory.tissue),
+    )
+
+
+def _draw(person: Person, visit: LabVisit, day: int) -> tuple[Array, tuple[TruePlate, ...]]:
+    """Return the cameras' level (3,) rad and the plates as they are drawn for one day."""
+    laboratory, tolerances = visit.laboratory, visit.tolerances
+    rng = stream(person.seed, "instruments", str(day))
     tilt = np.array([*(tolerances.lab_tilt * rng.normal(size=2)), 0.0]) + np.array(visit.tilt)
     plates = tuple(
         lay_plate(place, laboratory.heading, side, tolerances, rng, moment_zero=laboratory.moment_zero, half=half)
         for side, place, half in _places(laboratory)
     )
-    return Instruments(
-        visit,
-        plates,
-        frozen_array(small_rotation(tilt), (3, 3), "tilt"),
-        draw_soft_tissue(person, session, tolerances, laboratory.tissue),
-    )
+    return tilt, plates
 
 
 def _places(laboratory: Laboratory) -> list[tuple[str, Array, Array]]:

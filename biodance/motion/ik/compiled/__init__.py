@@ -27,6 +27,6 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     code carries the state of the whole folder (a private attribute of numba's; tests/test_motion_compiled.py sees that
     it works).
     """
-    dispatcher = numba.njit(cache=True, fastmath=FAST, error_model="numpy")(function)
+    dispatcher = numba.njit(cache=True, fastmath=FAST, error_model="numpy", no_cfunc_wrapper=True)(function)
     dispatcher._cache._cache_file._source_stamp = STAMP
     return dispatcher

@@ -75,7 +75,8 @@ def interpolate(chain, known, values, q, single, wanted, out):
     for f in range(wanted.shape[0]):
         k = np.searchsorted(known, wanted[f], side="right") - 1
         if k < 0 or k >= known.shape[0] - 1:
-            out[f] = q[max(k, 0)]
+            for c in range(q.shape[1]):  # not as a row: see `newton.minimise_frames`
+                out[f, c] = q[max(k, 0), c]
             continue
         smooth_at(known, values, k, wanted[f], smooth)
         nearest = q[k] if wanted[f] - known[k] < known[k + 1] - wanted[f] else q[k + 1]

@@ -191,7 +191,8 @@ def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
             if better:
                 damping = 0.1 * damping if damping > 1e-4 else 0.0
                 cost[f] = lowered
-                now[:] = new
+                for i in range(nq):  # an array as a whole brings numba's words on unequal shapes along: 2 s to compile
+                    now[i] = new[i]
                 bent = False
             else:
                 if (convex or not newton) and not retreat:

@@ -145,7 +145,8 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
                 column[:] = 0.0
                 _add_product(p, first[:, d], column)
                 _add_product(R[:, d], f, column)
-                own[3:, 1 + d] = column
+                for c in range(3):
+                    own[3 + c, 1 + d] = column[c]
 
 
 @compiled

@@ -1,0 +1,151 @@
+"""Where the feet and the pelvis were, by their markers."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from biodance.errors import BiodanceError
+from biodance.lab.markers.sets import landmark, read_marker_set
+from biodance.motion.contact.soles import OUTLINE
+from biodance.records import SIDES, Array, Markers
+from biodance.records.arrays import rate_of
+
+_UNSEEN = 0.05
+"""s over which a marker that was not seen is believed to go on straight."""
+_KEPT = 64
+"""Sets of times at which a foot's place is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootPath:
+    """One foot: ``time`` (T,) s; ``heel``, ``toe`` (T, 3) m of its markers, lab frame, NaN = not seen; ``centred``
+    False: its only toe marker is on one edge, and the line to it is not that of the foot.
+    """
+
+    side: str
+    time: Array
+    heel: Array
+    toe: Array
+    centred: bool = True
+    _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return heel and toe (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
+
+        It is kept: witnesses are asked for the same times again and again, of recordings whose plates were altered.
+        """
+        key = time.tobytes()
+        if key not in self._known:
+            if len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[key] = path_at(self.time, self.heel, time), path_at(self.time, self.toe, time)
+        return self._known[key]
+
+    def outline(self, time: Array) -> Array:
+        """Return the sole (n, P, 2) m seen from above, from heel and toe marker."""
+        heel, toe = (path[:, :2] for path in self.at(time))
+        ahead = toe - heel
+        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        return heel[:, None] + OUTLINE[:, :1] * ahead[:, None] + OUTLINE[:, 1:] * left[:, None]
+
+    def axes(self, time: float) -> Array:
+        """Return the horizontal unit vectors (2, 2) from heel to toe marker and outwards of it, at ``time`` s."""
+        heel, toe = (path[0, :2] for path in self.at(np.array([time])))
+        ahead = (toe - heel) / np.linalg.norm(toe - heel)
+        return np.stack([ahead, np.array([ahead[1], -ahead[0]]) * (1.0 if self.side == "right" else -1.0)])
+
+    def in_foot(self, time: Array, point: Array) -> tuple[Array, Array, Array]:
+        """Return how far ``point`` (n, 2) m lies ahead of the heel marker and outwards of the line to the toe marker,
+        m (n,), and the horizontal distance of the two markers (n,) m.
+        """
+        heel, toe = (path[:, :2] for path in self.at(time))
+        length = np.linalg.norm(toe - heel, axis=1)
+        ahead = (toe - heel) / length[:, None]
+        out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
+        return np.sum((point - heel) * ahead, axis=1), np.sum((point - heel) * out, axis=1), length
+
+    @property
+    def rate(self) -> float:
+        """Hz of the markers."""
+        return rate_of(self.time)
+
+    @cached_property
+    def velocity(self) -> Array:
+        """(T, 3) m/s of the middle between the two markers."""
+        if self.time.size < 2:
+            return np.zeros((self.time.size, 3))
+        return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
+
+    @cached_property
+    def pointing(self) -> Array:
+        """(3,) m from heel to toe marker, the median over the trial."""
+        return np.asarray(np.nanmedian(self.toe - self.heel, axis=0))
+
+    def drift(self, time: Array) -> Array:
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none. It is
+        kept, like the places.
+        """
+        key = time.tobytes()
+        if key not in self._drifts:
+            if len(self._drifts) >= _KEPT:
+                self._drifts.pop(next(iter(self._drifts)))
+            velocity = path_at(self.time, self.velocity, time)
+            known = velocity[np.isfinite(velocity).all(axis=1)]
+            self._drifts[key] = np.median(known, axis=0) if len(known) else np.full(3, np.nan)
+        return self._drifts[key]
+
+
+def path_at(known: Array, path: Array, time: Array) -> Array:
+    """Return a path (T, n) at other times, straight between frames; NaN where no frame near is known."""
+    seen = np.isfinite(path).all(axis=1)
+    if not seen.any():
+        return np.full((len(time), path.shape[1]), np.nan)
+    at, values = known[seen], path[seen]
+    out = np.stack([np.interp(time, at, column) for column in values.T], axis=1)
+    after = np.clip(np.searchsorted(at, time), 0, at.size - 1)
+    near = np.minimum(np.abs(time - at[after]), np.abs(time - at[np.maximum(after - 1, 0)]))
+    out[near > _UNSEEN] = np.nan
+    return out
+
+
+def feet_of(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ...]:
+    """Return both feet by the landmarks heel and toe of the first of the ``known`` marker sets that has all four; ()
+    without.
+    """
+    if markers is None or not markers.time.size:
+        return ()
+    for name in known:
+        found = {(s, p): _landmark(markers, name, f"{s}_{p}") for s in SIDES for p in ("heel", "toe")}
+        places = {key: path for key, path in found.items() if path is not None and np.isfinite(path).any()}
+        if len(places) == len(found):
+            return tuple(
+                FootPath(s, markers.time, places[s, "heel"], toe, _is_centred(markers, name, s, toe))
+                for s, toe in ((s, places[s, "toe"]) for s in SIDES)
+            )
+    return ()
+
+
+def _is_centred(markers: Markers, set_name: str, side: str, toe: Array) -> bool:
+    """Return whether a toe (T, 3) m is more than the marker on one edge of the foot alone, standing in for it."""
+    edges = [_landmark(markers, set_name, f"{side}_toe_{edge}") for edge in ("medial", "lateral")]
+    return not any(edge is not None and np.array_equal(toe, edge, equal_nan=True) for edge in edges)
+
+
+def _landmark(markers: Markers, set_name: str, name: str) -> Array | None:
+    try:
+        return landmark(markers, read_marker_set(set_name), name)
+    except BiodanceError:
+        return None
+
+
+def pelvis_path(markers: Markers | None, known: tuple[str, ...]) -> Array | None:
+    """Return the middle (T, 3) m of the front and back of the pelvis; None where no ``known`` set has them."""
+    for name in known if markers is not None else ():
+        assert markers is not None
+        right, left, back = (_landmark(markers, name, place) for place in ("right_asis", "left_asis", "mid_psis"))
+        if right is not None and left is not None and back is not None:
+            middle = ((right + left) / 2 + back) / 2
+            return middle if np.isfinite(middle).any() else None
+    return None
