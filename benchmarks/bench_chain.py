@@ -110,11 +110,12 @@ def row(folder: Path, number: int, subject: Subject, motion: str, way: Way) -> d
     if not kept.exists():
         place = session(folder, number, subject, motion, way)
         kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps(_identified(place), default=np.ndarray.tolist))
+        kept.write_text(json.dumps(identified(place), default=np.ndarray.tolist))
     return dict(json.loads(kept.read_text()))
 
 
-def _identified(place: Path) -> dict[str, Any]:
+def identified(place: Path) -> dict[str, Any]:
+    """Return what `row` keeps of the session in ``place``."""
     result = examine(read_session(place))
     document = json.loads((place / "truth" / "truth.json").read_text())
     one, body = identification_of(result), result.body
@@ -133,13 +134,15 @@ def _identified(place: Path) -> dict[str, Any]:
     mass, com = ("mass",), ("com x", "com y", "com z")
     rms = np.array([[v.table_agreement.rms, v.identified_agreement.rms] for v in one.validations]).mean(axis=0)
     phi = true.phi.reshape(-1, 10)
+    table = {"mass": body.sip.mass[:, None], "com": body.sip.com}
     return {
         "segments": true.segments,
         "seconds": sum(float(np.ptp(t.motion.time)) for t in result.trials if t.trial.role == "fit" and t.motion),
         "true": {"mass": phi[:, :1], "com": phi[:, 1:4] / phi[:, :1]},
+        "table": table,
         **{
             which: {"mass": column(key, mass), "com": column(key, com)}
-            for which, key in (("table", "table"), ("identified", "value"), ("sd", "sd"), ("table_sd", "table_sd"))
+            for which, key in (("identified", "value"), ("sd", "sd"), ("table_sd", "table_sd"))
         },
         "squats": [[float(np.linalg.norm(r[:3])), float(np.linalg.norm(r[3:]))] for r in rms],
         "sizes": vars(one.identification.sizes),

@@ -1,11 +1,12 @@
 """Dances that people follow: how much is called at once, what imprecise people leave, what will be known.
 
     OMP_NUM_THREADS=1 python benchmarks/bench_followable.py FOLDER [--protocols short,easy] [--bodies reference,careful]
-        [--seconds 800] [--page docs/benchmarks/dance.md]
+        [--seconds 800] [--price] [--page docs/benchmarks/dance.md]
 
 A row a body and protocol, all with seed 0. Everything is kept in FOLDER: what is found there is not designed again, and
 after ``--seconds`` no other one is begun. The margins are those that the design itself reports, of 200 imprecise
-performers. ``--page`` writes the rows that are there into that page, between the marks of the table.
+performers. ``--price`` also says what the postures would tell if they were chosen freely.
+``--page`` writes the rows that are there into that page, between the marks of the table.
 """
 
 import argparse
@@ -35,7 +36,7 @@ HEADING = (
 )
 
 
-def found(name: str, protocol: str, folder: Path) -> dict[str, Any]:
+def found(name: str, protocol: str, folder: Path, price: bool) -> dict[str, Any]:
     """Return the numbers of the dance of one body and protocol, designed if it is not in the folder."""
     path = folder / f"{name}_{protocol}.json"
     if path.exists():
@@ -68,7 +69,7 @@ def found(name: str, protocol: str, folder: Path) -> dict[str, Any]:
         if not out["left"]:
             few = rehearse_imprecisely(dance, plan.limits, who=range(_FEW))
             out["few"] = {room.limit: room.worst for room in few.rooms}
-        if np.isfinite(plan.instructions):
+        if price and np.isfinite(plan.instructions):
             free = expect(freer_dance(body, plan, seed=0), steps=1)
             out["free"] = [float(_rms(free.mass)[-1]), float(_rms(free.com)[-1])]
     path.write_text(json.dumps(out), encoding="utf-8")
@@ -79,16 +80,16 @@ def _rms(sd: np.ndarray) -> np.ndarray:
     return np.asarray(np.sqrt(np.mean(sd**2, axis=1)))
 
 
-def row(name: str, protocol: str, folder: Path) -> str:
+def row(name: str, protocol: str, folder: Path, price: bool) -> str:
     """Return the row of one body and protocol."""
-    one = found(name, protocol, folder)
+    one = found(name, protocol, folder, price)
     if "refused" in one:
         return f"| {name} | {protocol} | refused: {one['refused']} |" + " |" * 9
     mean, most = one["instructions"]
     few = "" if one["left"] else f" ({_FEW})"
     left = " | ".join(f"{1000 * worst:.0f}{few}" for worst in (one["left"] or one["few"]).values())
     mass, com = ([f"{factor * sd:.{digits}f}" for sd in one[key]] for key, factor, digits in _SIZES)
-    free = f"{one['free'][0]:.2f}, {1000 * one['free'][1]:.1f}" if "free" in one else "it is"
+    free = f"{one['free'][0]:.2f}, {1000 * one['free'][1]:.1f}" if "free" in one else "–"
     return (
         f"| {name} | {protocol} | {one['postures']} | {one['duration_s']:.0f} | {mean:.1f}, {most} | "
         f"{one['kept'][0]} of {one['kept'][1]} | {left} | {' -> '.join(mass)} | {' -> '.join(com)} | {free} | "
@@ -118,6 +119,7 @@ def main() -> None:
     parser.add_argument("--protocols", default=",".join(_PROTOCOLS))
     parser.add_argument("--bodies", default=",".join(BODIES))
     parser.add_argument("--seconds", type=float, default=np.inf)
+    parser.add_argument("--price", action="store_true")
     parser.add_argument("--page", type=Path)
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
@@ -127,7 +129,7 @@ def main() -> None:
         for name in chosen.bodies.split(","):
             there = (chosen.folder / f"{name}_{protocol}.json").exists()
             if there or (not chosen.page and time.time() - begun < chosen.seconds):
-                rows.append(row(name, protocol, chosen.folder))
+                rows.append(row(name, protocol, chosen.folder, chosen.price))
                 print(rows[-1], flush=True)
     if chosen.page:
         write_page(chosen.page, rows)

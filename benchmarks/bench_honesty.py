@@ -39,7 +39,7 @@ from biodance.virtual_lab.simulate import simulate_session
 
 REAL = (
     *(f"biomechzoo/HC{number}A" for number in ("030", "031", "032", "038", "044", "050", "055")), "adl_gait", "pycgm",
-    "c3d_parser_Sydney", "c3d_parser_QCMAS", "gaitalytics/test_small", "gaitalytics/treadmill_no_events",
+    "c3d_parser_Sydney", "c3d_parser_QCMAS", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "c3d_parser",
 )  # fmt: skip
 TRULY = {
     "biomechzoo/HC030A": {"labels_swapped"},

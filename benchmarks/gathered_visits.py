@@ -10,7 +10,7 @@ from pathlib import Path
 from virtual_visits import CACHE, TrackedVisit, visit
 
 import biodance
-from biodance.identification.identification import Identification, conclude
+from biodance.identification.identification import Identification, conclude, conclude_trials
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
 from biodance.identification.mismatch import Mismatch, mismatch
@@ -36,8 +36,10 @@ class Gathered:
         return tuple(fit.name for fit in self.visit.fits)
 
     def identified(self) -> Identification:
-        """Return the identification."""
-        return conclude(self.visit.body, self.total, self.names, noise=self.noise, found=self.found)
+        """Return the identification: `conclude_trials`, without learning again what is kept here."""
+        one = self.visit
+        found = conclude(one.body, self.total, self.names, noise=self.noise, found=self.found)
+        return conclude_trials(one.body, self.total, one.fits) if found.diluted else found
 
 
 SOURCES = ("statistics", "learning", "loads", "mismatch")

@@ -9,6 +9,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from biodance.body.human.human import human
 from biodance.identification.dilution import carried_away, undiluted
+from biodance.identification.identification import identify_body
+from biodance.identification.loads import compact_load
 from biodance.identification.posterior import posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
@@ -95,3 +97,40 @@ def test_masses_may_move_by_what_is_uncertain(shaken: Statistics, sds: float, ca
 def test_segments_of_no_person_are_left_alone(shaken: Statistics) -> None:
     names = tuple(f"link_{i}" for i in range(len(BODY.segments)))
     np.testing.assert_array_equal(undiluted(shaken, BODY.sip.phi, names).gram, shaken.gram)
+
+
+def test_statistics_without_their_fastest_band_are_those_of_fewer_bands(shaken: Statistics) -> None:
+    slower = shaken.slower()
+    assert slower.layout.bands == replace(BANDS, edges=BANDS.edges[:-1])
+    np.testing.assert_array_equal(slower.gram, shaken.gram[:-1])
+    np.testing.assert_array_equal(slower.count, shaken.count[:-1])
+
+
+@pytest.mark.parametrize("slow", [True, False])
+def test_a_band_that_only_noise_fills_is_left_out_and_said(slow: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = smooth_motion(BODY, np.random.default_rng(3), frames=400, size=0.3)
+    fit = Fit("t", real, predict_wrench(BODY, real), np.ones(400, dtype=bool))
+    monkeypatch.setattr("biodance.identification.calibration.carried_away", lambda *_: slow)
+    found = identify_body(BODY, (fit,))
+    assert found.diluted is slow
+    assert found.noise.bands.edges[-1] == (2.5 if slow else 6.0)
+    assert any("faster than 2.5 Hz was left out" in note for note in found.notes) is slow
+
+
+def test_gains_are_measured_under_the_load_that_the_data_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = smooth_motion(BODY, np.random.default_rng(5), frames=400, size=0.3)
+    arm, seen = 10 * BODY.segment_index("left_forearm_hand"), []
+    loaded = np.array(BODY.sip.phi)
+    loaded[arm : arm + 10] += 2.4 * compact_load(loaded[arm + 1 : arm + 4] / loaded[arm])
+    carrying = replace(BODY, sip=replace(BODY.sip, phi=loaded))
+    fit = Fit("t", real, predict_wrench(carrying, real), np.ones(400, dtype=bool))
+
+    def watched(total: Statistics, phi: Array, segments: tuple[str, ...]) -> Statistics:
+        seen.append(phi[arm] - BODY.sip.phi[arm])
+        return undiluted(total, phi, segments)
+
+    monkeypatch.setattr("biodance.identification.calibration.undiluted", watched)
+    belief = identify_body(BODY, (fit,)).belief
+    kept = belief.mean[arm] - BODY.sip.phi[arm]
+    assert kept < 1.0, "the table keeps most of it from the arm"
+    assert kept + 0.3 < seen[0] < 2.4

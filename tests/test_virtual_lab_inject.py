@@ -111,8 +111,8 @@ def test_real_recordings_of_four_laboratories_take_faults(name: str, data: Path,
     x = about_centre(before, 0)
     gain = about_centre(written(path, tmp_path / "gain.c3d", "plate_gain:target=plate1:Fz,gain=0.04"), 0)
     np.testing.assert_allclose(gain - x, 0.04 * x * np.eye(6)[2], atol=0.05)
-    moved = written(path, tmp_path / "moved.c3d", "plate_position:target=plate1:x,shift=0.02")
-    np.testing.assert_allclose(moved.plates[0].centre - before.plates[0].centre, [0.02, 0, 0], atol=1e-6)
+    moved = written(path, tmp_path / "moved.c3d", "plate_position:target=plate1:y,shift=0.02")
+    np.testing.assert_allclose(moved.plates[0].centre - before.plates[0].centre, [0, 0.02, 0], atol=1e-6)
     np.testing.assert_allclose(about_centre(moved, 0), x, atol=1e-3)
     late = about_centre(written(path, tmp_path / "late.c3d", "time_delay:delay=0.02"), 0)
     shift = 0.02 * before.plates[0].wrench.rate

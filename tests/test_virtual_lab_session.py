@@ -158,6 +158,14 @@ def test_each_instrument_fault_is_where_it_was_put(protocol):
     np.testing.assert_allclose(offset - clean, np.tile(instruments.plates[0].offset, (len(clean), 1)), atol=1e-3)
 
 
+def test_plates_stay_installed_and_are_zeroed_anew():
+    person = make_person(SUBJECT, 3)
+    first, second = (set_up(person, LabVisit(day)).plates[0] for day in (0, 1))
+    np.testing.assert_array_equal(first.mixing, second.mixing)
+    np.testing.assert_array_equal(first.centre, second.centre)
+    assert np.all(first.offset != second.offset)
+
+
 def test_markers_wander_on_the_skin_by_some_millimetres(protocol):
     person = make_person(SUBJECT, 3)
     wander = replace(REALISTIC, camera_noise=0.0, camera_wander=0.0, gaps_per_minute=0.0, lab_tilt=0.0)

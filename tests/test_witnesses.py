@@ -1,5 +1,6 @@
 """Witnesses see what was made, hide no fault, and the family keeps its contract."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,11 +9,12 @@ import pytest
 from walkers import WEIGHT, Stand, plate, walker
 from walking import FOOT, MASS, STANCE, Wrong, standing, walk
 
-from biodance.diagnosis.heard import hear, sights
+from biodance.diagnosis.heard import hear, put_right, sights
 from biodance.diagnosis.testimony import size_by, weigh
 from biodance.effects import causes
 from biodance.errors import BiodanceError
-from biodance.records import Session, Subject, Trial, Wrench
+from biodance.lab.markers.sets import GUESSED
+from biodance.records import SIDES, Session, Subject, Trial, Wrench
 from biodance.witnesses import (
     FAMILY,
     Observation,
@@ -203,6 +205,32 @@ def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str
         low, high = found[0].parameters[0].interval
         assert low <= size <= high
         assert found[0].parameters[0].sd < 0.3 * size
+
+
+def test_putting_a_delay_right_gives_back_what_was_seen_without_it() -> None:
+    """What 40 ms add to steps is no straight line: where they are taken off, everything is as in the clean walk."""
+    late = hear(session(standing(), walk(Wrong(late=0.04)))).counting
+    clean = {one.stride: one.value - one.expected for one in hear(session(standing(), walk())).observations}
+    added, _ = put_right(late, {("time_delay", ""): 0.04})
+    compared = [
+        (one.value - one.expected + more - clean[one.stride]) / one.sd
+        for one, more in zip(late.observations, added, strict=True)
+        if one.stride in clean and np.isfinite(more)
+    ]
+    straight = late.traces["time_delay", ""] / [one.sd for one in late.observations]
+    assert len(compared) > 20
+    assert np.abs(compared).max() < 0.5 < np.abs(0.04 * straight).max()
+
+
+def test_a_toe_marker_at_one_edge_says_nothing_of_the_plate_s_place() -> None:
+    trial = walk()
+    for toe, counts in (("toe", True), ("toe_lateral", False)):
+        places = {"HEE": "heel", "TOE": toe}
+        given = {side[0].upper() + label: f"{side}_{place}" for side in SIDES for label, place in places.items()}
+        found = observe(
+            recording(replace(trial, marker_set=GUESSED + json.dumps(given)), mass=MASS), ["foot_across", "foot_along"]
+        )
+        assert {one.counts for one in found} == {counts}
 
 
 def test_an_unknown_mass_and_missing_feet_are_silence_not_an_error() -> None:

@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 done but something was refused or needs a person, 2 could 
 130 stopped by Ctrl-C.
 """
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -43,6 +44,10 @@ __all__ = [
 ]
 
 
+_NEW_OBJECTS = 50_000
+"""How many objects may be new before circles among them are looked for: modules alone are more than Python's 700."""
+
+
 def run(tokens: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; every expected fault is one sentence on stderr."""
     from biodance.errors import BiodanceError
@@ -77,4 +82,5 @@ def _out(tokens: Sequence[str] | None) -> str:
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    gc.set_threshold(_NEW_OBJECTS)
     sys.exit(run())

@@ -44,7 +44,7 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
     return Calibrated(temper(data, found, sizes), sizes, noise)
 
 
-def give_back_dilution(
+def give_back(
     body: Body, total: Statistics, measured: Calibrated, found: Mismatch, before: Sip, *, open_table: bool
 ) -> Calibrated:
     """Return the ``measured`` data of ``total`` with their dilution given back; as they are, and ``diluted``, where

@@ -14,7 +14,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.calibration import discounted, give_back_dilution
+from biodance.identification.calibration import discounted, give_back
 from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
@@ -261,7 +261,7 @@ def conclude(
     room = before if machine else may_carry(body, before)
     got = discounted(total, noise or learn_noise(total, room)[0], found, room)
     if found is not None and not machine:
-        got = give_back_dilution(body, total, got, found, before, open_table=prior is None)
+        got = give_back(body, total, got, found, before, open_table=prior is None)
     data = got.data
     before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
     belief = posterior(data, before)

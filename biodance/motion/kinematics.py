@@ -77,9 +77,9 @@ class SegmentMotion:
     acceleration: Array
 
 
-def segment_motion(body: Body, motion: Motion) -> SegmentMotion:
-    """Return the spatial motion of all segments of ``body`` during ``motion``."""
-    pose = poses(body, motion.q)
+def segment_motion(body: Body, motion: Motion, *, pose: Poses | None = None) -> SegmentMotion:
+    """Return the spatial motion of all segments of ``body`` during ``motion``, whose ``pose`` may be known already."""
+    pose = pose or poses(body, motion.q)
     frames, n = motion.time.size, len(body.joints)
     w_root, dw_root, acc_root = np.zeros((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3))
     if body.n_root:

@@ -32,6 +32,10 @@ bounded, not exact.
 """
 
 
+_BLOCK = 2048
+"""Frames whose angles are taken from the smooth coordinates together: little memory, whatever the length."""
+
+
 def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None) -> Motion:
     """Return the smoothed motion of ``body`` from the postures ``q`` (T, nq) at the times ``time`` (T,) s, evenly
     spaced.
@@ -53,16 +57,31 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     chart = chart_of(body)
     rough = np.asarray(q).T
     even, first, second = _slow(chart, rough, _rate(time), settings)
-    posture = chart.posture(even, rough[len(rough) - chart.joint_count :])
-    v, a = np.empty((2, body.nv, len(time)))
-    v[body.n_root + chart.single], a[body.n_root + chart.single] = first.angle, second.angle
-    angles = chart.joints.angles_of(posture[len(posture) - chart.joint_count :])
-    rates = _ball_rates(chart.joints, angles, even.ball, first.ball, second.ball)
+    posture, v, a = (np.empty((len(time), count)) for count in (body.nq, body.nv, body.nv))
+    for start in range(0, len(time), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        near, at = rough[len(rough) - chart.joint_count :, part], (one.at(part) for one in (even, first, second))
+        posture[part], v[part], a[part] = _moving(chart, near, *at)
+    for filled in (posture, v, a):
+        filled.setflags(write=False)  # the record keeps them without a copy
+    return Motion(time, posture, v, a, joint_names=names)
+
+
+def _moving(chart: Chart, near: Array, at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array, Array]:
+    """Return posture (B, nq), v and a (B, nv) from the coordinates of ``chart`` and their two first derivatives;
+    ``near`` (n, B) rad decides between equal sets of angles.
+    """
+    joints, n_root = chart.joints, chart.n_root
+    posture = chart.posture(at, near)
+    v, a = np.empty((2, n_root + chart.joint_count, near.shape[1]))
+    v[n_root + chart.single], a[n_root + chart.single] = first.angle, second.angle
+    angles = joints.angles_of(posture[len(posture) - chart.joint_count :])
+    rates = _ball_rates(joints, angles, at.ball, first.ball, second.ball)
     for k in range(3):
-        v[body.n_root + chart.joints.first + k], a[body.n_root + chart.joints.first + k] = rates[0][k], rates[1][k]
-    if body.n_root:
-        v[:6], a[:6] = _root_rates(even, first, second)
-    return Motion(time, posture.T, v.T, a.T, joint_names=names)
+        v[n_root + joints.first + k], a[n_root + joints.first + k] = rates[0][k], rates[1][k]
+    if n_root:
+        v[:6], a[:6] = _root_rates(at, first, second)
+    return posture.T, v.T, a.T
 
 
 def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[Smooth, Smooth, Smooth]:

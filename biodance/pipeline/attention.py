@@ -18,6 +18,10 @@ from biodance.records.attention import Attention, Judged, Level, strongest_first
 
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
+_EMPTY = "empty_plate"
+"""The witness that sees plates with nobody on them."""
+_WEIGHED = "kg are declared: check the mass"
+"""What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
 _ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
 EXPLAINS: dict[str, tuple[str, ...]] = {
     "mass on the plates": (
@@ -156,7 +160,8 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [Attention("warn", text.removeprefix("Warning: "), "", "body") for text in result.doubts]
     for trial in result.trials:
         level: Level = "fail" if trial.status == "refused" else "warn"
-        found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in trial.reasons]
+        said = [text for text in trial.reasons if not (_WEIGHED in text and _cause_of("mass on the plates", findings))]
+        found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
     found += [_checked(check, findings) for check in result.all_checks if not check.inside]
     load = result.identification.search if result.identification else None
     return strongest_first([*found, *_load(load)])
@@ -164,11 +169,16 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
 
 def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
     """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
-    mine = next((causes for what, causes in EXPLAINS.items() if check.what.startswith(what)), ())
-    cause = next((in_words(finding) for finding in findings if finding.effect in mine), "")
+    cause = _cause_of(check.what, findings)
     then = f"{cause}, which was found, may explain it." if cause else check.advice
     text = f"{check.value}, should be {check.limit}. {then[:1].upper()}{then[1:]}".strip()
     return Attention("note" if cause else "warn", text, check.where, check.what)
+
+
+def _cause_of(checked: str, findings: Sequence[Finding]) -> str:
+    """Return the first finding that may explain a check of that name, in words; "" for none."""
+    mine = next((causes for what, causes in EXPLAINS.items() if checked.startswith(what)), ())
+    return next((in_words(finding) for finding in findings if finding.effect in mine), "")
 
 
 def _load(search: LoadSearch | None) -> list[Attention]:
@@ -212,8 +222,8 @@ def _short(reason: str) -> str:
 
 
 def _heard(one: Diagnosis) -> str:
-    """Return that the witnesses were asked, as a sentence; "" where they saw nothing."""
-    trials = len({o.trial for o in one.witnesses.observations}) if one.witnesses else 0
+    """Return that the witnesses were asked, as a sentence; "" where they saw nobody on a plate."""
+    trials = len({o.trial for o in one.witnesses.observations if o.witness != _EMPTY}) if one.witnesses else 0
     return (
         f" Plates and clocks, judged alone, are as without fault in {trials} trial{'s' * (trials > 1)}."
         if trials

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.watch import LiveWarning
-from biodance.identification.identification import Identification
+from biodance.errors import TrialRefused
+from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import Knowability
 from biodance.identification.statistics import Fit, believable
-from biodance.identification.streaming import RunningBelief, begin, belief_before, summed_pressure
+from biodance.identification.streaming import RunningBelief, belief_before, summed_pressure
 from biodance.lab.filters import force_filter, motion_filter
 from biodance.lab.prepare import at_marker_times
 from biodance.motion.contact.contact import Contact, ground_contact
@@ -155,17 +156,19 @@ class LiveSession:
         """Take in what the filter still held back, and return all that was found."""
         for _ in self._work or ():
             pass
-        count, cause, fit, found = len(self._q), "", None, None
+        count, found = len(self._q), None
         if self._done < count:
             for _ in self._take(count, count):
                 pass
         fit = self._fit()
-        if fit is not None and fit.use.any():
-            stream = begin(self.body, rate=self.markers.rate, verdicts=False).feed(fit.motion, fit.wrench, fit.use)
-            found = stream.identification((fit,))
-            cause = found.cause
-        else:
+        if fit is None or not fit.use.any():
             cause = "No frame had all its ground contact measured by the plates: nothing can be identified."
+            return LiveResult(fit, None, cause, self.warnings, frame_s, wall_s, self.state())
+        try:
+            found = identify_body(self.body, (fit,))
+            cause = found.cause
+        except TrialRefused as refused:
+            cause = str(refused)
         return LiveResult(fit, found, cause, self.warnings, frame_s, wall_s, self.state())
 
     def _take(self, stop: int, until: int) -> Iterator[None]:

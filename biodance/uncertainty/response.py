@@ -30,7 +30,7 @@ TRACKING_RIDGE = 1e-6
 they are."""
 _REACH = 100
 """Samples from an end beyond which a spline does not feel it: 2.3^-100 is 1e-36."""
-_TOGETHER = 128
+_TOGETHER = 64
 """Frames worked on at once where every frame stands alone."""
 _NOTHING = 1e-17
 """Share of the largest coefficient below which a double cannot show what is left out."""

@@ -44,12 +44,12 @@ def walks(seen: SeenTrial, step: FootStep) -> bool:
 
 
 @lru_cache(maxsize=128)
-def step_course(seen: SeenTrial, step: FootStep) -> StepCourse | None:
-    """Return one step sample by sample; None where its plate's force does not show it or the foot runs. Of the last
-    steps it is kept: several witnesses ask for it.
+def step_course(seen: SeenTrial, step: FootStep, *, running: bool = False) -> StepCourse | None:
+    """Return one step sample by sample; None where its plate's force does not show it or the foot runs (with
+    ``running``: walks). Of the last steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
-    if part is None or not walks(seen, step):
+    if part is None or walks(seen, step) is running:
         return None
     wrench = seen.under(step)
     time, force, cop = wrench.time[part], wrench.force[part], seen.pressure(step, part)

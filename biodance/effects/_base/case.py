@@ -56,7 +56,7 @@ class Case:
     @cached_property
     def segments(self) -> SegmentMotion:
         """Spatial motion of all segments in the lab frame."""
-        return segment_motion(self.body, self.motion)
+        return segment_motion(self.body, self.motion, pose=self.poses)
 
     @cached_property
     def predicted(self) -> Array:

@@ -5,6 +5,7 @@ Computed at 25 Hz or more (the low-pass leaves nothing above 10 Hz) and interpol
 all causes.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +23,8 @@ _RATE = 25.0
 """Hz, at least, of the frames in which the answer is computed."""
 _ENDS = 10
 """Frames at each end of the trial that are all computed."""
+_TOGETHER = 8
+"""Frames of such a mean worked on at once: little memory, however many markers there are."""
 MEANS = 60
 """Frames, about, over which the mean marker residual is taken: it changes slowly."""
 
@@ -51,13 +54,15 @@ class Geometry:
         """What one metre of every marker of the model does, three axes of its segment each: P = 3 K."""
         answer = self.answer
         count = len(answer.segment)
-        turn = answer.pose.rotation[self._few][:, list(answer.segment)]
-        moved = np.zeros((len(turn), count, 3, count, 3))
-        moved[:, range(count), :, range(count)] = np.moveaxis(turn, 1, 0)
-        posture = answer.follow(answer.marker_slopes())
-        return Changes(
-            self._wrench(self.matter @ posture), self._residual(posture, moved.reshape(len(turn), count, 3, -1))
-        )
+        own, turn = range(count), answer.pose.rotation[:, list(answer.segment)]
+
+        def moved(some: Index) -> Array:
+            place = np.zeros((some.size, count, 3, count, 3))
+            place[:, own, :, own] = np.moveaxis(turn[some], 1, 0)
+            return place.reshape(some.size, count, 3, -1)
+
+        posture = answer.follow_markers()
+        return Changes(self._wrench(self.matter @ posture), self._residual(posture, moved))
 
     @cached_property
     def joint_changes(self) -> "Changes":
@@ -71,10 +76,15 @@ class Geometry:
             centre, carried = _moves(answer, chain)
             slopes.append(answer.joint_slopes(chain, centre, carried))
             direct.append(self.direct[:, :, hanging[chain[-1]] > 0].sum(axis=2) @ carried)
-            moved.append(answer.hangs[chain[-1]][:, None, None] * carried[self._few][:, None])
+            moved.append(carried)
+        on = [answer.hangs[chain[-1]][:, None, None] for chain in chains(answer.body)]
         posture = answer.follow(np.concatenate(slopes, axis=2))
         wrench = self._wrench(self.matter @ posture + np.concatenate(direct, axis=2))
-        return Changes(wrench, self._residual(posture, np.concatenate(moved, axis=3)))
+        pairs = list(zip(on, moved, strict=True))
+        return Changes(
+            wrench,
+            self._residual(posture, lambda few: np.concatenate([k * one[few][:, None] for k, one in pairs], axis=3)),
+        )
 
     @property
     def changes(self) -> "GeometryChanges":
@@ -89,21 +99,27 @@ class Geometry:
     def _wrench(self, nine: Array) -> Array:
         return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
 
-    def _residual(self, posture: Array, moved: Array) -> Array:
+    def _residual(self, posture: Array, moved: Callable[[Index], Array]) -> Array:
         """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the
-        model's markers move by ``moved`` (f, K, 3, P) m in a few frames at fixed posture and the posture changes by
+        model's markers move by ``moved`` of some frames, (f, K, 3, P) m, at fixed posture and the posture changes by
         ``posture`` (F, nv, P).
         """
-        answer, few = self.answer, self._few
-        segment, (frames, count) = list(answer.segment), answer.weight[few].shape
+        few = np.arange(len(self.time))[self._few]
+        lasting = self.seen[few] * np.gradient(self.time)[few, None]
+        share = lasting / np.maximum(lasting.sum(axis=0), 1e-12)
+        parts = zip(*(np.array_split(one, max(1, few.size // _TOGETHER)) for one in (few, share)), strict=True)
+        return np.sum([self._mean_change(some, lasts, posture, moved(some)) for some, lasts in parts], axis=0)
+
+    def _mean_change(self, few: Index, share: Array, posture: Array, moved: Array) -> Array:
+        """Return what frames ``few`` (f,) add to that mean, of which they are the ``share`` (f, K)."""
+        answer, segment = self.answer, list(self.answer.segment)
+        frames, count = share.shape
         wide = (frames, count, 3, posture.shape[2])
         place = (answer.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved
         turns = self.turns[few][:, segment].reshape(frames, 3 * count, -1)
         weight = np.where(answer.weight > 0, answer.weight, 1.0)[few]
         apart = skew(answer.apart[few] / weight[..., None])
         change = -(apart @ (turns @ posture[few]).reshape(wide)) - place
-        lasting = self.seen[few] * np.gradient(self.time)[few, None]
-        share = lasting / np.maximum(lasting.sum(axis=0), 1e-12)
         back = np.swapaxes(answer.pose.rotation[few][:, segment], 2, 3) * share[..., None, None]
         return np.asarray((back @ change).sum(axis=0))
 

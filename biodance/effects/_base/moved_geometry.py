@@ -16,6 +16,7 @@ so that nine numbers per frame carry everything, and only they are filtered and 
 "Moved matter").
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,6 +33,8 @@ from biodance.spatial import cross, skew
 
 AT_LIMIT = 5e-3
 """rad: a joint so near to a limit that its markers push it against is held there."""
+_FRAMES = 32
+"""Frames whose answers to every marker are found together: little memory."""
 RIDGE = 1e-7
 """Added to H's diagonal in units of the marker weight (angles: times 0.01 m²), so that open coordinates stay where
 they are.
@@ -75,8 +78,11 @@ class PostureAnswer:
     @cached_property
     def inverse(self) -> Array:
         """(F, nv, nv) inverse of the second derivatives of the cost; zero rows and columns for what a limit holds."""
-        wide = (self.tangent * self.weight[:, :, None, None]).reshape(len(self.weight), -1, self.body.nv)
-        H = np.swapaxes(self.tangent.reshape(wide.shape), 1, 2) @ wide
+        H = np.empty((len(self.weight), self.body.nv, self.body.nv))
+        for some in self._parts():
+            wide = self.tangent[some] * self.weight[some, :, None, None]
+            flat = (len(wide), -1, self.body.nv)
+            np.matmul(np.swapaxes(self.tangent[some].reshape(flat), 1, 2), wide.reshape(flat), out=H[some])
         turns = slice(self.body.n_root // 2, None)
         H[:, turns, turns] += self._bending()
         size = np.maximum(self.weight.sum(axis=1), 1e-3)[:, None] * np.where(
@@ -131,18 +137,29 @@ class PostureAnswer:
         pressed = (low & (slope > 0)) | (high & (slope < 0))
         return np.concatenate([np.zeros(self.body.n_root, dtype=bool), pressed.mean(axis=0) > 0.5])
 
+    def _parts(self) -> Iterator[slice]:
+        """Yield all frames, some at a time."""
+        return (slice(start, start + _FRAMES) for start in range(0, len(self.weight), _FRAMES))
+
     def follow(self, slope: Array) -> Array:
         """Return dq (F, nv, P) of the changes ``slope`` (F, nv, P) of the cost's gradient at fixed posture."""
         return -self.inverse @ slope
 
-    def marker_slopes(self) -> Array:
-        """Return (F, nv, 3K): the gradient's change per metre of every model marker's place in the axes of its
-        segment.
+    def follow_markers(self) -> Array:
+        """Return dq (F, nv, 3K) per metre of every model marker's place in the axes of its segment."""
+        out = np.empty((len(self.weight), self.body.nv, 3 * len(self.segment)))
+        for some in self._parts():
+            np.matmul(-self.inverse[some], self.marker_slopes(some), out=out[some])
+        return out
+
+    def marker_slopes(self, some: slice = slice(None)) -> Array:
+        """Return (F, nv, 3K) of some frames: the gradient's change per metre of every model marker's place in the axes
+        of its segment.
         """
-        turn = self.pose.rotation[:, list(self.segment)]
-        pushed = np.moveaxis(self.tangent * self.weight[:, :, None, None], 3, 1)
+        turn = self.pose.rotation[some][:, list(self.segment)]
+        pushed = np.moveaxis(self.tangent[some] * self.weight[some, :, None, None], 3, 1)
         turning = np.concatenate([np.ones((self.body.n_root // 2, len(self.segment))), self.hangs])
-        lever = cross(self.axes[:, :, None], self.apart[:, None])  # a' [x] = (a x x)'
+        lever = cross(self.axes[some, :, None], self.apart[some, None])  # a' [x] = (a x x)'
         pushed[:, self.body.n_root // 2 :] -= lever * turning[:, :, None]
         return np.asarray(np.einsum("fvki,fkij->fvkj", pushed, turn, optimize=True).reshape(*pushed.shape[:2], -1))
 
@@ -161,6 +178,8 @@ class PostureAnswer:
 
 
 _DEGREE = 5
+_TOGETHER = 24
+"""Changes of the geometry that are filtered and differentiated together: little memory, however many there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +224,12 @@ def wrench_of(nine: Array, time: Array, wanted: Array, *, smoothed: LowPass, gra
     Q, S ``nine`` (F, 9, P) at some ``time`` (F,) s, low-passed and differentiated as the motion was (``smoothed``, see
     `biodance.motion.smoothing`).
     """
+    parts = range(0, nine.shape[2], _TOGETHER)
+    some = [_wrench_of(nine[..., k : k + _TOGETHER], time, wanted, smoothed, gravity) for k in parts]
+    return np.concatenate(some, axis=2) if some else np.empty((len(wanted), 6, 0))
+
+
+def _wrench_of(nine: Array, time: Array, wanted: Array, smoothed: LowPass, gravity: Array) -> Array:
     rough = make_interp_spline(time, nine.reshape(len(nine), -1), k=_DEGREE)(wanted)
     smooth = low_pass(rough, (len(wanted) - 1) / (wanted[-1] - wanted[0]), smoothed)
     ends = [(order, np.zeros(smooth.shape[1])) for order in (3, 4)]

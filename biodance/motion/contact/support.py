@@ -84,7 +84,7 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
 
 def _mean_speed(time: Array, xyz: Array) -> Array:
     """Return the speed (T,) m/s of the mean of the markers that are seen throughout; infinite without one."""
-    whole = np.isfinite(xyz).all(axis=(0, 2))
+    whole: Mask = np.asarray(np.isfinite(xyz).all(axis=(0, 2)))
     if not whole.any():
         return np.full(time.size, np.inf)
-    return np.asarray(np.linalg.norm(np.gradient(xyz[:, whole].mean(axis=1), time, axis=0), axis=1))
+    return np.asarray(np.linalg.norm(np.gradient(xyz.mean(axis=1, where=whole[None, :, None]), time, axis=0), axis=1))

@@ -108,6 +108,10 @@ class Smooth:
         """Return all numbers as one array (3 + 4 + 4 G + m, B)."""
         return np.concatenate([self.place, self.root, self.ball.reshape(-1, self.angle.shape[1]), self.angle])
 
+    def at(self, some: slice) -> "Smooth":
+        """Return some of the postures."""
+        return Smooth(self.place[:, some], self.root[:, some], self.ball[..., some], self.angle[:, some])
+
 
 @dataclass(frozen=True, eq=False)
 class Chart:

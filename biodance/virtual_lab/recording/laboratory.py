@@ -111,9 +111,10 @@ Fault = Callable[[Recording], Recording]
 
 @dataclass(frozen=True, eq=False)
 class LabVisit:
-    """The day of a session: its ``number`` (another day: markers glued, postures performed, instruments drawn anew),
-    the ``laboratory``, the ``tolerances`` of everything (None = the laboratory's), and ``faults`` that change each
-    recording (markers, raw analog samples, parameters) before it is written.
+    """The day of a session: its ``number`` (another day: markers glued, postures performed, plates zeroed and cameras
+    levelled anew; the plates stay as they are installed), the ``laboratory``, the ``tolerances`` of everything (None =
+    the laboratory's), and ``faults`` that change each recording (markers, raw analog samples, parameters) before it is
+    written.
 
     ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the
     person beside gravity and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the
