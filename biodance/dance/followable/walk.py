@@ -165,8 +165,8 @@ class Walk:
     def _stuck(self, stance: Stance, number: int, why: dict[str, int]) -> str:
         if cut := rest_cut_short(self.work.chain.body, stance, self.reach.words):
             return (
-                f"This body cannot be {stance_words(stance)} as the dance asks: {cut}. Choose a protocol on other feet, "
-                f"or widen that range if the person reaches farther."
+                f"This body cannot be {stance_words(stance)} as the dance asks: {cut}. Choose a protocol on other "
+                f"feet, or widen that range if the person reaches farther."
             )
         most = max(why, key=lambda name: why[name]).replace("_", " ") if why else "number of instructions"
         return (
