@@ -35,13 +35,13 @@ from virtual_visits import CACHE, FRESH, TUNED, TrackedVisit, subjects
 import biodance
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.identification.added_mass import LoadSearch, added_mass
-from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import SIGMAS, segment_quantities
 from biodance.identification.mismatch import evidence_of_scale
 from biodance.identification.paper_programme import paper_programme
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import posterior
-from biodance.identification.statistics import Fit, layout_for, statistics
+from biodance.identification.statistics import Fit, layout_for, standing_point, statistics
 from biodance.identification.torques import torque_bands, torque_regressor
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench

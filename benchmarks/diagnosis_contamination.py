@@ -10,7 +10,7 @@ import numpy as np
 from hidden_sessions import Scenario, examined, session_folder
 
 from biodance.diagnosis.accept import residuals_of
-from biodance.identification.identification import standing_point
+from biodance.identification.statistics import standing_point
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.identification import KEPT_ROLES
 from biodance.pipeline.results import SessionResult

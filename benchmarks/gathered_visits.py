@@ -10,11 +10,11 @@ from pathlib import Path
 from virtual_visits import CACHE, TrackedVisit, visit
 
 import biodance
-from biodance.identification.identification import Identification, conclude, conclude_trials, usable
+from biodance.identification.identification import Identification, conclude, conclude_trials
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
 from biodance.identification.mismatch import Mismatch, mismatch
-from biodance.identification.statistics import Statistics, empty, layout_for, statistics
+from biodance.identification.statistics import Statistics, empty, layout_for, statistics, usable
 from biodance.library import locate
 from biodance.records import Subject
 from biodance.uncertainty.caution import widened

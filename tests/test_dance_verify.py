@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from small_dances import BODY, small_dance
 
-from biodance.dance.dance import Dance, Phase
+from biodance.dance.dance import Dance
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, unconcerned
+from biodance.dance.problem.stance import Phase
 from biodance.dance.problem.state import State
 from biodance.dance.verify import Margin, _least, broken, verify
 

@@ -19,7 +19,7 @@ from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import screen
 from biodance.effects import Case, Effect, Parameter, effect
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
-from biodance.identification.identification import standing_point
+from biodance.identification.statistics import standing_point
 from biodance.motion.kinematics import poses
 from biodance.records import Motion, Sip
 

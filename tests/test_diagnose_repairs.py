@@ -8,7 +8,8 @@ from human_cases import human_case
 
 from biodance.body.changes import move_marker
 from biodance.body.parts import JointError
-from biodance.diagnosis.diagnosis import Adequacy, Diagnosis
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.repairs import with_repairs
 from biodance.uncertainty.tolerances import shipped
 

@@ -47,8 +47,10 @@ def names(tmp_path_factory):
 def test_examples_print_what_they_say(name, names):
     thing = biodance.front_door(name)
     runner, told = doctest.DocTestRunner(optionflags=FLAGS), []
-    for example in doctest.DocTestFinder().find(thing, name, globs=dict(names)):
-        runner.run(example, out=told.append)
+    inherited = [cls for cls in getattr(thing, "__mro__", ())[1:] if cls.__module__.startswith("biodance")]
+    for home in (thing, *inherited):
+        for example in doctest.DocTestFinder().find(home, name, globs=dict(names)):
+            runner.run(example, out=told.append)
     assert runner.failures == 0, "".join(told)
 
 

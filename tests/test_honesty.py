@@ -11,8 +11,8 @@ from diagnosed_sessions import RATE, about_plate, body, known, looks, motion
 from example_results import full_session
 
 from biodance.diagnosis.adequacy import adequacy, alarming, verdict
-from biodance.diagnosis.consequence import least, matters
-from biodance.diagnosis.diagnosis import ABOUT, LEAST_FORCE, LEAST_MOMENT, Adequacy, Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT, Adequacy, least, matters
+from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import built, held, needed, settle, stands

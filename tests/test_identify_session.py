@@ -8,12 +8,12 @@ from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.identification import NOISE_ALONE, conclude, identify_body, standing_point
+from biodance.identification.identification import NOISE_ALONE, conclude, identify_body
 from biodance.identification.knowledge import knowledge, segment_quantities
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import compact_load, may_carry
 from biodance.identification.sessions import differences
-from biodance.identification.statistics import layout_for, statistics
+from biodance.identification.statistics import layout_for, standing_point, statistics
 from biodance.identification.validation import residual_ratio, validate
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench

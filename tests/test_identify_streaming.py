@@ -9,8 +9,8 @@ from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.identification import identify_body, standing_point
-from biodance.identification.statistics import Fit, layout_for, statistics
+from biodance.identification.identification import identify_body
+from biodance.identification.statistics import Fit, layout_for, standing_point, statistics
 from biodance.identification.streaming import about, begin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench

@@ -12,7 +12,8 @@ import pytest
 from example_results import full_session
 from rich.console import Console
 
-from biodance.diagnosis.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.pipeline.attention import told
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import provenance

@@ -10,7 +10,8 @@ import pytest
 from example_results import full_session
 from identified_sessions import session_result
 
-from biodance.diagnosis.diagnosis import Adequacy, Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.tables import session_tables

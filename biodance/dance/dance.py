@@ -5,10 +5,10 @@ planted feet stay where they are at every instant, not only at samples.
 """
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import basis_at
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.records import SIDES, Array, Motion, Subject, frozen_array
@@ -30,19 +30,6 @@ if TYPE_CHECKING:
 _VERSION = 1
 _PERSON = ("mass", "stature", "sex", "age")
 """What is kept of the person for whom a dance was designed; an unknown age is not."""
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
-    to.
-    """
-
-    start: float
-    end: float
-    kind: Literal["hold", "move"]
-    stance: Stance
-    posture: int
 
 
 _chain_of = lru_cache(maxsize=4)(Chain)
@@ -233,8 +220,7 @@ class Dance(Sendable):
             raise BiodanceError(f"A dance cannot be sampled at {rate:g} Hz; give a positive rate, for example 100.")
         time = np.arange(round(self.duration * rate) + 1) / rate
         x, v, a = np.empty((3, len(time), self.chain.size))
-        starts = np.array([phase.start for phase in self.phases])
-        owner = np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+        owner = phase_at(self.phases, time)
         for k, phase in enumerate(self.phases):
             rows = owner == k
             if rows.any():
@@ -259,7 +245,7 @@ class Dance(Sendable):
             who = {name: getattr(self.subject, name) for name in _PERSON}
             words["subject"] = {name: value for name, value in who.items() if value == value}
         words |= {"names": self.names, "mirrored": self.mirrored}
-        words |= {"stances": [_told(s) for s in self.stances], "under": [_told(s) for s in self.under]}
+        words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(
             path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays
@@ -308,9 +294,3 @@ class Dance(Sendable):
             raise FileRefused(
                 f"{path}: is not a dance that biodance wrote ({error}). Run biodance dance again."
             ) from error
-
-
-def _told(stance: Stance) -> dict[str, Any]:
-    """Return a stance in words that JSON knows."""
-    found = {field.name: getattr(stance, field.name) for field in fields(stance)}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}

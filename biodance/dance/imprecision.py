@@ -14,10 +14,10 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
 from biodance.body.pinocchio_model import load_pinocchio
-from biodance.dance.dance import Dance, Phase
+from biodance.dance.dance import Dance
 from biodance.dance.limits import Copied
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import Phase, Stance
 from biodance.records import Array
 
 _RATE, _PLAN_RATE = 5.0, 25.0

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.export import mjcf
 from biodance.dance.dance import Dance
+from biodance.dance.problem.stance import phase_at
 from biodance.errors import BiodanceError, MissingLibrary
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import poses
@@ -31,12 +32,9 @@ STIFFNESS = {"hip": 4000.0, "knee": 4000.0, "ankle": 4000.0, "trunk": 3000.0, "s
 """N·m/rad of the joint springs: legs and trunk several times the m g h (about 600 N·m/rad) that would topple a standing
 person.
 """
-_DAMPING = 0.05
-"""s: damper over spring."""
-ROTOR = 0.005
-"""kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line, nothing else resists
-them.
-"""
+_DAMPING, ROTOR = 0.05, 0.005
+"""s, damper over spring; kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line,
+nothing else resists them."""
 SETTLE = 0.5
 """s in which the first posture is held before the motion begins, so that the floor bears the body."""
 FALLEN = 0.6
@@ -289,16 +287,11 @@ def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehea
 def bearing(dance: Dance, time: Array) -> NDArray[np.bool_]:
     """Return (T, 2) True where the right, the left foot is planned to be down at instants ``time`` s."""
     planted = np.array([[side in phase.stance.planted for side in (0, 1)] for phase in dance.phases])
-    return planted[_owner(dance, time)]
-
-
-def _owner(dance: Dance, time: Array) -> NDArray[np.intp]:
-    starts = np.array([phase.start for phase in dance.phases])
-    return np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+    return planted[phase_at(dance.phases, time)]
 
 
 def _inside(dance: Dance, played: Playback) -> Array:
-    point, owner = played.wrench.cop()[:, :2], _owner(dance, played.time)
+    point, owner = played.wrench.cop()[:, :2], phase_at(dance.phases, played.time)
     out = np.empty(len(point))
     for k in np.unique(owner):
         normals, offsets = dance.phases[k].stance.whole.reduced(1.0)

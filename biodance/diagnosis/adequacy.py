@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from biodance.diagnosis.diagnosis import Adequacy, Verdict
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import Verdict
 from biodance.diagnosis.evidence import believe
 from biodance.diagnosis.model import Model
 from biodance.records import CHANNELS, Array, Motion

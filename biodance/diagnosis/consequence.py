@@ -2,6 +2,8 @@
 finding however well it is seen.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from biodance.effects import Effect, unit_of
@@ -69,3 +71,36 @@ def unit_at(effect: Effect, unit: str) -> str:
         return unit_of(target)
     force = [not name.rpartition(":")[2].startswith("M") for name in (source, target)]
     return "1" if force[0] == force[1] else "m" if force[0] else "1/m"
+
+
+LEAST_FORCE, LEAST_MOMENT = 1.0, 0.3
+"""N, N·m RMS in one band: what is left below it alarms nobody. 1 N is 0.15 % of an adult's weight, half of what
+plates are accurate to (0.2-0.5 %); 0.3 N·m are 0.4 mm of centre of pressure, where plates in place err by 2-5 mm
+(Collins 2009, doi:10.1016/j.gaitpost.2008.10.060), and 0.004 N·m/kg in a joint moment, where the smallest
+meaningful differences are some 0.05.
+"""
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """How far the residual that is left in one ``channel`` and band (Hz) is from what sessions without fault show, in
+    their standard deviations, and its RMS ``size`` over the trials' time (N for forces, N·m for moments); ``trial``
+    where it is largest, and the ``second`` s of its recording around which (NaN: not looked for).
+    """
+
+    channel: str
+    band_hz: tuple[float, float]
+    z: float
+    trial: str = ""
+    second: float = float("nan")
+    size: float = float("inf")
+
+    @property
+    def unit(self) -> str:
+        """N or N·m."""
+        return "N·m" if self.channel.startswith("M") else "N"
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is large enough to change what a laboratory concludes (`LEAST_FORCE`, `LEAST_MOMENT`)."""
+        return self.size >= (LEAST_MOMENT if self.channel.startswith("M") else LEAST_FORCE)

@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
-from biodance.diagnosis.diagnosis import LEAST_FORCE, LEAST_MOMENT
+from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import named_of
 from biodance.diagnosis.problem import Problem

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from biodance import display
+from biodance.diagnosis.consequence import Adequacy
 from biodance.identification.knowledge import SIGMAS
 from biodance.records import Array, frozen_array
 from biodance.records.attention import Attention, Judged
@@ -25,12 +26,6 @@ if TYPE_CHECKING:
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
 ABOUT = "diagnosis"
 """What the one of a diagnosis's sentences is about that says the verdict."""
-LEAST_FORCE, LEAST_MOMENT = 1.0, 0.3
-"""N, N·m RMS in one band: what is left below it alarms nobody. 1 N is 0.15 % of an adult's weight, half of what
-plates are accurate to (0.2-0.5 %); 0.3 N·m are 0.4 mm of centre of pressure, where plates in place err by 2-5 mm
-(Collins 2009, doi:10.1016/j.gaitpost.2008.10.060), and 0.004 N·m/kg in a joint moment, where the smallest
-meaningful differences are some 0.05.
-"""
 
 
 @dataclass(frozen=True)
@@ -141,31 +136,6 @@ class Finding:
     def log_bayes_factor(self) -> float:
         """Evidence of the named cause against "nothing wrong", natural logarithm."""
         return self.set[0].log_bayes_factor
-
-
-@dataclass(frozen=True)
-class Adequacy:
-    """How far the residual that is left in one ``channel`` and band (Hz) is from what sessions without fault show, in
-    their standard deviations, and its RMS ``size`` over the trials' time (N for forces, N·m for moments); ``trial``
-    where it is largest, and the ``second`` s of its recording around which (NaN: not looked for).
-    """
-
-    channel: str
-    band_hz: tuple[float, float]
-    z: float
-    trial: str = ""
-    second: float = float("nan")
-    size: float = float("inf")
-
-    @property
-    def unit(self) -> str:
-        """N or N·m."""
-        return "N·m" if self.channel.startswith("M") else "N"
-
-    @property
-    def matters(self) -> bool:
-        """Whether it is large enough to change what a laboratory concludes (`LEAST_FORCE`, `LEAST_MOMENT`)."""
-        return self.size >= (LEAST_MOMENT if self.channel.startswith("M") else LEAST_FORCE)
 
 
 @dataclass(frozen=True)

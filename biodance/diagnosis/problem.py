@@ -18,9 +18,8 @@ from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.spectrum import SHORTEST_RUN, Spectrum, spectrum, thinned
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
-from biodance.identification.identification import usable
 from biodance.identification.posterior import prior_factor
-from biodance.identification.statistics import Fit
+from biodance.identification.statistics import Fit, usable
 from biodance.records import Array, Motion, Sip, Trial
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.sources import Errors, forward, of_clusters

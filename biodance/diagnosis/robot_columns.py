@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identification.identification import standing_point
 from biodance.identification.robot import RobotMotion
 from biodance.identification.robot_errors import (
     GIVE,
@@ -19,7 +18,7 @@ from biodance.identification.robot_errors import (
     places_of,
     slow_wrench,
 )
-from biodance.identification.statistics import layout_for
+from biodance.identification.statistics import layout_for, standing_point
 from biodance.motion.grounded import ground_again
 from biodance.records import CHANNELS, Array, Wrench
 from biodance.uncertainty.bands import Bands

@@ -10,11 +10,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from biodance import display
 from biodance.body.body import Body
-from biodance.errors import NotSolved, TrialRefused, UnknownName
+from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.calibration import discounted, give_back
 from biodance.identification.information import Information
@@ -25,8 +23,8 @@ from biodance.identification.mismatch import Mismatch, Sizes, mismatch
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
-from biodance.identification.statistics import Fit, Statistics, believable, layout_for, statistics_together
-from biodance.records import Array, Sip
+from biodance.identification.statistics import Fit, Statistics, layout_for, statistics_together, usable
+from biodance.records import Sip
 from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.caution import from_true_centres, widened
 from biodance.uncertainty.noise import Noise
@@ -243,31 +241,6 @@ def conclude_trials(
     return replace(slower, notes=(*slower.notes, _TOO_SLOW.format(total.layout.bands.edges[-2])))
 
 
-def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, tuple[str, ...]]:
-    """Return the trials with believable frames, the standing point (3,) m, and what was left out in words.
-
-    Raises
-    ------
-    TrialRefused
-        There is no trial, or none has a usable frame.
-    """
-    some = tuple(fit for fit in fits if fit.use.any())
-    if not some:
-        raise TrialRefused(
-            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. "
-            f"Record trials to fit."
-        )
-    blind = [fit.name for fit in fits if not fit.use.any()]
-    about = standing_point(some)
-    gated = tuple(believable(body, fit, about) for fit in some)
-    notes = [f"Left out, no usable frame: {', '.join(blind)}."] if blind else []
-    notes += [sentence for _, sentence in gated if sentence]
-    used = tuple(fit for fit, _ in gated if fit.use.any())
-    if not used:
-        raise TrialRefused(f"No frame is left to identify from. {' '.join(notes)}")
-    return used, about, tuple(notes)
-
-
 @one_thread()
 def conclude(
     body: Body,
@@ -306,15 +279,6 @@ def conclude(
     return Identification(
         body, belief, data, base, got.noise, got.sizes, fit, trials, data.frames, known, words, apart, got.diluted
     )
-
-
-def standing_point(fits: tuple[Fit, ...]) -> Array:
-    """Return the mean centre of pressure (3,) m of all used frames: the point about which the wrench's noise is
-    described.
-    """
-    points = np.concatenate([fit.wrench.cop()[fit.use] for fit in fits])
-    loaded = points[np.isfinite(points).all(axis=1)]
-    return loaded.mean(axis=0) if len(loaded) else np.zeros(3)
 
 
 def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:

@@ -12,11 +12,11 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
-from biodance.identification.identification import Identification, conclude, usable
+from biodance.identification.identification import Identification, conclude
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import SHORTEST, Mismatch
 from biodance.identification.robot_errors import THINNED, place_changes, places_of, some_frames, zero_changes
-from biodance.identification.statistics import Fit, layout_for, statistics_together
+from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.motion.grounded import Grounded
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Wrench

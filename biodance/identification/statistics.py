@@ -182,3 +182,37 @@ def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
         f"posture that jumps or "
         "a contact beside the plates."
     )
+
+
+def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, tuple[str, ...]]:
+    """Return the trials with believable frames, the standing point (3,) m, and what was left out in words.
+
+    Raises
+    ------
+    TrialRefused
+        There is no trial, or none has a usable frame.
+    """
+    some = tuple(fit for fit in fits if fit.use.any())
+    if not some:
+        raise TrialRefused(
+            f"None of {len(fits)} trials has a frame to identify from: ground contact not measured or no motion. "
+            f"Record trials to fit."
+        )
+    blind = [fit.name for fit in fits if not fit.use.any()]
+    about = standing_point(some)
+    gated = tuple(believable(body, fit, about) for fit in some)
+    notes = [f"Left out, no usable frame: {', '.join(blind)}."] if blind else []
+    notes += [sentence for _, sentence in gated if sentence]
+    used = tuple(fit for fit, _ in gated if fit.use.any())
+    if not used:
+        raise TrialRefused(f"No frame is left to identify from. {' '.join(notes)}")
+    return used, about, tuple(notes)
+
+
+def standing_point(fits: tuple[Fit, ...]) -> Array:
+    """Return the mean centre of pressure (3,) m of all used frames: the point about which the wrench's noise is
+    described.
+    """
+    points = np.concatenate([fit.wrench.cop()[fit.use] for fit in fits])
+    loaded = points[np.isfinite(points).all(axis=1)]
+    return loaded.mean(axis=0) if len(loaded) else np.zeros(3)

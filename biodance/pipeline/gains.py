@@ -9,7 +9,8 @@ from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_namin
 from biodance.diagnosis.diagnosis import Finding, Gain
 from biodance.diagnosis.engine import Examined, without_name
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
-from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.identification import Identification, identify_body
+from biodance.identification.statistics import standing_point
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.looked_at import cases_of, looks
 from biodance.pipeline.results import SessionResult

@@ -13,11 +13,11 @@ from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
-from biodance.identification.identification import Identification, identify_body, standing_point
+from biodance.identification.identification import Identification, identify_body
 from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.sessions import Difference, differences
-from biodance.identification.statistics import Fit
+from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import TorqueBands, torque_bands
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare

@@ -9,8 +9,7 @@ from biodance.body.body import Body
 from biodance.diagnosis.problem import Look
 from biodance.diagnosis.spectrum import SHORTEST_RUN, spectrum, thinned
 from biodance.effects import Case
-from biodance.identification.identification import standing_point
-from biodance.identification.statistics import Fit
+from biodance.identification.statistics import Fit, standing_point
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult

@@ -1,13 +1,17 @@
 """Where the feet stand and which part of the ground may carry the weight."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.records import SIDES, Array, frozen_array
+from biodance.records import SIDES, Array, Index, frozen_array
 from biodance.threads import Sendable
+
+if TYPE_CHECKING:
+    pass
 
 _WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
@@ -222,3 +226,28 @@ def stance_words(stance: Stance) -> str:
     """Return where the feet are, in words, and on which of them the weight is where it must be over one."""
     weight = "" if stance.over is None else f", the weight on the {SIDES[stance.over]} one"
     return _FEET[stance.name] + weight
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
+    to.
+    """
+
+    start: float
+    end: float
+    kind: Literal["hold", "move"]
+    stance: Stance
+    posture: int
+
+
+def stance_fields(stance: Stance) -> dict[str, Any]:
+    """Return a stance in words that JSON knows."""
+    found = {field.name: getattr(stance, field.name) for field in fields(stance)}
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
+
+
+def phase_at(phases: tuple[Phase, ...], time: Array) -> Index:
+    """Return which of the ``phases`` every instant (T,) s lies in."""
+    starts = np.array([phase.start for phase in phases])
+    return np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)

@@ -11,7 +11,8 @@ import numpy as np
 
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.adequacy import LIMIT
-from biodance.diagnosis.diagnosis import ABOUT, Adequacy, Diagnosis, Estimate, Unobservable
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Unobservable
 from biodance.diagnosis.heard import Testimony, sights
 from biodance.display import BLACK, BLUE, GREY
 from biodance.effects import discrete_effects, effects
