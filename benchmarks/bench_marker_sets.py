@@ -40,7 +40,9 @@ SESSIONS = {
 
 
 def sessions(data: Path) -> None:
-    """Print session, set, of every trial the RMS marker distance of all and of legs, and the first line of its page."""
+    """Print session, set, of every trial the RMS marker distance of all and of legs, and the first line of its page
+    as far as the trials that were not judged and the checks outside their limits.
+    """
     from biodance.errors import BiodanceError
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnose_session
@@ -55,10 +57,11 @@ def sessions(data: Path) -> None:
                 os.symlink(file, Path(folder) / file.name)
             try:
                 result = examine(read_session(folder, subject_name=None))
-                first = next(one.text for one in diagnose_session(result).diagnosis.attention if one.about == ABOUT)
+                said = next(one.text for one in diagnose_session(result).diagnosis.attention if one.about == ABOUT)
             except BiodanceError as error:
                 print(f"| {name} | - | - | - | refused: {error} |", flush=True)
                 continue
+        first = said.partition(" Beside it: ")[0].partition("; ")[0]
         worn = ", ".join(sorted({trial.trial.worn or "none" for trial in result.trials}))
         print(f"| {name} | {worn} | {_unseen(result)} | {'; '.join(map(_near, result.trials))} | {first} |", flush=True)
 
