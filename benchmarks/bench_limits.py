@@ -124,6 +124,7 @@ def main() -> None:
     parser.add_argument("--null", type=int, default=1)
     parser.add_argument("--trials", type=int, default=4)
     parser.add_argument("--effects", nargs="*", default=[])
+    parser.add_argument("--times", nargs="*", type=float, default=TIMES)
     parser.add_argument("--run", default="now", help="what is there of this run is not made again")
     parser.add_argument("--out", type=Path)
     chosen = parser.parse_args()
@@ -136,7 +137,7 @@ def main() -> None:
     cases = cases_of(body, looks)
     for effect, row in best_seen(clean):
         hidden = f"{effect.name} {effect.target}".strip()
-        for times in TIMES:
+        for times in chosen.times:
             known = any((one.hidden, one.times) == (hidden, times) for one in found)
             if known or (chosen.effects and effect.name not in chosen.effects):
                 continue

@@ -1,7 +1,7 @@
 """Loads on five segments, declared with the load and without it, found with a reference session and without one, on
 people of our virtual laboratory and of one that is not ours.
 
-    python benchmarks/bench_loads.py own 3 --into loads.jsonl          # sessions of 3 people, a line for every search
+    python benchmarks/bench_loads.py own 3 --into loads.jsonl [--segments trunk_head]   # a line for every search
     python benchmarks/bench_loads.py foreign 3 --into loads.jsonl      # needs BIODANCE_FOREIGN_LAB
     python benchmarks/bench_loads.py unloaded 8 --into loads.jsonl     # unloaded foreign people, two sessions each
     python benchmarks/bench_loads.py unloaded-own 8 --into loads.jsonl # the same of our laboratory
@@ -16,6 +16,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -74,22 +75,17 @@ def foreign(person: int, session: int, load: tuple[str, float] | None) -> Seen:
 _LABS = {"own": own, "foreign": foreign}
 
 
-def loaded(lab: str, person: int) -> Iterator[Row]:
-    """Yield every search of one person: unloaded, and loads declared either way."""
+def loaded(lab: str, person: int, segments: tuple[str, ...]) -> Iterator[Row]:
+    """Yield every search of one person with loads on ``segments``, declared either way."""
     make = _LABS[lab]
-    body, fits = make(person, 1, None)
-    reference = identify_body(body, fits)
-    mass = float(body.sip.mass.sum())
-    yield _row(lab, person, "", 0.0, "with", "alone", added_mass(reference))
-    for kg in (0.0, *KILOGRAMS):
-        for segment in SEGMENTS if kg else [""]:
-            body, fits = make(person, 2, (segment, kg) if kg else None)
-            for way, declared in (("with", mass + kg), ("without", mass)):
-                one = identify_body(replace(body, sip=weighing(body.sip, declared)), fits)
-                yield _row(lab, person, segment, kg, way, "reference", added_mass(one, reference=reference))
-                yield _row(lab, person, segment, kg, way, "alone", added_mass(one))
-                if not kg:
-                    break
+    reference = identify_body(*make(person, 1, None))
+    mass = float(reference.body.sip.mass.sum())
+    for kg, segment in product(KILOGRAMS, segments):
+        body, fits = make(person, 2, (segment, kg))
+        for way, declared in (("with", mass + kg), ("without", mass)):
+            one = identify_body(replace(body, sip=weighing(body.sip, declared)), fits)
+            yield _row(lab, person, segment, kg, way, "reference", added_mass(one, reference=reference))
+            yield _row(lab, person, segment, kg, way, "alone", added_mass(one))
 
 
 def unloaded(lab: str, person: int) -> Iterator[Row]:
@@ -150,6 +146,7 @@ def main() -> None:
     ask.add_argument("what", choices=("own", "foreign", "unloaded", "unloaded-own", "table"))
     ask.add_argument("people", type=int, nargs="?", default=1)
     ask.add_argument("--first", type=int, default=0, help="number of the first person")
+    ask.add_argument("--segments", default=",".join(SEGMENTS), help="that carry a load, separated by commas")
     ask.add_argument("--into", type=Path, required=True)
     asked = ask.parse_args()
     if asked.what == "table":
@@ -160,7 +157,7 @@ def main() -> None:
             if asked.what.startswith("unloaded"):
                 rows = unloaded("own" if asked.what == "unloaded-own" else "foreign", person)
             else:
-                rows = loaded(asked.what, person)
+                rows = loaded(asked.what, person, tuple(asked.segments.split(",")))
             for row in rows:
                 print(json.dumps(row), file=out, flush=True)
 

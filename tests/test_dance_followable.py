@@ -12,7 +12,7 @@ from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.followable import mending
 from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.reach import Reach
-from biodance.dance.followable.vocabulary import read_vocabulary, words_for, words_left_out
+from biodance.dance.followable.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
 from biodance.dance.followable.walk import NoWay, Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, mass_centre
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
@@ -94,6 +94,15 @@ def test_feet_that_cannot_be_reached_are_named() -> None:
     assert NoWay("", stances, lift - 1).stance == NoWay("", stances, lift).stance == "single_right"
     assert NoWay("", stances, down).stance == "single_right"
     assert NoWay("", stances, down + 1).stance == NoWay("", stances, down + 2).stance == "single_left"
+
+
+def test_who_cannot_bend_the_hip_to_sit_is_told_so() -> None:
+    stiff = limit_body(BODY, PersonLimits(ranges=(("left_hip_flexion", -0.1, np.radians(70.0)),)))
+    (seated,) = support_sequence(BODY, replace(PLAN, blocks=(("seated", 1),)))
+    words = read_vocabulary()
+    assert rest_cut_short(BODY, seated, words) == ""
+    said = "left hip flexion reaches 68 of 91 degrees"
+    assert rest_cut_short(replace(BODY, limits=stiff), seated, words) == said
 
 
 def test_what_a_stiff_arm_cannot_do_is_said() -> None:

@@ -177,9 +177,10 @@ def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tupl
 def place_jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> Array:
     """Return (T, 3S, nv) of points (T, S, 3) on segments, the first of `jacobian`."""
     place = np.zeros((*points.shape, body.nv))
-    hangs, root = below(body)[:, segment] > 0, pose.root_position
-    axis, points = _tree(body)[3], np.ascontiguousarray(points)
-    fill_places(hangs, axis, pose.joint_rotation, pose.joint_position, root, body.n_root, points, place)
+    hangs = np.ascontiguousarray(below(body)[:, segment] > 0)
+    known = pose.joint_rotation, pose.joint_position, pose.root_position, points
+    rotation, origin, root, points = (np.ascontiguousarray(one) for one in known)  # one type for the compiled code
+    fill_places(hangs, _tree(body)[3], rotation, origin, root, body.n_root, points, place)
     return place.reshape(len(place), -1, body.nv)
 
 
@@ -188,9 +189,10 @@ def tangent_of(body: Body, pose: Poses, com: Array, place: Array, turn: Array) -
     of the moved ``com`` (T, N, 3) m of the body's segments and ``turn`` (T, N, L, 3) of their turn.
     """
     tangent = np.zeros((len(com), place.shape[2], body.nv))
-    hangs = below(body)[:, : com.shape[1]] > 0
-    joints = _tree(body)[3], pose.joint_rotation, pose.joint_position, pose.root_position, body.n_root
-    fill_tangent(hangs, *joints, np.ascontiguousarray(com), place, turn, tangent)
+    hangs = np.ascontiguousarray(below(body)[:, : com.shape[1]] > 0)
+    known = pose.joint_rotation, pose.joint_position, pose.root_position, com, place, turn
+    rotation, origin, root, com, place, turn = (np.ascontiguousarray(one) for one in known)
+    fill_tangent(hangs, _tree(body)[3], rotation, origin, root, body.n_root, com, place, turn, tangent)
     return tangent
 
 

@@ -18,6 +18,8 @@ from biodance.records.attention import Attention, Judged, Level, strongest_first
 
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
+_FORCES = "force difference"
+"""Beginning of the name of a check that compares a body with the plates, for however short a time."""
 _EMPTY = "empty_plate"
 """The witness that sees plates with nobody on them."""
 _WEIGHED = "kg are declared: check the mass"
@@ -110,7 +112,10 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     elif one.doubt.startswith(_FITS):
         level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
     elif not (one.adequacy and rests_on):
-        whole = f" for {SHORTEST_RUN:g} s without a break" if any(TOO_SHORT in row.why_not for row in judged) else ""
+        partly = any(TOO_SHORT in row.why_not for row in judged) or any(
+            check.what.startswith(_FORCES) for check in outside
+        )
+        whole = f" for {SHORTEST_RUN:g} s without a break" if partly else ""
         level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
         text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
     elif one.doubt:

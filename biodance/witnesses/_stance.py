@@ -1,12 +1,18 @@
 """Means over a part of the stance of one step: the centre of pressure in the foot's own frame, the plate's force."""
 
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache, wraps
+from typing import TypeVar
 
 import numpy as np
 
-from biodance.records import Array
+from biodance.records import Array, Markers, Plate
+from biodance.witnesses._feet import FootPath
 from biodance.witnesses._recording import FootStep, SeenTrial
+
+_Seen = TypeVar("_Seen")
+_Witness = TypeVar("_Witness")
 
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
@@ -60,3 +66,38 @@ def step_course(seen: SeenTrial, step: FootStep, *, running: bool = False) -> St
     known = apart[np.isfinite(apart)]
     length = float(np.median(known)) if known.size else float("nan")
     return StepCourse(phase, time, force, ahead, outwards, length)
+
+
+_KEPT = 64
+"""Steps of which a witness keeps what it saw."""
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A look of a ``kind`` of witness at one step, and all that it hangs on: other plates than those under the foot,
+    and the person's mass, change nothing.
+    """
+
+    kind: type
+    step: FootStep
+    feet: tuple[FootPath, ...]
+    markers: Markers | None
+    plates: tuple[Plate, ...]
+    seen: SeenTrial = field(compare=False)
+
+
+def by_step(look: Callable[[_Witness, SeenTrial, FootStep], _Seen]) -> Callable[[_Witness, SeenTrial, FootStep], _Seen]:
+    """Keep what a witness sees of a step: it is asked about one recording after another in which other plates are
+    altered (`traces`).
+    """
+
+    @lru_cache(maxsize=_KEPT)
+    def known(asked: _Look) -> _Seen:
+        return look(asked.kind(), asked.seen, asked.step)
+
+    @wraps(look)
+    def of_step(witness: _Witness, seen: SeenTrial, step: FootStep) -> _Seen:
+        plates = tuple(plate for plate in seen.trial.plates if plate.name in (step.plate, *step.beside))
+        return known(_Look(type(witness), step, seen.feet, seen.trial.markers, plates, seen))
+
+    return of_step

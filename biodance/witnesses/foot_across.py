@@ -7,7 +7,7 @@ from where the laboratory puts its toe marker. A turned plate shows as a slant o
 from collections.abc import Mapping
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import step_course
+from biodance.witnesses._stance import by_step, step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -36,10 +36,14 @@ class FootAcross(Witness):
         """Return three observations of each walking step, the early one only where the heel came down first, on one
         plate alone; one of each running step.
         """
-        ways = ((ACROSS_PHASES, False), (_RUNNING, True))
-        return tuple(one for step in seen.steps for way in ways for one in self._of_step(seen, step, *way))
+        return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
-    def _of_step(
+    @by_step
+    def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
+        ways = ((ACROSS_PHASES, False), (_RUNNING, True))
+        return [one for way in ways for one in self._phases(seen, step, *way)]
+
+    def _phases(
         self, seen: SeenTrial, step: FootStep, phases: Mapping[str, tuple[float, ...]], running: bool
     ) -> list[Observation]:
         part, found = step_course(seen, step, running=running), []

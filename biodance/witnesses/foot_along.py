@@ -4,7 +4,7 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 """
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import step_course
+from biodance.witnesses._stance import by_step, step_course
 
 ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -29,6 +29,7 @@ class FootAlong(Witness):
         """Return two observations of each step in which the heel came down first, one of a foot on two plates."""
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 
+    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, found = step_course(seen, step), []
         if part is None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from biodance.motion.contact.footing import distance_to_hull
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import by_step
 
 _STEADY = (0.1, 0.9)
 """Shares of stance between which the pressure must lie under the foot."""
@@ -24,6 +25,7 @@ class FootOutline(Witness):
         found = [self._of_step(seen, step) for step in seen.steps]
         return tuple(one for one in found if one is not None)
 
+    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> Observation | None:
         part = seen.stance(step)
         if part is None:

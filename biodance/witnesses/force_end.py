@@ -7,6 +7,7 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._stance import by_step
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves."""
@@ -28,6 +29,7 @@ class ForceEnd(Witness):
         """Return one observation of each step that ends within the recording."""
         return tuple(one for step in seen.steps if not step.mixed for one in self._of_step(seen, step))
 
+    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, time = seen.stance(step), seen.plate(step.plate).wrench.time
         if part is None or part.stop >= time.size:

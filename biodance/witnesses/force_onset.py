@@ -9,6 +9,7 @@ import numpy as np
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
+from biodance.witnesses._stance import by_step
 
 _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
@@ -32,6 +33,7 @@ class ForceOnset(Witness):
             one for step in seen.steps if step.heel_first and not step.mixed for one in self._of_step(seen, step)
         )
 
+    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
         if part is None or part.start == 0:

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import StepCourse, step_course
+from biodance.witnesses._stance import StepCourse, by_step, step_course
 
 _PARTS = {
     "braking": (0.08, 0.35, 0, -0.145, 0.015, 0.030),
@@ -42,6 +42,7 @@ class Shear(Witness):
         whole = (step for step in seen.steps if step.heel_first and not step.beside)
         return tuple(one for step in whole for one in self._of_step(seen, step))
 
+    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = step_course(seen, step)
         path = way(seen, step, part) if part is not None else None

@@ -63,7 +63,7 @@ class StrideForce(Witness):
             return []
         total, names = seen.total, {step.plate for step in moving}
         here = (total.time >= moving[0].middle) & (total.time <= moving[-1].middle)
-        value = _mass(seen, total.time[here], total.force[here])
+        value = _mass(seen, _means(seen, total.time[here], total.force[here]))
         return [
             _weighed(self.name, "all strides", seen, value, "going on", _ON, names.pop() if len(names) == 1 else "")
         ]
@@ -79,7 +79,7 @@ class StrideForce(Witness):
             span = slice(here[0], here[-1] + 1) if here.size else slice(0, 0)
         if span.stop - span.start < _SHORTEST * wrench.rate or _elsewhere(seen, step.plate, *step.beside)[span].any():
             return []
-        value = _mass(seen, wrench.time[span], wrench.force[span])
+        value = _mass(seen, _means(seen, wrench.time[span], wrench.force[span]))
         return [_weighed(self.name, f"{step.name}, alone", seen, value, "on one foot", _ALONE, step.plate)]
 
     def _whole(self, seen: SeenTrial, first: FootStep, last: FootStep) -> list[Observation]:
@@ -89,8 +89,8 @@ class StrideForce(Witness):
         total, g, name = seen.total, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
         time, force = total.time[span], total.force[span]
         what = f"{name} from {first.middle:.2f} s"
-        found = [_weighed(self.name, what, seen, _mass(seen, time, force), "in a step", _STEP)]
         needed = _means(seen, time, force)
+        found = [_weighed(self.name, what, seen, _mass(seen, needed), "in a step", _STEP)]
         for axis, channel in enumerate(("Fx", "Fy")):
             value, sd = float(needed[0, axis] - seen.mass * needed[1, axis]), _HORIZONTAL * seen.mass * g
             found.append(Observation(self.name, f"{what}, mean {channel}", seen.trial.name, value, sd, 0.0, "N"))
@@ -125,9 +125,11 @@ def _means(seen: SeenTrial, time: Array, force: Array) -> Array:
     return np.asarray(np.trapezoid(both, time, axis=1) / np.trapezoid(weight, time))
 
 
-def _mass(seen: SeenTrial, time: Array, force: Array) -> float:
-    """Return the mass kg whose weight and acceleration need the mean vertical force of ``force`` (n, 3) N."""
-    needed, moved = _means(seen, time, force)[:, 2]
+def _mass(seen: SeenTrial, means: Array) -> float:
+    """Return the mass kg whose weight and acceleration need the mean vertical force, of the ``means`` (2, 3) of force
+    N and acceleration m/s².
+    """
+    needed, moved = means[:, 2]
     return float(needed / (seen.trial.settings.gravity + moved))
 
 

@@ -30,6 +30,8 @@ _FREE = {
 _FREE_WORDS = 8
 _FITS = np.radians(25.0)
 """rad: a word that a person's range shortens by more is not asked of that person."""
+_CUT = np.radians(10.0)
+"""rad that the posture at rest may be cut short by a joint's range, and is still that posture."""
 _STOP = np.radians(1.5)
 """rad that a word keeps from a joint's stop."""
 
@@ -149,6 +151,19 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
         f"{', '.join(dict.fromkeys(texts.values()))}."
         for part, texts in found.items()
     )
+
+
+def rest_cut_short(body: Body, stance: Stance, words: Vocabulary) -> str:
+    """Return which joints of this body do not reach what the posture at rest on these feet takes, "" if all do."""
+    found = []
+    for part, group in groups_of(stance).items():
+        rest = words[group][0]
+        for joint, angle in rest.angles if part != "legs" else ():
+            reached = _near(body, part, joint, angle)
+            if abs(reached - angle) > _CUT:
+                name = own_joint(part, joint).replace("_", " ")
+                found.append(f"{name} reaches {np.degrees(reached):.0f} of {np.degrees(angle):.0f} degrees")
+    return " and ".join(found)
 
 
 def free_words(rng: np.random.Generator) -> tuple[Word, ...]:

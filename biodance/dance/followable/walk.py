@@ -16,10 +16,12 @@ import numpy as np
 from biodance.dance.dance import Dance
 from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
 from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
+from biodance.dance.followable.reach import DanceStep, Reach, feet_key
+from biodance.dance.followable.vocabulary import rest_cut_short
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.ordering import learned
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.dance.problem.stance import Stance, under
+from biodance.dance.problem.stance import Stance, stance_words, under
 from biodance.dance.transitions.context import DesignContext
 from biodance.dance.transitions.move import Move, Task
 from biodance.errors import BiodanceError
@@ -161,6 +163,11 @@ class Walk:
             yield from ((step, move) for _, step, move in sorted(doubtful, key=lambda one: -one[0]))
 
     def _stuck(self, stance: Stance, number: int, why: dict[str, int]) -> str:
+        if cut := rest_cut_short(self.work.chain.body, stance, self.reach.words):
+            return (
+                f"This body cannot be {stance_words(stance)} as the dance asks: {cut}. Choose a protocol on other "
+                f"feet, or widen that range if the person reaches farther."
+            )
         most = max(why, key=lambda name: why[name]).replace("_", " ") if why else "number of instructions"
         return (
             f"No posture {stance.name.replace('_', ' ')} can be reached from posture {number}: most of those within "
