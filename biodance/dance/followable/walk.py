@@ -16,7 +16,6 @@ import numpy as np
 from biodance.dance.dance import Dance
 from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
 from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
-from biodance.dance.followable.reach import DanceStep, Reach, feet_key
 from biodance.dance.followable.vocabulary import rest_cut_short
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.ordering import learned
