@@ -13,14 +13,12 @@ from cyclopts import CycloptsError
 
 from biodance.cli import (
     archive,
-    batch,
     begin,
     dance,
     diagnose,
     files,
     identify,
     live,
-    register,
     session,
     virtual,
 )
@@ -29,7 +27,6 @@ from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 __all__ = [
     "app",
     "archive",
-    "batch",
     "begin",
     "dance",
     "diagnose",
@@ -37,7 +34,6 @@ __all__ = [
     "identify",
     "live",
     "main",
-    "register",
     "run",
     "session",
     "virtual",

@@ -1,10 +1,58 @@
-"""The commands with which a machine and a session begin: doctor, init."""
+"""The commands with which a machine and a session begin: doctor, init, register."""
 
+import sys
 from pathlib import Path
+from typing import Annotated
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
-from biodance.cli.options import JsonOption
+from cyclopts import Parameter
+
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, say
+from biodance.cli.options import ForceOption, JsonOption
 from biodance.cli.progress import progress
+
+
+@app.command(name="register")
+def register_command(
+    markers: Path,
+    forces: Path,
+    *,
+    out: Annotated[Path, Parameter(name="--out", help="Folder for the session; it is made if it is missing.")],
+    rough: Annotated[
+        bool,
+        Parameter(
+            name="--rough", negative="", help="Also write a pose that is known less exactly than 5 mm, 0.5 deg, 5 ms."
+        ),
+    ] = False,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> int:
+    """Find from the movement where force plates lie in the room of the markers and how late their clock is, and write
+    one session.
+
+    Parameters
+    ----------
+    markers
+        A marker file (static trial and session.toml beside it), or the folder of such a session.
+    forces
+        A force file whose clock and place in the room are unknown.
+    """
+    from biodance.pipeline.registration import register
+
+    with progress() as tell:
+        found = register(markers, forces, out, rough=rough, force=force, tell=tell)
+    if json:
+        print_json(found.document())
+    else:
+        sys.stdout.write(f"{found}\n" + "".join(f"{note}\n" for note in found.notes))
+    if found.status == "refused":
+        say(found.reason)
+        return NOT_DONE if found.pose is None else NEEDS_A_PERSON
+    if not json:
+        sys.stdout.write(f"{out}\n")
+    if found.status == "rough":
+        say(found.reason)
+        return NEEDS_A_PERSON
+    return DONE
 
 
 @app.command(name="doctor")
