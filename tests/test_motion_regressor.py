@@ -15,13 +15,14 @@ def test_regressor_agrees_with_pinocchio_rnea(seed: int) -> None:
     rng = np.random.default_rng(seed)
     body = random_body(rng)
     motion = random_motion(body, rng)
-    wrench = predict_wrench(body, motion)
+    wrench, linear = predict_wrench(body, motion), regressor(body, motion) @ body.sip.phi
     data = body.model.createData()
     for t in range(motion.time.size):
         tau = pin.rnea(body.model, data, motion.q[t], motion.v[t], motion.a[t])
         pin.forwardKinematics(body.model, data, motion.q[t], motion.v[t], motion.a[t])
         lab = data.oMi[1].toDualActionMatrix() @ tau[:6]
         np.testing.assert_allclose(wrench.value[t], lab, atol=1e-10)
+        np.testing.assert_allclose(linear[t], lab, atol=1e-10)
 
 
 def test_poses_agree_with_pinocchio_for_both_roots() -> None:
