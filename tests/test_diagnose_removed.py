@@ -46,6 +46,7 @@ def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str
     return Finding(effect, target, (Estimate("size", value, 0.05 * abs(value), unit),), aliases, 0.5)
 
 
+NAMES = ("plate_position", "plate1:y")
 HEARD = heard.Testimony((), {}, {}, {})
 LOAD = finding("added_mass", "right_forearm_hand", 2.4, "kg")
 WEIGHT = finding("body_mass", "", 2.5, "kg", ("plate_gain", "Fz"))
@@ -63,6 +64,18 @@ def test_a_witness_is_believed_where_the_simulation_is_blind_or_finds_nothing_wr
     simulation = replace(BY_SIMULATION, verdict=verdict, findings=(), limits=limits)
     one = with_witnesses(simulation, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
     assert [f.effect for f in one.findings] == ["body_mass"]
+
+
+@pytest.mark.parametrize(("bayes", "named"), [(-1.6, False), (1.6, True)])
+def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(bayes: float, named: bool) -> None:
+    """The movement, which sees 8 mm, shows nothing wrong and nothing of 21 mm (or something of it)."""
+    place = finding("plate_position", "plate1:y", 0.021, "m")
+    limits, candidates = (Unobservable("plate_position", "plate1:y", 0.008, "m"),), (Alias(*NAMES, bayes),)
+    simulation = Diagnosis("nothing wrong", (), limits=limits, candidates=candidates)
+    one = with_witnesses(simulation, Verdicts((place,), HEARD), HEARD, judged=True)
+    assert one.findings == ((place,) if named else ())
+    assert one.verdict == ("named, complete" if named else "nothing wrong")
+    assert any("plate position of plate1:y" in note for note in one.notes) is not named
 
 
 def test_what_the_simulation_tells_from_its_look_alikes_keeps_its_name() -> None:

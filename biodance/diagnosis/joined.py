@@ -19,6 +19,8 @@ _PLAIN = 3.0
 """Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
 _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
+_NOT_MOVED = "Feet or weight alone look like a {} of {}; the movement, which would show it, shows none."
+"""What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
 
@@ -44,6 +46,9 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
             mine.append(_together(finding, alike))
     known = {_names(f) for f in checked.resembles}
     shadows = [shadow for shadow in shadows if _names(shadow) not in known]
+    if not mine and checked.verdict == "nothing wrong":
+        notes = (_NOT_MOVED.format(each.effect.replace("_", " "), each.target) for each in shadows)
+        return replace(checked, notes=(*checked.notes, *notes))
     if not mine:
         return replace(checked, resembles=(*checked.resembles, *shadows))
     names = {_names(alias) for finding in mine for alias in finding.set}
@@ -63,16 +68,19 @@ def _names(one: Finding | Alias) -> tuple[str, str]:
 def _explained_without(finding: Finding, one: Diagnosis) -> bool:
     """Return whether the simulation found something else wrong, though it would see a cause of this size: a load is
     weight to the plates, and a hand that carries it moves where people stand; or found this very cause to have no one
-    size. Where it doubts what it found, it still has to have seen some of a cause that is `_PLAIN`.
+    size; or found nothing wrong, and nothing of this cause: who stands beside the middle has no plate beside its place.
+    Where it doubts what it found, it still has to have seen some of a cause that is `_PLAIN`.
     """
     if any(_names(other) == _names(finding) and other.hangs_on for other in one.resembles):
         return True
-    if not finding.parameters or one.verdict == "nothing wrong":
+    if not finding.parameters:
         return False
     limits = {(row.effect, row.target): row.limit for row in one.limits}
     times = abs(finding.parameters[0].value) / limits.get(_names(finding), float("inf"))
     if one.doubt:
         return times > _PLAIN and _evidence(finding, one) <= 0.0
+    if one.verdict == "nothing wrong":
+        return times > 1.0 and _evidence(finding, one) <= 0.0
     return times > 1.0
 
 
