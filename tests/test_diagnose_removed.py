@@ -11,6 +11,8 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Un
 from biodance.diagnosis.engine import SEVERAL, UNASKED, diagnose_trials
 from biodance.diagnosis.joined import with_witnesses
 from biodance.diagnosis.testimony import Verdicts
+from biodance.witnesses import Observation
+from biodance.witnesses._causes import Alteration
 
 
 def shifted(local, session):
@@ -66,13 +68,19 @@ def test_a_witness_is_believed_where_the_simulation_is_blind_or_finds_nothing_wr
     assert [f.effect for f in one.findings] == ["body_mass"]
 
 
-@pytest.mark.parametrize(("bayes", "named"), [(-1.6, False), (1.6, True)])
-def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(bayes: float, named: bool) -> None:
-    """The movement, which sees 8 mm, shows nothing wrong and nothing of 21 mm (or something of it)."""
-    place = finding("plate_position", "plate1:y", 0.021, "m")
-    limits, candidates = (Unobservable("plate_position", "plate1:y", 0.008, "m"),), (Alias(*NAMES, bayes),)
+@pytest.mark.parametrize(
+    ("witness", "bayes", "named"),
+    [("standing_place", -1.6, False), ("standing_place", 1.6, True), ("foot_across", -1.6, True)],
+)
+def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(witness: str, bayes: float, named: bool) -> None:
+    """The movement, which sees 8 mm, shows nothing wrong and nothing of 21 mm; feet have their own say."""
+    cause = Alteration(*NAMES, "shift", "m", 0.005, lambda seen, size: seen)
+    there = Observation(witness, "pressure to the left", "static", 0.021, 0.003, 0.0, "m")
+    said = heard.Testimony((there,), {NAMES: cause}, {NAMES: np.ones(1)})
+    limits, candidates = (Unobservable(*NAMES, 0.008, "m"),), (Alias(*NAMES, bayes),)
     simulation = Diagnosis("nothing wrong", (), limits=limits, candidates=candidates)
-    one = with_witnesses(simulation, Verdicts((place,), HEARD), HEARD, judged=True)
+    place = finding(*NAMES, 0.021, "m")
+    one = with_witnesses(simulation, Verdicts((place,), said), said, judged=True)
     assert one.findings == ((place,) if named else ())
     assert one.verdict == ("named, complete" if named else "nothing wrong")
     assert any("plate position of plate1:y" in note for note in one.notes) is not named

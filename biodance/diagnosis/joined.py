@@ -19,7 +19,9 @@ _PLAIN = 3.0
 """Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
 _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
-_NOT_MOVED = "Feet or weight alone look like a {} of {}; the movement, which would show it, shows none."
+_STANDING = {"standing_place"}
+"""Witnesses of a habit: no law says where over their feet people stand."""
+_NOT_MOVED = "Standing alone looks like a {} of {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
@@ -40,7 +42,7 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
     mine, shadows = [], []
     for finding in said.findings:
         alike = next((same[alias.effect, alias.target] for alias in finding.set if _names(alias) in same), None)
-        if alike is None and judged and _explained_without(finding, checked):
+        if alike is None and judged and (_explained_without(finding, checked) or _habit(finding, checked, heard)):
             shadows.append(finding)
         else:
             mine.append(_together(finding, alike))
@@ -68,20 +70,31 @@ def _names(one: Finding | Alias) -> tuple[str, str]:
 def _explained_without(finding: Finding, one: Diagnosis) -> bool:
     """Return whether the simulation found something else wrong, though it would see a cause of this size: a load is
     weight to the plates, and a hand that carries it moves where people stand; or found this very cause to have no one
-    size; or found nothing wrong, and nothing of this cause: who stands beside the middle has no plate beside its place.
-    Where it doubts what it found, it still has to have seen some of a cause that is `_PLAIN`.
+    size. Where it doubts what it found, it still has to have seen some of a cause that is `_PLAIN`.
     """
     if any(_names(other) == _names(finding) and other.hangs_on for other in one.resembles):
         return True
-    if not finding.parameters:
+    if not finding.parameters or one.verdict == "nothing wrong":
         return False
-    limits = {(row.effect, row.target): row.limit for row in one.limits}
-    times = abs(finding.parameters[0].value) / limits.get(_names(finding), float("inf"))
+    times = _times_its_limit(finding, one)
     if one.doubt:
         return times > _PLAIN and _evidence(finding, one) <= 0.0
-    if one.verdict == "nothing wrong":
-        return times > 1.0 and _evidence(finding, one) <= 0.0
     return times > 1.0
+
+
+def _habit(finding: Finding, one: Diagnosis, heard: Testimony) -> bool:
+    """Return whether only the way in which the person stands says so, and a movement without fault shows nothing of
+    it, which would show that size: who stands beside the middle has no plate beside its place.
+    """
+    alone = _names(finding) in heard.causes and set(heard.seen_by(_names(finding))) <= _STANDING
+    seen = alone and one.verdict == "nothing wrong" and _times_its_limit(finding, one) > 1.0
+    return seen and _evidence(finding, one) <= 0.0
+
+
+def _times_its_limit(finding: Finding, one: Diagnosis) -> float:
+    """Return the size of a finding over the limit from which the simulation sees it; 0 where it does not."""
+    limits = {(row.effect, row.target): row.limit for row in one.limits}
+    return abs(finding.parameters[0].value) / limits.get(_names(finding), float("inf")) if finding.parameters else 0.0
 
 
 def _evidence(finding: Finding, one: Diagnosis) -> float:
