@@ -86,6 +86,13 @@ def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(witness: str
     assert any("plate position of plate1:y" in note for note in one.notes) is not named
 
 
+def test_exchanged_labels_explain_nothing_that_plates_weigh() -> None:
+    labels = Finding("labels_swapped", "LWRA/LWRB", (), (Alias("labels_swapped", "LWRA/LWRB", 30.0),), 1.0)
+    simulation = replace(BY_SIMULATION, verdict="named, incomplete", findings=(labels,))
+    one = with_witnesses(simulation, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    assert (one.verdict, one.findings) == ("named, incomplete", (WEIGHT, labels))
+
+
 def test_what_the_simulation_tells_from_its_look_alikes_keeps_its_name() -> None:
     gain = finding("plate_gain", "Fz", 0.05, "1")
     one = with_witnesses(replace(BY_SIMULATION, findings=(gain,)), Verdicts((WEIGHT,), HEARD), HEARD, judged=True)

@@ -70,11 +70,13 @@ def _names(one: Finding | Alias) -> tuple[str, str]:
 def _explained_without(finding: Finding, one: Diagnosis) -> bool:
     """Return whether the simulation found something else wrong, though it would see a cause of this size: a load is
     weight to the plates, and a hand that carries it moves where people stand; or found this very cause to have no one
-    size. Where it doubts what it found, it still has to have seen some of a cause that is `_PLAIN`.
+    size. Exchanged labels are nothing to the plates. Where it doubts what it found, it still has to have seen some of a
+    cause that is `_PLAIN`.
     """
     if any(_names(other) == _names(finding) and other.hangs_on for other in one.resembles):
         return True
-    if not finding.parameters or one.verdict == "nothing wrong":
+    labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
+    if not finding.parameters or one.verdict == "nothing wrong" or labels:
         return False
     times = _times_its_limit(finding, one)
     if one.doubt:
