@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.ik.compiled.derivatives import fill_places, fill_tangent
+from biodance.motion.ik.compiled.derivatives import PlacedJoints, fill_places, fill_tangent
 from biodance.motion.ik.compiled.tree import move_joints, place_joints
 from biodance.records import Array, Index, Motion
 from biodance.spatial import cross, quaternion_matrix, skew
@@ -178,9 +178,7 @@ def place_jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -
     """Return (T, 3S, nv) of points (T, S, 3) on segments, the first of `jacobian`."""
     place = np.zeros((*points.shape, body.nv))
     hangs = np.ascontiguousarray(below(body)[:, segment] > 0)
-    known = pose.joint_rotation, pose.joint_position, pose.root_position, points
-    rotation, origin, root, points = (np.ascontiguousarray(one) for one in known)  # one type for the compiled code
-    fill_places(hangs, _tree(body)[3], rotation, origin, root, body.n_root, points, place)
+    fill_places(hangs, _placed_joints(body, pose), np.ascontiguousarray(points), place)
     return place.reshape(len(place), -1, body.nv)
 
 
@@ -190,10 +188,16 @@ def tangent_of(body: Body, pose: Poses, com: Array, place: Array, turn: Array) -
     """
     tangent = np.zeros((len(com), place.shape[2], body.nv))
     hangs = np.ascontiguousarray(below(body)[:, : com.shape[1]] > 0)
-    known = pose.joint_rotation, pose.joint_position, pose.root_position, com, place, turn
-    rotation, origin, root, com, place, turn = (np.ascontiguousarray(one) for one in known)
-    fill_tangent(hangs, _tree(body)[3], rotation, origin, root, body.n_root, com, place, turn, tangent)
+    com, place, turn = (np.ascontiguousarray(one) for one in (com, place, turn))
+    fill_tangent(hangs, _placed_joints(body, pose), com, place, turn, tangent)
     return tangent
+
+
+def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
+    """Return the joints as the compiled code takes them: contiguous arrays, so that there is one type of them."""
+    known = pose.joint_rotation, pose.joint_position, pose.root_position
+    rotation, origin, root = (np.ascontiguousarray(one) for one in known)
+    return PlacedJoints(_tree(body)[3], rotation, origin, root, body.n_root)
 
 
 def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:

@@ -1,19 +1,33 @@
 """First derivatives of places on a tree of joints and of what is linear in them, compiled (numba): what
 `motion.kinematics` and `uncertainty.response` define, frame by frame.
 
-Coordinates are the root's place and turn where it moves (``roots`` 6, else 0), then the n joints, lab axes.
-``hangs`` (n, K) tells which of K points hang on a joint; functions fill the arrays that come last, which hold zeros.
+Coordinates are the root's place and turn where it moves, then the n joints, lab axes. ``hangs`` (n, K) tells which of K
+points hang on a joint; functions fill the arrays that come last, which hold zeros.
 """
+
+from typing import NamedTuple
 
 from biodance.motion.ik.compiled import compiled
 from biodance.motion.ik.compiled.tree import cross_of, dot_of, matrix_of, three_of
+from biodance.records import Array
+
+
+class PlacedJoints(NamedTuple):
+    """The n joints of T postures, lab frame: the own ``axis`` (n, 3) of each, ``rotation`` (T, n, 3, 3) and ``origin``
+    (T, n, 3) m; the ``root`` (T, 3) m and how many coordinates move it (``roots``: 6, or 0).
+    """
+
+    axis: Array
+    rotation: Array
+    origin: Array
+    root: Array
+    roots: int
 
 
 @compiled
-def fill_places(hangs, axis, rotation, origin, root, roots, points, J):
-    """Fill J (T, K, 3, nv) of ``points`` (T, K, 3) m from the joints' own ``axis`` (n, 3), their ``rotation`` (T, n, 3,
-    3) and ``origin`` (T, n, 3) m, and the ``root`` (T, 3) m.
-    """
+def fill_places(hangs, joints, points, J):
+    """Fill J (T, K, 3, nv): how ``points`` (T, K, 3) m move with each coordinate of `PlacedJoints`."""
+    axis, rotation, origin, root, roots = joints
     for t in range(points.shape[0]):
         for k in range(points.shape[1]):
             if roots:
@@ -41,10 +55,11 @@ def _turned_axis(R, axis):
 
 
 @compiled
-def fill_tangent(hangs, axis, rotation, origin, root, roots, com, place, turn, tangent):
-    """Fill tangent (T, L, nv): what each coordinate does to L functionals that are ``place`` (T, N, L, 3) of the moved
-    ``com`` (T, N, 3) m of N segments and ``turn`` (T, N, L, 3) of their turn.
+def fill_tangent(hangs, joints, com, place, turn, tangent):
+    """Fill tangent (T, L, nv): what each coordinate of `PlacedJoints` does to L functionals that are ``place``
+    (T, N, L, 3) of the moved ``com`` (T, N, 3) m of N segments and ``turn`` (T, N, L, 3) of their turn.
     """
+    axis, rotation, origin, root, roots = joints
     for t in range(com.shape[0]):
         for s in range(com.shape[1]):
             P, D, at = place[t, s], turn[t, s], three_of(com[t, s])
