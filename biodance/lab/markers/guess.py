@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.lab.markers.names import Meaning, meanings
+from biodance.lab.markers.names import Meaning, meanings_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.still import posture_frames
@@ -78,7 +78,7 @@ def guess_set(markers: Markers) -> GuessedSet:
     Geometry needs z up; for a recording without anybody upright nothing is believed.
     """
     at = _posture(markers)
-    said = {label: found for label in at if (found := meanings(label))}
+    said = meanings_of(at)
     named = _assigned(said, {label: one[0].rank for label, one in said.items()})
     stand = _stand(at, named)
     if stand is None:

@@ -5,12 +5,13 @@ The spellings are data: ``anthropometry/marker_names.toml``.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
 
 from biodance.lab.markers.set_file import LANDMARKS
+from biodance.lab.markers.spelling import Reading, readings, readings_of
 from biodance.library import locate, read_toml
 
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
@@ -30,7 +31,7 @@ class Meaning:
 
 @dataclass(frozen=True)
 class _Vocabulary:
-    sides: Mapping[str, str]
+    pairs: tuple[tuple[str, str], ...]
     noise: frozenset[str]
     landmarks: Mapping[str, tuple[tuple[str, int], ...]]
     segments: Mapping[str, str]
@@ -46,22 +47,35 @@ def _vocabulary() -> _Vocabulary:
         for rank, spelling in enumerate(spellings):
             spelled.setdefault(spelling, []).append((landmark, rank))
     segments = {word: segment for segment, words in table["segments"].items() for word in words}
-    sides = {word: side for side, words in table["sides"].items() for word in words}
+    pairs = tuple((right, left) for right, left in table["sides"]["pairs"])
     landmarks = {word: tuple(found) for word, found in spelled.items()}
     single = {
         word: kind for group in ("regions", "qualities") for kind, words in table[group].items() for word in words
     }
     composed = {frozenset(way.split()): landmark for landmark, ways in table["composed"].items() for way in ways}
-    return _Vocabulary(sides, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
+    return _Vocabulary(pairs, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
 
 
 def meanings(label: str) -> tuple[Meaning, ...]:
     """Return what a label may mean, the most usual first; nothing where no spelling is known."""
     words = _vocabulary()
+    return _of(words, readings(label, words.pairs, words.noise))
+
+
+def meanings_of(labels: Iterable[str]) -> dict[str, tuple[Meaning, ...]]:
+    """Return label -> what it may mean, the most usual first, read as the whole set of labels is written; labels that
+    mean nothing are left out.
+    """
+    words = _vocabulary()
+    every = readings_of(labels, words.pairs, words.noise)
+    return {label: found for label, ways in every.items() if (found := _of(words, ways))}
+
+
+def _of(words: _Vocabulary, ways: Iterable[Reading]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
-    for side, rest, cost in _readings(label):
-        for place, rank in _places(words, rest, side):
-            found[place] = min(found.get(place, 10**6), rank + cost)
+    for way in ways:
+        for place, rank in _places(words, way.rest, way.side):
+            found[place] = min(found.get(place, 10**6), rank + way.cost)
     return tuple(sorted((Meaning(place, rank) for place, rank in found.items()), key=lambda one: one.rank))
 
 
@@ -87,29 +101,3 @@ def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[
         if segment and (side or middle):
             return [(segment if middle else f"{side}_{segment}", 500)]
     return []
-
-
-def _readings(label: str) -> list[tuple[str, tuple[str, ...], int]]:
-    """Return the ways to take a side from a label: side or "", the tokens that are left, and what this way costs."""
-    words = _vocabulary()
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", label)
-    tokens = [token for token in re.split(r"[^a-z0-9]+", spaced.lower()) if token]
-    kept = tuple(token for token in tokens if token not in words.noise) or tuple(tokens)
-    out: list[tuple[str, tuple[str, ...], int]] = []
-    for given in dict.fromkeys((kept, tuple(tokens))):
-        out.append(("", given, 0))
-        for i, token in enumerate(given):
-            if token in words.sides and len(given) > 1:
-                out.append(
-                    (words.sides[token], given[:i] + given[i + 1 :], 0 if len(token) > 1 or token in "lr" else 3)
-                )
-        whole = "".join(given)
-        for word, side in words.sides.items():
-            cost = 0 if word in ("l", "r", "left", "right") else 3
-            if whole.startswith(word) and len(whole) > len(word):
-                out.append((side, (whole[len(word) :],), cost))
-                if given[0] != word and given[0].startswith(word):
-                    out.append((side, (given[0][len(word) :], *given[1:]), cost))
-            if whole.endswith(word) and len(whole) > len(word):
-                out.append((side, (whole[: -len(word)],), cost + 1))
-    return [(side, tuple(token for token in rest if token), cost) for side, rest, cost in out if any(rest)]
