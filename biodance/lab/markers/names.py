@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import permutations
+from itertools import permutations, product
 
 from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.spelling import Reading, readings, readings_of
@@ -17,6 +17,10 @@ from biodance.library import locate, read_toml
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
 _WHOLE = {"head_front", "head_back"}
 """Landmarks of the midline that are the mean of a right and a left marker."""
+
+
+_WAYS = 24
+"""Ways to cut the tokens of a label into words, beyond which the label says nothing."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +39,8 @@ class _Vocabulary:
     noise: frozenset[str]
     landmarks: Mapping[str, tuple[tuple[str, int], ...]]
     segments: Mapping[str, str]
-    words: Mapping[str, str]
-    composed: Mapping[frozenset[str], str]
+    words: Mapping[str, tuple[str, ...]]
+    composed: Mapping[frozenset[str], tuple[str, ...]]
 
 
 @cache
@@ -49,10 +53,14 @@ def _vocabulary() -> _Vocabulary:
     segments = {word: segment for segment, words in table["segments"].items() for word in words}
     pairs = tuple((right, left) for right, left in table["sides"]["pairs"])
     landmarks = {word: tuple(found) for word, found in spelled.items()}
-    single = {
-        word: kind for group in ("regions", "qualities") for kind, words in table[group].items() for word in words
-    }
-    composed = {frozenset(way.split()): landmark for landmark, ways in table["composed"].items() for way in ways}
+    single: dict[str, tuple[str, ...]] = {}
+    for kind, spellings in (table["regions"] | table["qualities"]).items():
+        for word in spellings:
+            single[word] = (*single.get(word, ()), kind)
+    composed: dict[frozenset[str], tuple[str, ...]] = {}
+    for landmark, several in table["composed"].items():
+        for way in several:
+            composed[frozenset(way.split())] = (*composed.get(frozenset(way.split()), ()), landmark)
     return _Vocabulary(pairs, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
 
 
@@ -91,13 +99,36 @@ def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[
                 found.append((f"{side}_{landmark}", rank))
     if found:
         return found
-    split = [part for token in rest for part in re.split(r"(?<=[a-z])(?=\d)|(?<=\d)(?=[a-z])", token)]
-    kinds = frozenset(words.words[part] for part in split if part in words.words)
-    if side and kinds in words.composed:
-        return [(f"{side}_{words.composed[kinds]}", 100)]
     for spelling in joined:
         segment = words.segments.get(re.sub(r"\d+$", "", spelling)) or words.segments.get(spelling)
         middle = segment in ("pelvis", "trunk_head")
         if segment and (side or middle):
-            return [(segment if middle else f"{side}_{segment}", 500)]
-    return []
+            found.append((segment if middle else f"{side}_{segment}", 500))
+    if side:
+        found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(words, rest)]
+    return found
+
+
+def _composed(words: _Vocabulary, rest: tuple[str, ...]) -> list[tuple[str, int]]:
+    """Return landmark and rank for tokens that name a region and a quality of it, whole or in short: KneeLat, lat_kn,
+    EpiFemInt. Words that say nothing may stand among them, but no remainder within a token.
+    """
+    cuts = [cut for token in rest if (cut := _cuts(words.words, token))]
+    found = []
+    for way in product(*cuts) if cuts and sum(map(len, cuts)) <= _WAYS else ():
+        parts = [part for cut in way for part in cut]
+        if sum(map(len, parts)) < 2:
+            continue
+        for kinds in product(*(words.words[part] for part in parts)):
+            short = sum(len(part) < 3 for part in parts)
+            for landmark in words.composed.get(frozenset(kinds), ()):
+                found.append((landmark, 100 + 30 * short + 10 * (len(rest) - len(cuts))))
+    return found
+
+
+def _cuts(known: Mapping[str, tuple[str, ...]], token: str) -> list[tuple[str, ...]]:
+    """Return the ways to cut a token into known words."""
+    if not token:
+        return [()]
+    ends = [end for end in range(1, len(token) + 1) if token[:end] in known]
+    return [(token[:end], *rest) for end in ends for rest in _cuts(known, token[end:])]
