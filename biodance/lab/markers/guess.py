@@ -6,11 +6,12 @@ lacks a landmark the body needs, or of which too much is contradicted, is none.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.lab.markers.absent import absent_landmarks, fill_absent
 from biodance.lab.markers.names import Meaning, meanings_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
 from biodance.lab.markers.sets import GUESSED
@@ -65,7 +66,8 @@ def guess_set(markers: Markers) -> GuessedSet:
     _sort_pairs(places, stand, doubts)
     believed = sum(bool(confirmed[label]) for place, label in named.items() if place in LANDMARKS)
     total = sum(place in LANDMARKS for place in named)
-    absent = _absent(places)
+    doubts += fill_absent(places, stand, said)
+    absent = absent_landmarks(places)
     map_ = _map(places, confirmed)
     if believed < _BELIEVED * total:
         doubts.insert(0, f"Only {believed} of {total} landmarks that the labels name stand where a person has them.")
@@ -125,26 +127,6 @@ def _sort_pairs(places: dict[str, str], stand: Standing, doubts: list[str]) -> N
                         f"{places[lateral]} lies outside {places[medial]}, so it was taken for the lateral marker of "
                         f"the {side} {joint}, against its name."
                     )
-
-
-def _absent(places: Iterable[str]) -> list[str]:
-    """Return the landmarks that a body needs and the guess lacks."""
-    have = set(places)
-    needs = [
-        (f"{side} {part.replace('_', ' ')}", {f"{side}_{part}", *(f"{side}_{other}" for other in others)})
-        for side in SIDES
-        for part, others in (
-            ("asis", ()),
-            ("knee_lateral", ()),
-            ("ankle_lateral", ()),
-            ("heel", ()),
-            ("toe", ("toe_lateral", "toe_medial")),
-        )
-    ]
-    absent = [name for name, any_of in needs if not any_of & have]
-    if "mid_psis" not in have and not {"left_psis", "right_psis"} <= have:
-        absent.append("the posterior iliac spines or the sacrum")
-    return absent
 
 
 def _map(places: Mapping[str, str], said: Mapping[str, tuple[Meaning, ...]]) -> dict[str, str]:

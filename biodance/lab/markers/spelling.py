@@ -14,6 +14,10 @@ _SHARED = 0.8
 _PAIRS = 2
 """Pairs of mirror images that make a way to say the side one of this set."""
 _UNLABELLED = re.compile(r"^(\*\s*\d*|u\d+|(un(label|name|known|ident)|uname|uncertain|traj).*)$", re.IGNORECASE)
+_COMPUTED = re.compile(
+    r"(?i:[hkaesw]_?jc\d?|cent(re|er|ro)\w*|centerofmass|(?<![a-z])com|mid_?(asis?|hip|pelvis|knee|ankle|shoulder|trunk))$"
+)
+"""Points that software computes from markers: joint centres, middles, centres of mass."""
 _SPOKEN = {"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l"}
 
 
@@ -31,10 +35,12 @@ class Reading:
 
 def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     """Return label -> label without the subject's name: without what stands before a colon, and without a beginning
-    that nearly all labels share. Labels of unlabelled points are left out.
+    that nearly all labels share. Labels of unlabelled and of computed points are left out.
     """
     given = {label: label.rpartition(":")[2].strip() for label in labels}
-    given = {label: name for label, name in given.items() if name and not _UNLABELLED.match(name)}
+    given = {
+        label: name for label, name in given.items() if name and not (_UNLABELLED.match(name) or _COMPUTED.search(name))
+    }
     shared = _beginning(list(given.values()))
     return {label: name.removeprefix(shared) or name for label, name in given.items()}
 

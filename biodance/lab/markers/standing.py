@@ -29,6 +29,8 @@ _ON_THE_SIDE = ("asis", "knee", "ankle", "heel", "toe", "acromion")
 _ACROSS = 0.02
 """Share of the stature by which a landmark may lie beyond the middle of the body, or one of the middle beside it."""
 _OFF_MIDDLE = 0.045
+_WIDEST = {"asis": 0.12, "psis": 0.09, "acromion": 0.19}
+"""Share of the stature beyond which a landmark of the trunk does not lie from the middle."""
 _REACH = {"elbow": (0.09, 0.26), "wrist": (0.15, 0.44), "hand": (0.18, 0.52)}
 """Shares of the stature between a landmark of the arm and its own acromion."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "toe", "toe_lateral", "acromion")
@@ -78,7 +80,8 @@ class Standing:
         out = float((self.at[label] - self.middle) @ self.right) / self.stature
         if place.startswith(SIDES):
             own = out if place.startswith("right") else -out
-            return own > -_ACROSS or not part_of(place).startswith(_ON_THE_SIDE)
+            widest = _WIDEST.get(part_of(place), np.inf)
+            return own < widest and (own > -_ACROSS or not part_of(place).startswith(_ON_THE_SIDE))
         return abs(out) < _OFF_MIDDLE or _kind(place) in (None, "head")
 
     def _in_its_place(self, place: str, label: str) -> bool:
