@@ -21,6 +21,8 @@ from biodance.records import SIDES, Array, Markers
 
 _BELIEVED = 0.85
 """Share of the named landmarks that the standing person must confirm, or the names mean something else here."""
+_USUAL = 30
+"""Rank of a spelling below which it is a common one, whose word counts."""
 _WEIGHT = 20.0
 """Ranks of spelling by which a marker at the limit of where it is believed counts less than one at the usual place."""
 _APART = 0.005
@@ -64,8 +66,8 @@ def guess_set(markers: Markers) -> GuessedSet:
         if one in LANDMARKS and not confirmed[label]
     ]
     _sort_pairs(places, stand, doubts)
-    believed = sum(bool(confirmed[label]) for place, label in named.items() if place in LANDMARKS)
-    total = sum(place in LANDMARKS for place in named)
+    usual = [label for place, label in named.items() if said[label][0].rank < _USUAL]
+    believed, total = sum(bool(confirmed[label]) for label in usual), len(usual)
     doubts += fill_absent(places, stand, said)
     absent = absent_landmarks(places)
     map_ = _map(places, confirmed)

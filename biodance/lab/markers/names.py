@@ -97,14 +97,14 @@ def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[
                 found.append((landmark, rank))
             elif landmark not in _MIDLINE and side:
                 found.append((f"{side}_{landmark}", rank))
-    if found:
-        return found
+    named = bool(found)
     for spelling in joined:
-        segment = words.segments.get(re.sub(r"\d+$", "", spelling)) or words.segments.get(spelling)
-        middle = segment in ("pelvis", "trunk_head")
-        if segment and (side or middle):
-            found.append((segment if middle else f"{side}_{segment}", 500))
-    if side:
+        stem = spelling.rstrip("0123456789")
+        sided = words.segments.get(stem if side else spelling) or words.segments.get(spelling if side else stem)
+        middle = sided in ("pelvis", "trunk_head")
+        if sided and (side or (middle and len(spelling) > 1)):
+            found.append((sided if middle else f"{side}_{sided}", 500))
+    if side and not named:
         found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(words, rest)]
     return found
 

@@ -25,10 +25,18 @@ _HEIGHT = {
 """Share of the stature at which a standing person has a landmark, and how far from it it is still believed; arms may be
 anywhere (Winter 2009; static trials of nine persons).
 """
+_SEGMENT_HEIGHT = {
+    "pelvis": (0.45, 0.72),
+    "thigh": (0.24, 0.62),
+    "shank": (0.02, 0.33),
+    "foot": (-0.02, 0.11),
+    "trunk_head": (0.5, 1.1),
+}
+"""Shares of the stature between which markers of a segment are."""
 _ON_THE_SIDE = ("asis", "knee", "ankle", "heel", "toe", "acromion")
 _ACROSS = 0.02
 """Share of the stature by which a landmark may lie beyond the middle of the body, or one of the middle beside it."""
-_OFF_MIDDLE = 0.045
+_OFF_MIDDLE = 0.06
 _WIDEST = {"asis": 0.12, "psis": 0.09, "acromion": 0.19}
 """Share of the stature beyond which a landmark of the trunk does not lie from the middle."""
 _REACH = {"elbow": (0.09, 0.26), "wrist": (0.15, 0.44), "hand": (0.18, 0.52)}
@@ -72,7 +80,10 @@ class Standing:
         return float(abs((self.at[label][2] - self.floor) / self.stature - share) / spare)
 
     def believed(self, place: str, label: str) -> bool:
-        """Return whether a marker stands where a person has this landmark."""
+        """Return whether a marker stands where a person has this landmark or segment."""
+        if part_of(place) in _SEGMENT_HEIGHT:
+            lowest, highest = _SEGMENT_HEIGHT[part_of(place)]
+            return lowest <= (self.at[label][2] - self.floor) / self.stature <= highest
         return self.misfit(place, label) <= 1 and self._on_its_side(place, label) and self._in_its_place(place, label)
 
     def _on_its_side(self, place: str, label: str) -> bool:
