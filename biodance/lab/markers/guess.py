@@ -25,6 +25,8 @@ _USUAL = 30
 """Rank of a spelling below which it is a common one, whose word counts."""
 _WEIGHT = 20.0
 """Ranks of spelling by which a marker at the limit of where it is believed counts less than one at the usual place."""
+_AS_USUAL = 0.5
+"""Share of the way to that limit within which all places are equally usual."""
 _APART = 0.005
 """m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
 
@@ -99,7 +101,7 @@ def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, st
     """
     wishes = sorted(
         (
-            (one.rank + _WEIGHT * misfit(one.place, label), one.place, label)
+            (one.rank + _WEIGHT * max(misfit(one.place, label) - _AS_USUAL, 0.0), one.place, label)
             for label, ways in said.items()
             for one in ways
         ),

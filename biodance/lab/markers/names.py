@@ -4,7 +4,6 @@ are one thing.
 The spellings are data: ``anthropometry/marker_names.toml``.
 """
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -88,7 +87,17 @@ def _of(words: _Vocabulary, ways: Iterable[Reading]) -> tuple[Meaning, ...]:
 
 
 def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
-    """Return the places of one reading: a landmark whose spelling the tokens make in some order, else a segment."""
+    """Return the places of one reading: a landmark whose spelling the tokens make in some order, else a segment; a
+    number behind a name may count its markers.
+    """
+    found = _spelled(words, rest, side)
+    stem = (*rest[:-1], rest[-1].rstrip("0123456789"))
+    if not found and stem != rest and any(stem):
+        found = [(place, rank + 70) for place, rank in _spelled(words, tuple(filter(None, stem)), side)]
+    return found
+
+
+def _spelled(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
     joined = ["".join(order) for order in permutations(rest)] if len(rest) <= 3 else ["".join(rest)]
     found = []
     for spelling in joined:
@@ -104,6 +113,9 @@ def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[
         middle = sided in ("pelvis", "trunk_head")
         if sided and (side or (middle and len(spelling) > 1)):
             found.append((sided if middle else f"{side}_{sided}", 500))
+    part = next((words.segments[token] for token in rest if len(token) > 2 and token in words.segments), "")
+    if part and side and not found:
+        found.append((part if part in ("pelvis", "trunk_head") else f"{side}_{part}", 600))
     if side and not named:
         found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(words, rest)]
     return found

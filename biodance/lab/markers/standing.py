@@ -28,7 +28,7 @@ anywhere (Winter 2009; static trials of nine persons).
 _SEGMENT_HEIGHT = {
     "pelvis": (0.45, 0.72),
     "thigh": (0.24, 0.62),
-    "shank": (0.02, 0.33),
+    "shank": (0.02, 0.36),
     "foot": (-0.02, 0.11),
     "trunk_head": (0.5, 1.1),
 }
@@ -39,9 +39,13 @@ _ACROSS = 0.02
 _OFF_MIDDLE = 0.06
 _WIDEST = {"asis": 0.12, "psis": 0.09, "acromion": 0.19}
 """Share of the stature beyond which a landmark of the trunk does not lie from the middle."""
+_LIFTED = 0.085
+"""Share of the stature above which an ankle belongs to a foot that is not flat on the ground."""
 _REACH = {"elbow": (0.09, 0.26), "wrist": (0.15, 0.44), "hand": (0.18, 0.52)}
 """Shares of the stature between a landmark of the arm and its own acromion."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "toe", "toe_lateral", "acromion")
+_STRAIGHT = ("asis", "psis", "acromion")
+"""Pairs that point right even where one leg is before the other."""
 _FEET = ("_heel", "_toe", "_toe_lateral", "_toe_medial")
 
 
@@ -68,6 +72,9 @@ class Standing:
     middle: Array
     floor: float
     stature: float
+
+    def _stands_on(self, ankle: str) -> bool:
+        return bool(self.at[ankle][2] - self.floor < _LIFTED * self.stature)
 
     def misfit(self, place: str, label: str) -> float:
         """Return how far a marker is from the usual height of a landmark: 1 at the limit where it is believed; 0 where
@@ -99,7 +106,7 @@ class Standing:
         """Return whether heel and toes lie behind and before their ankle, and arms within reach of their shoulder."""
         side, part = place.partition("_")[0], part_of(place)
         ankle = self.named.get(f"{side}_ankle_lateral")
-        if part.startswith(("heel", "toe")) and ankle not in (None, label):
+        if part.startswith(("heel", "toe")) and ankle not in (None, label) and self._stands_on(str(ankle)):
             ahead = float((self.at[label] - self.at[str(ankle)]) @ self.ahead) / self.stature
             return ahead < 0 if part == "heel" else ahead > _ACROSS
         reach = next((span for key, span in _REACH.items() if part.startswith(key)), None)
@@ -116,11 +123,11 @@ def standing_person(at: Mapping[str, Array], named: Mapping[str, str]) -> Standi
 
     ``at`` label -> (3,) m, z up; ``named`` landmark -> label.
     """
-    pairs = [
-        at[named[f"right_{part}"]] - at[named[f"left_{part}"]]
+    pairs = {
+        part: at[named[f"right_{part}"]] - at[named[f"left_{part}"]]
         for part in _PAIRS
         if f"right_{part}" in named and f"left_{part}" in named
-    ]
+    }
     ahead = [
         at[named[front]] - at[named[back]]
         for side in SIDES
@@ -134,7 +141,8 @@ def standing_person(at: Mapping[str, Array], named: Mapping[str, str]) -> Standi
     ]
     if len(pairs) < 3 or not ahead:
         return None
-    right = np.sum(pairs, axis=0) * [1.0, 1.0, 0.0]
+    straight = [pairs[part] for part in _STRAIGHT if part in pairs] or list(pairs.values())
+    right = np.sum(straight, axis=0) * [1.0, 1.0, 0.0]
     right = right / max(float(np.linalg.norm(right)), 1e-9)
     forward = np.cross([0.0, 0.0, 1.0], right)
     if np.mean([step @ forward > 0 for step in ahead]) < 0.5:
@@ -142,11 +150,10 @@ def standing_person(at: Mapping[str, Array], named: Mapping[str, str]) -> Standi
             "The labels say right where the person has the left: toes and iliac spines would point backwards. Are the "
             "sides exchanged, or is z not up?"
         )
-    if np.mean([pair @ right > 0 for pair in pairs]) < 0.99:
+    if np.mean([pair @ right > 0 for pair in pairs.values()]) < 0.99:
         return "Of some pairs of markers the right one lies left of the left one: the sides are exchanged in part."
-    middle = np.mean(
-        [at[named[f"{side}_{part}"]] for part in _PAIRS[:4] for side in SIDES if f"{side}_{part}" in named], axis=0
-    )
+    both = [part for part in _STRAIGHT[:2] if part in pairs] or list(pairs)
+    middle = np.mean([at[named[f"{side}_{part}"]] for part in both for side in SIDES], axis=0)
     floor, stature = _size(at, named)
     if not 0.6 < stature < 2.6:
         return f"Nobody stands upright here: the labels would make a person of {stature:.2f} m."
