@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from biodance.lab.markers.names import Meaning
+from biodance.lab.markers.names import Meaning, sides_of
 from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.standing import Standing
@@ -23,6 +23,8 @@ _NEEDS = (
 _MIRRORED = 0.035
 """m: a marker so near to the mirror image of the other side's is the same landmark, if no other is nearly as near."""
 _ALONE = 1.6
+_LENGTH = 0.13
+"""Share of the stature within which the markers of a foot are from its ankle."""
 _BEHIND, _BEFORE = -0.012, 0.045
 """Shares of the stature by which a marker of the foot lies before its ankle: the heel less, the toe more."""
 
@@ -45,7 +47,7 @@ def fill_absent(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
     """Take markers without a landmark for those that a body needs and that no label names; return what was taken, in
     sentences. ``places`` landmark -> label is added to.
     """
-    taken, markers = [], plain_labels(stand.at)
+    taken, markers, sides = [], plain_labels(stand.at), sides_of(stand.at)
     lacking = {f"{side}_{part}" for side in SIDES for part, others in _NEEDS} - places.keys()
     if "mid_psis" not in places:
         lacking |= {f"{side}_psis" for side in SIDES} - places.keys()
@@ -60,7 +62,8 @@ def fill_absent(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
             places[place] = found
             taken.append(f"{found} lies where the mirror image of {other} is: taken for the {_words(place)}.")
         elif part in ("heel", "toe"):
-            found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), free, stand, said)
+            own = [label for label in free if sides.get(label) == side]
+            found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), own, stand)
             if found is not None:
                 places[place] = found
                 taken.append(
@@ -93,19 +96,17 @@ def _at_mirror_image(place: str, other: str, free: Iterable[str], stand: Standin
     return near[0][1] if len(near) == 1 or near[1][0] > max(_ALONE * near[0][0], _MIRRORED) else None
 
 
-def _end_of_foot(
-    place: str, ankle: str | None, free: Iterable[str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]
-) -> str | None:
-    """Return the hindmost (heel) or foremost (toe) marker whose label names this foot; None if none lies far enough
-    from the ankle.
+def _end_of_foot(place: str, ankle: str | None, own: Iterable[str], stand: Standing) -> str | None:
+    """Return the hindmost (heel) or foremost (toe) marker near the ground and this ankle, of those whose labels say its
+    side; None if none lies far enough from the ankle.
     """
     if ankle is None:
         return None
-    foot = f"{place.partition('_')[0]}_foot"
+    way = {label: (stand.at[label] - stand.at[ankle]) / stand.stature for label in own}
     ahead = {
-        label: float((stand.at[label] - stand.at[ankle]) @ stand.ahead) / stand.stature
-        for label in free
-        if any(one.place == foot for one in said.get(label, ())) and stand.believed(place, label)
+        label: float(step @ stand.ahead)
+        for label, step in way.items()
+        if np.linalg.norm(step) < _LENGTH and step[2] < 0 and stand.believed(place, label)
     }
     if place.endswith("heel"):
         found = min(ahead, key=lambda label: ahead[label], default=None)

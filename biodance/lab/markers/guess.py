@@ -70,7 +70,7 @@ def guess_set(markers: Markers) -> GuessedSet:
     _sort_pairs(places, stand, doubts)
     usual = [label for place, label in named.items() if said[label][0].rank < _USUAL]
     believed, total = sum(bool(confirmed[label]) for label in usual), len(usual)
-    doubts += fill_absent(places, stand, said)
+    doubts += fill_absent(places, stand, confirmed)
     absent = absent_landmarks(places)
     map_ = _map(places, confirmed)
     if believed < _BELIEVED * total:
@@ -134,15 +134,16 @@ def _sort_pairs(places: dict[str, str], stand: Standing, doubts: list[str]) -> N
 
 
 def _map(places: Mapping[str, str], said: Mapping[str, tuple[Meaning, ...]]) -> dict[str, str]:
-    """Return label -> landmark, and for labels without one the segment that they name."""
+    """Return label -> landmark, and for labels without one the segment that they name or whose landmark another has."""
     found = {label: place for place, label in places.items()}
     for label, several in said.items():
         if label in found:
             continue
         whole = next((one.place for one in several if one.place in MIDLINE and one.place.startswith("head")), None)
         segment = next((one.place for one in several if one.place not in LANDMARKS), None)
-        if several and several[0].place.endswith("_wand"):
-            segment = segment_of(several[0].place)
+        on = {segment_of(one.place) for one in several if one.place in LANDMARKS}
+        if len(on) == 1 and (segment is None or several[0].place.endswith("_wand")):
+            segment = on.pop()
         if whole or segment:
             found[label] = whole or segment or ""
     return found

@@ -4,6 +4,7 @@ are one thing.
 The spellings are data: ``anthropometry/marker_names.toml``.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +19,8 @@ _WHOLE = {"head_front", "head_back"}
 """Landmarks of the midline that are the mean of a right and a left marker."""
 
 
+_PARTS = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
+"""A number, as an ordinal or not, or a word, within a token."""
 _WAYS = 24
 """Ways to cut the tokens of a label into words, beyond which the label says nothing."""
 
@@ -78,6 +81,14 @@ def meanings_of(labels: Iterable[str]) -> dict[str, tuple[Meaning, ...]]:
     return {label: found for label, ways in every.items() if (found := _of(words, ways))}
 
 
+def sides_of(labels: Iterable[str]) -> dict[str, str]:
+    """Return label -> "right" or "left", for the labels that say one as the whole set of labels is written."""
+    words = _vocabulary()
+    every = readings_of(labels, words.pairs, words.noise)
+    sides = {label: {one.side for one in ways if one.side} for label, ways in every.items()}
+    return {label: next(iter(found)) for label, found in sides.items() if len(found) == 1}
+
+
 def _of(words: _Vocabulary, ways: Iterable[Reading]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
     for way in ways:
@@ -125,7 +136,8 @@ def _composed(words: _Vocabulary, rest: tuple[str, ...]) -> list[tuple[str, int]
     """Return landmark and rank for tokens that name a region and a quality of it, whole or in short: KneeLat, lat_kn,
     EpiFemInt. Words that say nothing may stand among them, but no remainder within a token.
     """
-    cuts = [cut for token in rest if (cut := _cuts(words.words, token))]
+    parted = [part for token in rest for part in ([token] if token in words.words else _PARTS.findall(token))]
+    cuts = [cut for token in parted if (cut := _cuts(words.words, token))]
     found = []
     for way in product(*cuts) if cuts and sum(map(len, cuts)) <= _WAYS else ():
         parts = [part for cut in way for part in cut]
@@ -134,7 +146,7 @@ def _composed(words: _Vocabulary, rest: tuple[str, ...]) -> list[tuple[str, int]
         for kinds in product(*(words.words[part] for part in parts)):
             short = sum(len(part) < 3 for part in parts)
             for landmark in words.composed.get(frozenset(kinds), ()):
-                found.append((landmark, 100 + 30 * short + 10 * (len(rest) - len(cuts))))
+                found.append((landmark, 100 + 30 * short + 10 * (len(parted) - len(cuts))))
     return found
 
 

@@ -15,9 +15,13 @@ _PAIRS = 2
 """Pairs of mirror images that make a way to say the side one of this set."""
 _UNLABELLED = re.compile(r"^(\*\s*\d*|u\d+|(un(label|name|known|ident)|uname|uncertain|traj).*)$", re.IGNORECASE)
 _COMPUTED = re.compile(
-    r"(?i:[hkaesw]_?jc\d?|cent(re|er|ro)\w*|centerofmass|(?<![a-z])com|mid_?(asis?|hip|pelvis|knee|ankle|shoulder|trunk))$"
+    r"[hkaesw]_?jc\d?$|cent(re|er|ro)\w*$|jointcent|(?<![a-z])com$|mid_?p(oi)?nt|virtual|"
+    r"mid_?(asis?|hip|pelvis|knee|ankle|shoulder|trunk)$",
+    re.IGNORECASE,
 )
 """Points that software computes from markers: joint centres, middles, centres of mass."""
+_AXES = ({"0", "1", "2", "3"}, {"O", "A", "L", "P"})
+"""Last signs of the four points that are the axes of a bone."""
 _SPOKEN = {"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l"}
 
 
@@ -38,11 +42,19 @@ def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     that nearly all labels share. Labels of unlabelled and of computed points are left out.
     """
     given = {label: label.rpartition(":")[2].strip() for label in labels}
-    given = {
-        label: name for label, name in given.items() if name and not (_UNLABELLED.match(name) or _COMPUTED.search(name))
+    bones = {
+        name[:-1]
+        for name in given.values()
+        if any({name[:-1] + end for end in ends} <= set(given.values()) for ends in _AXES)
     }
+    given = {label: name for label, name in given.items() if name and not _is_no_marker(name, bones)}
     shared = _beginning(list(given.values()))
     return {label: name.removeprefix(shared) or name for label, name in given.items()}
+
+
+def _is_no_marker(name: str, bones: set[str]) -> bool:
+    """Return whether a label names no marker: an unlabelled point, one that software computes, an axis of a bone."""
+    return bool(_UNLABELLED.match(name) or _COMPUTED.search(name)) or (name[:-1] in bones and name[-1:] in "0123OALP")
 
 
 def _beginning(names: Sequence[str]) -> str:

@@ -25,14 +25,19 @@ _HEIGHT = {
 """Share of the stature at which a standing person has a landmark, and how far from it it is still believed; arms may be
 anywhere (Winter 2009; static trials of nine persons).
 """
-_SEGMENT_HEIGHT = {
+_SOMEWHERE = {
     "pelvis": (0.45, 0.72),
     "thigh": (0.24, 0.62),
     "shank": (0.02, 0.36),
     "foot": (-0.02, 0.11),
     "trunk_head": (0.5, 1.1),
+    "elbow_lateral": (0.45, 1.2),
+    "elbow_medial": (0.45, 1.2),
+    "wrist_radial": (0.32, 1.4),
+    "wrist_ulnar": (0.32, 1.4),
+    "hand": (0.25, 1.4),
 }
-"""Shares of the stature between which markers of a segment are."""
+"""Shares of the stature between which markers of a segment are, and landmarks of the arms."""
 _ON_THE_SIDE = ("asis", "knee", "ankle", "heel", "toe", "acromion")
 _ACROSS = 0.02
 """Share of the stature by which a landmark may lie beyond the middle of the body, or one of the middle beside it."""
@@ -88,9 +93,10 @@ class Standing:
 
     def believed(self, place: str, label: str) -> bool:
         """Return whether a marker stands where a person has this landmark or segment."""
-        if part_of(place) in _SEGMENT_HEIGHT:
-            lowest, highest = _SEGMENT_HEIGHT[part_of(place)]
-            return lowest <= (self.at[label][2] - self.floor) / self.stature <= highest
+        if part_of(place) in _SOMEWHERE:
+            lowest, highest = _SOMEWHERE[part_of(place)]
+            if not lowest <= (self.at[label][2] - self.floor) / self.stature <= highest:
+                return False
         return self.misfit(place, label) <= 1 and self._on_its_side(place, label) and self._in_its_place(place, label)
 
     def _on_its_side(self, place: str, label: str) -> bool:
