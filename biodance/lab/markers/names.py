@@ -11,7 +11,7 @@ from functools import cache
 from itertools import permutations, product
 
 from biodance.lab.markers.set_file import LANDMARKS
-from biodance.lab.markers.spelling import Reading, readings, readings_of
+from biodance.lab.markers.spelling import Spelled, readings, readings_of
 from biodance.library import locate, read_toml
 
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
@@ -89,7 +89,7 @@ def sides_of(labels: Iterable[str]) -> dict[str, str]:
     return {label: next(iter(found)) for label, found in sides.items() if len(found) == 1}
 
 
-def _of(words: _Vocabulary, ways: Iterable[Reading]) -> tuple[Meaning, ...]:
+def _of(words: _Vocabulary, ways: Iterable[Spelled]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
     for way in ways:
         for place, rank in _places(words, way.rest, way.side):

@@ -26,7 +26,7 @@ _SPOKEN = {"ß": "ss", "ø": "o", "æ": "ae", "œ": "oe", "ł": "l"}
 
 
 @dataclass(frozen=True)
-class Reading:
+class Spelled:
     """One way to read a label: ``side`` "right", "left" or ""; ``rest`` the tokens without it; ``cost`` of reading it
     so; ``way`` how the side was said: where, and with which pair of words.
     """
@@ -58,10 +58,19 @@ def _is_no_marker(name: str, bones: set[str]) -> bool:
 
 
 def _beginning(names: Sequence[str]) -> str:
-    """Return what nearly all names begin with: at least two signs and a separator, or three letters."""
-    counts = Counter(name[:end] for name in names for end in range(2, len(name)))
+    """Return what nearly all names begin with: some signs and a separator, three letters, a number of two digits, or a
+    small letter before a capital.
+    """
+    counts = Counter(name[:end] for name in names for end in range(1, len(name)))
     often = [start for start, times in counts.items() if times >= max(_SHARED * len(names), 4)]
-    ends = [start for start in often if re.search(r"[\W_]$", start) or re.fullmatch(r"\D{3,}|.*\d{2,}", start)]
+    capital = sum(name[1:2].isupper() for name in names) >= _SHARED * len(names)
+    ends = [
+        start
+        for start in often
+        if re.search(r".[\W_]$|\d\d$", start)
+        or re.fullmatch(r"\D{3,}", start)
+        or (re.fullmatch("[a-z]", start) and capital)
+    ]
     return max(ends, key=len, default="")
 
 
@@ -75,13 +84,13 @@ def tokens_of(label: str) -> tuple[str, ...]:
     return tuple(token for token in re.split(r"[^a-z0-9]+", spaced.lower()) if token)
 
 
-def readings(label: str, pairs: Iterable[tuple[str, str]], noise: frozenset[str]) -> list[Reading]:
+def readings(label: str, pairs: Iterable[tuple[str, str]], noise: frozenset[str]) -> list[Spelled]:
     """Return the ways to take a side from one label, with the words of ``pairs`` (right, left); ``noise`` are words
     that say nothing.
     """
     tokens = tokens_of(label)
     kept = tuple(token for token in tokens if token not in noise) or tokens
-    out = [Reading("", given) for given in dict.fromkeys((kept, tokens))]
+    out = [Spelled("", given) for given in dict.fromkeys((kept, tokens))]
     for right, left in pairs:
         for word, side in ((right, "right"), (left, "left")):
             for given in dict.fromkeys((kept, tokens)):
@@ -89,7 +98,7 @@ def readings(label: str, pairs: Iterable[tuple[str, str]], noise: frozenset[str]
     return [one for one in dict.fromkeys(out) if any(one.rest)]
 
 
-def _sided(given: tuple[str, ...], word: str, side: str, pair: tuple[str, str]) -> list[Reading]:
+def _sided(given: tuple[str, ...], word: str, side: str, pair: tuple[str, str]) -> list[Spelled]:
     """Return the readings of tokens in which ``word`` says the side: as a token, at the beginning or at the end."""
     usual = 0 if pair in (("r", "l"), ("right", "left")) else 3
     told = 0 if len(word) > 1 else usual
@@ -98,26 +107,26 @@ def _sided(given: tuple[str, ...], word: str, side: str, pair: tuple[str, str]) 
     for i, token in enumerate(given):
         if token == word and count > 1:
             where = "first" if i == 0 else "last" if i == count - 1 else "within"
-            out.append(Reading(side, given[:i] + given[i + 1 :], told, (where, *pair)))
+            out.append(Spelled(side, given[:i] + given[i + 1 :], told, (where, *pair)))
     if given[0] != word and given[0].startswith(word):
         rest = (given[0][len(word) :], *given[1:])
-        out += [Reading(side, one, usual, ("first", *pair)) for one in dict.fromkeys((rest, ("".join(rest),)))]
+        out += [Spelled(side, one, usual, ("first", *pair)) for one in dict.fromkeys((rest, ("".join(rest),)))]
     if given[-1] != word and given[-1].endswith(word):
         rest = (*given[:-1], given[-1][: -len(word)])
-        out += [Reading(side, one, usual + 1, ("last", *pair)) for one in dict.fromkeys((rest, ("".join(rest),)))]
+        out += [Spelled(side, one, usual + 1, ("last", *pair)) for one in dict.fromkeys((rest, ("".join(rest),)))]
     elif count > 1 and whole.endswith(word) and not given[-1].endswith(word):
-        out.append(Reading(side, (whole[: -len(word)],), usual + 1, ("last", *pair)))
+        out.append(Spelled(side, (whole[: -len(word)],), usual + 1, ("last", *pair)))
     return out
 
 
 def readings_of(
     labels: Iterable[str], pairs: Sequence[tuple[str, str]], noise: frozenset[str]
-) -> dict[str, tuple[Reading, ...]]:
+) -> dict[str, tuple[Spelled, ...]]:
     """Return label -> its readings as this set writes its sides: the way that makes most pairs of mirror images first,
     then among the other labels the next. A label with a mirror image is read in no other way.
     """
     every = {label: readings(name, pairs, noise) for label, name in plain_labels(labels).items()}
-    out: dict[str, tuple[Reading, ...]] = {}
+    out: dict[str, tuple[Spelled, ...]] = {}
     ways: list[tuple[str, str, str]] = []
     while True:
         left = {label: found for label, found in every.items() if label not in out}
@@ -135,7 +144,7 @@ def readings_of(
     return {label: out[label] for label in every}
 
 
-def _mirrored(every: Mapping[str, Iterable[Reading]]) -> dict[tuple[str, str, str], set[str]]:
+def _mirrored(every: Mapping[str, Iterable[Spelled]]) -> dict[tuple[str, str, str], set[str]]:
     """Return way to say the side -> labels that have a mirror image when read so."""
     sides: dict[tuple[tuple[str, str, str], str], dict[str, set[str]]] = {}
     for label, found in every.items():
@@ -143,7 +152,7 @@ def _mirrored(every: Mapping[str, Iterable[Reading]]) -> dict[tuple[str, str, st
             if one.side:
                 sides.setdefault((one.way, " ".join(one.rest)), {}).setdefault(one.side, set()).add(label)
     out: dict[tuple[str, str, str], set[str]] = {}
-    for (way, _), found in sides.items():
-        if len(found) == 2:
-            out.setdefault(way, set()).update(*found.values())
+    for (way, _), on in sides.items():
+        if len(on) == 2:
+            out.setdefault(way, set()).update(*on.values())
     return out
