@@ -9,7 +9,7 @@ from biodance.records import SIDES, Array
 
 _HEIGHT = {
     "asis": (0.56, 0.06),
-    "psis": (0.57, 0.06),
+    "psis": (0.57, 0.07),
     "mid_psis": (0.57, 0.07),
     "knee": (0.275, 0.055),
     "ankle": (0.05, 0.035),
