@@ -6,9 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, progress, say
 from biodance.cli.options import ForceOption, JsonOption
-from biodance.cli.progress import progress
 
 
 @app.command(name="register")
@@ -88,7 +87,7 @@ def init_command(session: Path, *, subject: str | None = None, json: JsonOption 
     """
     from rich.console import Console
 
-    from biodance.lab.session.init import init_session
+    from biodance.lab.session.write import init_session
     from biodance.report.terminal import print_initialised
 
     found = init_session(session, subject_name=subject)

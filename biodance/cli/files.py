@@ -6,9 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, progress, say
 from biodance.cli.options import JsonOption, MarkersFile, Set, SubjectOption
-from biodance.cli.progress import progress
 
 
 @app.command(name="inspect")

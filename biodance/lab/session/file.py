@@ -41,8 +41,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.foot_outline import traced_outline, typed_outline
-from biodance.lab.girths import legal_girths
+from biodance.lab.shape import legal_girths, traced_outline, typed_outline
 from biodance.library import read_toml
 from biodance.records import FootSizes, Role
 from biodance.settings import USUAL, Settings
