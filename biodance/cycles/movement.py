@@ -150,7 +150,7 @@ class TrialMovement:
         Returns
         -------
         dict
-            Name -> (mean, sd, count) in the units of `cycles.steps.STRIDE_UNITS`; {} where nobody walks.
+            Name -> (mean, sd, count) in the units of `cycles.cut.STRIDE_UNITS`; {} where nobody walks.
 
         Examples
         --------

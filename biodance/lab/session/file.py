@@ -19,9 +19,9 @@ filter.cutoff = 6
 ``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
 which segment.
 
-``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.girths`),
+``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.shape`),
 ``foot_outline = {length = 26, breadth = 10, heel_breadth = 7}`` (cm) or ``"feet.csv"`` how large the feet are
-(`lab.foot_outline`), ``scan = "body.obj"`` names the closed surface of the standing person, in m (``scan_up`` its axis
+(`lab.shape`), ``scan = "body.obj"`` names the closed surface of the standing person, in m (``scan_up`` its axis
 that points up, by default z).
 
 ``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
