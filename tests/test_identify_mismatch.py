@@ -8,7 +8,7 @@ from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.human.human import human
 from biodance.body.parts import JointError
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.anthropometry import error_size
 from biodance.identification.information import Information
 from biodance.identification.mismatch import (
     Mismatch,
@@ -26,7 +26,7 @@ from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.joints import joint_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import around_zero, plate_sources
-from biodance.uncertainty.source import neighbours
+from biodance.uncertainty.response import neighbours
 from biodance.uncertainty.sources import deviations, of_markers
 
 BANDS = Bands((0.0, 1.0, 10.0), 25.0)

@@ -20,8 +20,7 @@ from biodance.motion.regressor import regressor
 from biodance.records import Array, Sip
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
-from biodance.uncertainty.response import Response
-from biodance.uncertainty.source import ErrorSource
+from biodance.uncertainty.response import ErrorSource, Response
 from biodance.uncertainty.sources import deviations, of_markers, transpose
 
 EVERY = 8

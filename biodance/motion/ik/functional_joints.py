@@ -15,9 +15,15 @@ from numpy.typing import NDArray
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
-from biodance.body.tables.error_sizes import error_size
-from biodance.motion.ik.elsewhere import elsewhere
-from biodance.motion.ik.joint_fit import CalibrationState, evaluate_joints, fit_joints, marker_slopes, spread_postures
+from biodance.body.tables.anthropometry import error_size
+from biodance.motion.ik.joint_fit import (
+    CalibrationState,
+    elsewhere,
+    evaluate_joints,
+    fit_joints,
+    marker_slopes,
+    spread_postures,
+)
 from biodance.motion.ik.joint_unknowns import (
     HINGES,
     SIZE,
