@@ -95,7 +95,7 @@ def share_errors(body: Body) -> Array:
     """Return what the table's share of its `parts` may be off, (10 M, K) parameters of the M links, each column of one
     standard deviation: the part has more, the rest of its segment less, the whole is the same.
 
-    Without them a part that moves would weigh its whole: by the little that a nodding head shows, times a table's share.
+    Without them a part that moves would weigh its whole: what a nodding head shows, over the table's share of it.
     """
     table, count, columns = body.sharing, len(body.segments), []
     if table is None:
@@ -114,7 +114,9 @@ def share_errors(body: Body) -> Array:
 
 def _part_errors(phi: Array) -> Array:
     """Return the errors (10, 4) of a part: its mass, and where along three axes its matter lies."""
-    return np.column_stack([error_size("segment_mass", "floor") * phi, error_size("part_com", "any") * shift_slope(phi)])
+    return np.column_stack(
+        [error_size("segment_mass", "floor") * phi, error_size("part_com", "any") * shift_slope(phi)]
+    )
 
 
 def _marker_squares(trial: Response, sources: tuple[ErrorSource, ...]) -> Array:

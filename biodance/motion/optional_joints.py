@@ -23,8 +23,8 @@ from biodance.records import Array, Index, Markers
 NEED = 0.020
 """m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
 _HEAD = 0.010
-"""m: the same for the head's markers. They lie on bone and slide by 1 to 2 mm, so that this is a head that nods; carried
-along with the trunk it turns this and spoils what movement tells of trunk and pelvis.
+"""m: the same for the head's markers. They lie on bone and slide by 1 to 2 mm, so that beyond this a head nods; carried
+along stiffly it turns the trunk and spoils what movement tells of trunk and pelvis.
 """
 _ONCE_WIDER = 0.015
 """m: the same for a body that was found too stiff elsewhere."""
