@@ -79,14 +79,6 @@ def test_exactly_the_joints_that_moved_are_shown(plain: Body, moved: dict[str, f
     assert np.sqrt(np.mean(motion.residual**2)) < 2 * SKIN
 
 
-@pytest.mark.parametrize(("size", "expected"), [(0.02, set()), (0.05, {"neck"})])
-def test_a_head_has_its_neck_where_wrists_have_to_be_farther_off(plain: Body, size: float, expected: set[str]) -> None:
-    truth = wider(plain, *OPTIONAL_JOINTS)
-    _, gains = with_shown_joints(plain, (seen(truth, walked(truth, {"neck": size, "wrist": size})),), LANDMARKS)
-    assert {gain.name for gain in gains if gain.taken} == expected
-    assert all(0.010 < gain.fitted < NEED for gain in gains if gain.taken)
-
-
 def test_a_marker_set_without_head_and_wrists_shows_nothing(plain: Body) -> None:
     truth = wider(plain, *OPTIONAL_JOINTS)
     whole = seen(truth, walked(truth, {"neck": 0.3, "elbow_pronation": 0.9}))

@@ -105,18 +105,19 @@ def share_errors(body: Body) -> Array:
         own = slice(10 * (count + k), 10 * (count + k + 1))
         rest = slice(10 * part.segment, 10 * (part.segment + 1))
         _, origin = body.place_on_segment(body.segment_joint[count + k])
-        for error in _part_errors(phi[own]).T:
+        for error in _part_errors(part.name, phi[own]).T:
             column = np.zeros(len(phi))
             column[own], column[rest] = error, -shift_matter(origin) @ error
             columns.append(column)
     return np.array(columns).T
 
 
-def _part_errors(phi: Array) -> Array:
-    """Return the errors (10, 4) of a part: its mass, and where along three axes its matter lies."""
-    return np.column_stack(
-        [error_size("segment_mass", "floor") * phi, error_size("part_com", "any") * shift_slope(phi)]
-    )
+def _part_errors(name: str, phi: Array) -> Array:
+    """Return the errors (10, 4) of a part of parameters ``phi`` (10,): its mass, and where along three axes its matter
+    lies.
+    """
+    off = error_size("part_com", "head" if name == "head" else "other")
+    return np.column_stack([error_size("segment_mass", "floor") * phi, off * shift_slope(phi)])
 
 
 def _marker_squares(trial: Response, sources: tuple[ErrorSource, ...]) -> Array:

@@ -22,10 +22,6 @@ from biodance.records import Array, Index, Markers
 
 NEED = 0.020
 """m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
-_HEAD = 0.010
-"""m: the same for the head's markers. They lie on bone and slide by 1 to 2 mm, so that beyond this a head nods; carried
-along stiffly it turns the trunk and spoils what movement tells of trunk and pelvis.
-"""
 _ONCE_WIDER = 0.015
 """m: the same for a body that was found too stiff elsewhere."""
 NEARER = 0.9
@@ -100,7 +96,7 @@ def with_shown_joints(
             pair
             for name, more in wider
             if more is not body
-            for pair in _tried(name, more, some, before, _need(name, gains))
+            for pair in _tried(name, more, some, before, _ONCE_WIDER if gains else NEED)
         ]
         more, best = min(tried, key=lambda pair: pair[1].with_it / pair[1].without, default=(body, None))
         if best is None or best.with_it >= NEARER * best.without:
@@ -108,13 +104,6 @@ def with_shown_joints(
         body, gains = more, [*gains, replace(best, taken=True)]
         left.remove(best.name)
     return body, ()
-
-
-def _need(name: str, taken: list[JointGain]) -> float:
-    """Return the distance, m, of its markers from which on a joint is tried, of a body that has ``taken`` others."""
-    if name == "neck":
-        return _HEAD
-    return _ONCE_WIDER if any(one.name != "neck" or one.fitted > NEED for one in taken) else NEED
 
 
 def _tried(name: str, more: Body, some: _Sample, before: _Followed | None, need: float) -> list[tuple[Body, JointGain]]:
