@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
@@ -102,22 +103,16 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
     return first + [bend for bend in second if np.linalg.norm(bend) > _NOTHING * np.linalg.norm(middle)]
 
 
-def local_basis(problem: Problem, effect: Effect) -> Array | None:
-    """Return (r, k): the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
+def local_basis(problem: Problem, effect: Effect) -> ByTrial | None:
+    """Return the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
     blocks = []
     for index, case in enumerate(problem.cases):
         samples = effect.local(case)
         if samples is None:
             return None
-        blocks.append(problem.spectrum.of_trial(index, samples))
-    width = np.cumsum([0, *(block.shape[2] for block in blocks)])
-    out = np.zeros((len(problem.target), int(width[-1])))
-    row = 0
-    for block, start in zip(blocks, width, strict=False):
-        rows = 6 * len(block)
-        out[row : row + rows, start : start + block.shape[2]] = block.reshape(rows, block.shape[2])
-        row += rows
-    return out
+        block = problem.spectrum.of_trial(index, samples)
+        blocks.append(block.reshape(6 * len(block), -1))
+    return ByTrial.of(blocks)
 
 
 def changes(problem: Problem, effect: Effect, theta: Array) -> Array:
