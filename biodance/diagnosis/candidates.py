@@ -20,6 +20,8 @@ SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
 _EMPTY = 50.0
 """N that a plate carries at most that is always empty."""
+_AT_ONCE = 32
+"""Causes whose columns are computed at once: little memory, however many there are."""
 _NOTHING = 1e-7
 """Share of the largest column below which a column is zero."""
 
@@ -60,9 +62,11 @@ def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candida
     empty = empty_plates(problem.cases)
     every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
     every = [one for one in every if not (one.by_load and one.target.partition(":")[0] in empty)]
-    if not every:
-        return ()
-    found = [candidate(problem, effect, columns) for effect, columns in zip(every, problem.columns(every), strict=True)]
+    found = [
+        candidate(problem, effect, columns)
+        for some in (every[start : start + _AT_ONCE] for start in range(0, len(every), _AT_ONCE))
+        for effect, columns in zip(some, problem.columns(some), strict=True)
+    ]
     return tuple(one for one in found if one.basis.shape[1])
 
 

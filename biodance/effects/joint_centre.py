@@ -10,6 +10,8 @@ star-arc) while the rest stands still.
 
 from dataclasses import replace
 
+import numpy as np
+
 from biodance.body.changes import recentre_joint
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
@@ -46,7 +48,7 @@ class JointCentre(Effect):
 
     def columns(self, case: Case) -> Array:
         """Return the change of the wrench with the posture that the markers give the true body, per metre."""
-        return case.geometry.joint_changes.wrench[..., self._own(case)]
+        return np.asarray(case.geometry.joint_changes.wrench[..., self._own(case)], dtype=float)
 
     def marker_columns(self, case: Case) -> Array:
         """Return what the model with the wrong centre leaves of the markers, per metre."""
