@@ -13,7 +13,7 @@ from biodance.records import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class TrialColumns:
     """What one trial sees: its ``rows`` of the session, the ``columns`` that are not zero there, and their ``values``
     (rows, columns).
     """
@@ -27,7 +27,7 @@ class Part:
 class ByTrial:
     """``width`` columns of a session in the ``parts`` of its trials; what no trial has is zero."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[TrialColumns, ...]
     width: int
 
     @classmethod
@@ -36,7 +36,7 @@ class ByTrial:
         parts, row, column = [], 0, 0
         for block in blocks:
             rows, width = block.shape
-            parts.append(Part(slice(row, row + rows), np.arange(column, column + width), block))
+            parts.append(TrialColumns(slice(row, row + rows), np.arange(column, column + width), block))
             row, column = row + rows, column + width
         return cls(tuple(parts), column)
 
@@ -53,7 +53,7 @@ class ByTrial:
         """Return these columns and behind them ``columns`` (r, n), which all trials share."""
         own = np.arange(self.width, self.width + columns.shape[1])
         parts = (
-            Part(p.rows, np.append(p.columns, own), np.concatenate([p.values, columns[p.rows]], axis=1))
+            TrialColumns(p.rows, np.append(p.columns, own), np.concatenate([p.values, columns[p.rows]], axis=1))
             for p in self.parts
         )
         return ByTrial(tuple(parts), self.width + columns.shape[1])
