@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.by_trial import ByTrial
@@ -124,7 +125,7 @@ class Nuisances:
     tilts are mirrored between sides and persons).
     """
 
-    parts: tuple[Array, ...]
+    parts: tuple[NDArray[np.floating], ...]
     scale: Array
     keys: tuple[str, ...]
     means: tuple[str, ...]
@@ -134,7 +135,8 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
     """Return the kinematic errors of a problem and the ``causes`` that are tolerances."""
     body = problem.cases[0].body
     joints = {joint_of(body, chain) for chain in chains(body)}
-    parts, keys, scale = [problem.kinematics], list(problem.groups), [1.0] * problem.kinematics.shape[1]
+    parts: list[NDArray[np.floating]] = [problem.kinematics]
+    keys, scale = list(problem.groups), [1.0] * problem.kinematics.shape[1]
     means = [group if group.startswith("sag ") else "" for group in problem.groups]
     for one in causes:
         parts.append(one.basis)

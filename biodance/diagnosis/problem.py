@@ -48,9 +48,9 @@ class Problem:
 
     ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured
     minus what the prior's mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip``
-    (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K), many and in single precision; ``markers`` number m of marker
-    rows, near the end; the last s rows: sizes that the markers alone show of the causes ``shown`` (s; effect, target);
-    ``notes`` what was left out.
+    (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K), many and in single precision;
+    ``markers`` number m of marker rows, near the end; the last s rows: sizes that the markers alone show of the causes
+    ``shown`` (s; effect, target); ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]
