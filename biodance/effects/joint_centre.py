@@ -16,6 +16,7 @@ from biodance.body.changes import recentre_joint
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.geometry import joint_chains
+from biodance.motion.ik.joint_unknowns import MISSED
 from biodance.motion.track import track
 from biodance.records import Array
 
@@ -27,7 +28,7 @@ class JointCentre(Effect):
 
     name = "joint_centre"
     parameters = tuple(
-        Parameter(f"shift_{axis}", "m", 0.015, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
+        Parameter(f"shift_{axis}", "m", MISSED, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
         for axis in "xyz"
     )
     placed = True
