@@ -78,8 +78,8 @@ def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Findi
     than static trials place joints. A bone of another length, its other joint and the one of the ``markers`` that
     places it look the same.
     """
-    far, own = (error.reach, error.reach_sd) if error.reach else (error.moved, error.centre)
-    sd = float(np.hypot(centre_sd(error.joint), own))
+    far, shown = (error.reach, error.reach_sd) if error.reach else (error.moved, error.centre)
+    sd = float(np.hypot(centre_sd(error.joint), shown))
     found = _named(replace(effect, target=error.joint), [("shift", far)], sd)
     side, _, joint = error.joint.partition("_")
     alike = [Alias(kind, f"{side}_{name}", float("inf")) for kind, name in _ALIKE.get(joint, ())]

@@ -134,7 +134,7 @@ def _told(
     """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
     far that would lie with them.
     """
-    covariance = np.linalg.inv(found.information)
+    covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
     deviation = np.sqrt(np.diag(covariance))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
@@ -144,8 +144,14 @@ def _told(
     for joint in (joint for joint in JOINTS if joint in moved or joint in spared):
         marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
         placed_errors.append(
-            JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far, marker)._replace(
-                **_reach(joint, found.theta, covariance) if joint in wrong else {}
+            JointError(
+                joint,
+                _centre_sd(joint, deviation),
+                axis.get(joint, 0.0),
+                joint in wrong,
+                far,
+                marker,
+                *(_reach(joint, found.theta, covariance) if joint in wrong else (0.0, 0.0)),
             )
         )
     errors = tuple(placed_errors)
@@ -184,7 +190,7 @@ def _moved_since(joint: str, marker: str, far: float) -> str:
     )
 
 
-def _reach(joint: str, theta: Array, covariance: Array) -> dict[str, float]:
+def _reach(joint: str, theta: Array, covariance: Array) -> tuple[float, float]:
     """Return how far (m) a joint that the movement contradicts lies from the static trial's place, and the standard
     deviation of that: what the movement says of it (the posterior of the unknowns ``theta`` (37,) with ``covariance``
     (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off. The placing is
@@ -197,7 +203,7 @@ def _reach(joint: str, theta: Array, covariance: Array) -> dict[str, float]:
     wide = axes @ np.diag(spread) @ axes.T
     shift = wide @ told @ theta[own]
     far = float(np.linalg.norm(shift))
-    return {"reach": far, "reach_sd": float(np.hypot(np.sqrt(shift @ wide @ shift) / far, fixed_point(joint)))}
+    return far, float(np.hypot(np.sqrt(shift @ wide @ shift) / far, fixed_point(joint)))
 
 
 def _centre_sd(joint: str, deviation: Array) -> float:
