@@ -87,7 +87,7 @@ def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed,
     assert "Mend what is suspect" in state.advice
 
 
-@pytest.mark.parametrize("seconds, told", [(0.25, []), (0.35, ["plate_offset"])])
+@pytest.mark.parametrize(("seconds", "told"), [(0.25, []), (0.35, ["plate_offset"])])
 def test_a_load_on_a_plate_is_told_as_soon_as_nobody_is_on_it(streamed, seconds, told):
     body, trial = streamed
     (plate,), time = trial.plates, np.arange(100) / 100

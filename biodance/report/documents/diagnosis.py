@@ -72,8 +72,8 @@ def _limit(row: Unobservable) -> dict[str, Any]:
 
 
 _SEATED = (
-    "This dance is for somebody who sits: squats, hops, lunges and standing are not asked of that person. What concerns "
-    "the plate and the cameras alone somebody else can do in their place."
+    "This dance is for somebody who sits: squats, hops, lunges and standing are not asked of that person. What "
+    "concerns the plate and the cameras alone somebody else can do in their place."
 )
 
 
