@@ -20,8 +20,8 @@ from biodance.lab.markers.names import meanings, meanings_of
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.read import read_trial
-from biodance.lab.session.init import init_session
 from biodance.lab.session.read import read_session
+from biodance.lab.session.write import init_session
 from biodance.motion.kinematics import poses
 from biodance.motion.track import upright_trunk
 from biodance.records import Markers, Source, Subject, Trial
