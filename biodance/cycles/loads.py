@@ -44,12 +44,13 @@ def load_curves(
     rates, mass = here.v[:, body.n_root :], float(sip.mass.sum())
 
     rows, needed, names, units = _rows(body, regressor, given, rates)
+    whose = [seen_from(cycle, name.removesuffix("_moment").removesuffix("_power")) for name in names]
+    rows = rows[:, [seen is not None for seen in whose]]
+    needed = needed[:, [seen is not None for seen in whose]]
     variance = np.sum((rows @ sip.covariance) * rows, axis=-1)
     value, sd = (rows @ sip.phi - needed) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
-    for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-        if (seen := seen_from(cycle, name.removesuffix("_moment").removesuffix("_power"))) is None:
-            continue
-        side, _, sign = seen
+    told_of = [(name, unit, seen) for name, unit, seen in zip(names, units, whose, strict=True) if seen is not None]
+    for k, (name, unit, (side, _, sign)) in enumerate(told_of):
         sign = 1.0 if unit == "W/kg" else sign
         shown = np.where(_is_known(name, known, here), 1.0, np.nan)
         quantity = side_and_name(name)[1]

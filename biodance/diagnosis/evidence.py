@@ -50,6 +50,12 @@ class Belief:
         cross = self.X.T @ Z
         return Z.T @ self.y - cross.T @ self.mean, Z.T @ Z - cross.T @ _solved(self.factor, cross)
 
+    def free(self, Z: Array) -> Array:
+        """Return what of whitened columns ``Z`` (r, k) no error can explain: any target's score under these columns is
+        its product with them.
+        """
+        return np.asarray(Z - self.X @ _solved(self.factor, self.X.T @ Z))
+
 
 def _solved(factor: tuple[Array, bool], b: Array) -> Array:
     """Return A^-1 b (K, ...) from the Cholesky factor of A; LAPACK at once, for it is asked a thousand times."""

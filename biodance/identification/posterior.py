@@ -7,6 +7,7 @@ of the data decide.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -51,13 +52,16 @@ class Posterior:
         return np.where(before > 0, 1 - after / np.where(before > 0, before, 1.0), 0.0).clip(0.0, 1.0)
 
 
+@lru_cache(maxsize=4)
 def prior_factor(prior: Sip) -> Array:
-    """Return S (p, k) with S S' = the prior covariance; directions without variance are dropped."""
+    """Return S (p, k), read-only, with S S' = the prior covariance; directions without variance are dropped."""
     scale = np.sqrt(np.diag(prior.covariance))
     safe = np.where(scale > 0, scale, 1.0)
     value, vector = np.linalg.eigh(prior.covariance / np.outer(safe, safe))
     keep = value > 1e-12 * value.max(initial=0.0)
-    return scale[:, None] * vector[:, keep] * np.sqrt(value[keep])
+    factor = scale[:, None] * vector[:, keep] * np.sqrt(value[keep])
+    factor.setflags(write=False)
+    return np.asarray(factor)
 
 
 def posterior(data: Information, prior: Sip) -> Posterior:

@@ -58,7 +58,7 @@ def assign(record: object, **values: object) -> None:
 def check_time(time: ArrayLike, what: str) -> Array:
     """Return times (T,) s as a read-only array; BiodanceError where they do not increase."""
     time = frozen_array(time, (None,), f"{what}.time")
-    if time.size > 1 and not np.all(np.diff(time) > 0):
+    if not (time[1:] > time[:-1]).all():
         frame = int(np.argmin(np.diff(time) > 0))
         raise BiodanceError(
             f"{what}.time does not increase at sample {frame + 1} ({time[frame]:g} s, {time[frame + 1]:g} s)."
