@@ -4,6 +4,7 @@ memory.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,10 @@ class Fit:
             raise TrialRefused(f"Trial {self.name}: the wrench is NaN in a frame that is to be used; mask the frame.")
 
 
+_PAIRS = np.triu_indices(6)
+"""Pairs of channels, each once."""
+
+
 @dataclass(frozen=True, eq=False)
 class Statistics:
     """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,)
@@ -82,7 +87,8 @@ class Statistics:
     def information(self, noise: Noise) -> Information:
         """Return the R factor of the data whitened by ``noise`` (same bands)."""
         weight = np.linalg.inv(noise.covariance)
-        H = np.einsum("bcd,bcidj->ij", weight, self.gram)
+        half = np.tensordot(weight[:, *_PAIRS] * np.where(_PAIRS[0] == _PAIRS[1], 0.5, 1.0), self._pairs, axes=2)
+        H = half + half.T
         scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
         value, vector = np.linalg.eigh(H / np.outer(scale, scale))
         rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
@@ -95,7 +101,14 @@ class Statistics:
         z = np.append(-phi, 1.0)
         second = np.outer(z, z)
         second[:-1, :-1] += covariance
-        return Moments(np.einsum("bcidj,ij->bcd", self.gram, second), self.count.astype(float))
+        squares = np.empty((len(self.gram), 6, 6))
+        squares[:, *_PAIRS] = squares[:, *_PAIRS[::-1]] = np.tensordot(self._pairs, second, axes=2)
+        return Moments(squares, self.count.astype(float))
+
+    @cached_property
+    def _pairs(self) -> Array:
+        """(B, 21, p + 1, p + 1) of ``gram``, each pair of channels once: learning asks for all of it in every round."""
+        return np.ascontiguousarray(self.gram.transpose(0, 1, 3, 2, 4)[:, *_PAIRS])
 
 
 def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
