@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation, median_filter, uniform_filter1d
 from scipy.signal import butter, cont2discrete, find_peaks, lfilter, lfilter_zi, sosfiltfilt, ss2tf
 
 from biodance.cycles.tops import find_tops
 from biodance.effects._base.oscillator import relative_motion
 from biodance.lab.recursive import butterworth_sections, first_order_section, run_both_ways, run_forwards
+from biodance.records.moving import any_near, moving_mean, moving_median
 
 WALK = np.random.default_rng(0).normal(size=(400, 3)).cumsum(axis=0)
 
@@ -50,3 +52,14 @@ def test_tops_are_scipys_peaks(seed: int) -> None:
         np.testing.assert_array_equal(found, expected)
     flat = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 2.0, 0.0])
     np.testing.assert_array_equal(find_tops(flat, prominence=0.5, apart=1), find_peaks(flat, prominence=0.5)[0])
+
+
+@pytest.mark.parametrize("width", [1, 4, 11])
+def test_what_lies_around_a_sample_is_as_scipy_has_it(width: int) -> None:
+    curve = WALK[:60, 0]
+    for ends, mode in (("symmetric", "reflect"), ("edge", "nearest")):
+        found = moving_mean(curve, width, ends=ends)
+        np.testing.assert_allclose(found, uniform_filter1d(curve, width, mode=mode), atol=1e-12)
+    np.testing.assert_array_equal(moving_median(curve, width), median_filter(curve, width, mode="mirror"))
+    rare = curve > np.sort(curve)[-4]
+    np.testing.assert_array_equal(any_near(rare, width), binary_dilation(rare, iterations=width))

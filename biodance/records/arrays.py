@@ -96,5 +96,5 @@ def in_time(time: Array, values: Array, columns: Iterable[str]) -> "pd.DataFrame
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
