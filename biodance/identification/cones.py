@@ -16,9 +16,7 @@ _WORDS = {"Solved": SOLVED, "AlmostSolved": "optimal_inaccurate", "PrimalInfeasi
 """The solver's words, as cvxpy says them."""
 
 
-def shortest_inside(
-    matrices: Sequence[tuple[Array, Array]], slope: Array, level: Array
-) -> tuple[Array | None, str]:
+def shortest_inside(matrices: Sequence[tuple[Array, Array]], slope: Array, level: Array) -> tuple[Array | None, str]:
     """Return argmin |z|² (k,) and "optimal", or None and what the solver ran into.
 
     Every M z + m of ``matrices`` (M (n, n, k) and m (n, n), symmetric) is positive semidefinite, ``slope`` (q, k) z +

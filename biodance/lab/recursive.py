@@ -32,7 +32,7 @@ def first_order_section(tangent: float) -> Array:
 
 
 def run_forwards(sections: Array, values: Array) -> Array:
-    """Return ``values`` (T, n) behind the ``sections`` (S, 6), which before the first sample have long had its value."""
+    """Return ``values`` (T, n) behind the ``sections`` (S, 6), which have long had the first one before."""
     out = np.array(values, dtype=float, order="C")
     _run(sections, _settled(sections), out, False)
     return out

@@ -19,15 +19,14 @@ from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
-from biodance.identification.torques import TorqueBands, torque_bands
+from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.comparison import Agreement, compare
-from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
+from biodance.pipeline.torques import torques_in
 from biodance.pipeline.trial_result import Check, TrialResult, trial_fit
-from biodance.records import ROLES, SIDES, Role, Sip
+from biodance.records import ROLES, Role, Sip
 from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.plates import around_zero
 
@@ -108,7 +107,7 @@ class SessionIdentification(Sendable):
     @cached_property
     def torques(self) -> TorqueBands | None:
         """Joint torques with bands in the trial ``shown``, computed when asked for; None without one."""
-        return _torques(self.identification, self.shown) if self.shown else None
+        return torques_in(self.identification, self.shown) if self.shown else None
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
@@ -278,17 +277,6 @@ def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
     """Return the first trial kept, else the first fitted, whose plates tell what each foot carries."""
     told = [one for one in results if one.motion is not None and one.comparison is not None and one.trial.plates]
     return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
-
-
-@one_thread()
-def _torques(found: Identification, one: TrialResult) -> TorqueBands:
-    """Return the joint torques of a trial that `_shown` chose."""
-    assert one.motion is not None
-    assert one.comparison is not None
-    soles = soles_from_body(found.body, one.motion)
-    feet = foot_wrenches(one.trial, ground_contact(one.trial, soles, mass=found.sip.mass.sum()), soles)
-    ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
-    return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
 
 
 def _at_origin(identified: Body, fit: Fit) -> Agreement:

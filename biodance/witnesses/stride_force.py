@@ -128,7 +128,7 @@ def _means(seen: SeenTrial, time: Array, force: Array) -> Array:
 
 
 def _fading(seen: SeenTrial, time: Array) -> tuple[Array, Array]:
-    """Return the share (n,) of each of the times (n,) s in a mean, and the mean acceleration (3,) m/s² of the pelvis."""
+    """Return the share (n,) of each of the times (n,) s in a mean, and the pelvis' mean acceleration (3,) m/s²."""
     lasts = time[-1] - time[0]
     edge = np.minimum((time - time[0]) / lasts, (time[-1] - time) / lasts) / _FADES
     weight = np.where(edge < 1, 0.5 * (1 - np.cos(np.pi * edge)), 1.0)

@@ -41,7 +41,9 @@ def _sections(w: float, damping: float, dt: float) -> tuple[Array, Array]:
     pole = np.array([1.0, -np.trace(A), np.linalg.det(A)])
     seen = (A - np.outer(B, row) for row in np.eye(2))
     rest = (np.array([1.0, -np.trace(one), np.linalg.det(one)]) for one in seen)
-    x, speed = (np.concatenate([top + (through - 1) * pole, pole])[None] for top, through in zip(rest, ramp, strict=True))
+    x, speed = (
+        np.concatenate([top + (through - 1) * pole, pole])[None] for top, through in zip(rest, ramp, strict=True)
+    )
     return x, speed
 
 
