@@ -77,7 +77,8 @@ class Slide(_WithAngles):
     @cached_property
     def _alone(self) -> tuple[bool, ...]:
         """Whether every marker of a segment slides by itself: its patterns then are the axes of the segment."""
-        return tuple(np.array_equal(one.reshape(-1, one.shape[2]), np.eye(one.shape[2])) for one in self.patterns)
+        flat = (one.reshape(3 * len(one), -1 if one.size else 0) for one in self.patterns)
+        return tuple(np.array_equal(one, np.eye(one.shape[1])) for one in flat)
 
     def _left(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         """Yield for every segment what its patterns leave of the markers (F, 3M, P) m per radian, and the angles."""
