@@ -57,7 +57,8 @@ def _level(axis: int) -> float:
 
 def mean_force(force: Array) -> Array:
     """Return the mean (3,) N of forces (S, 3) N, NaN samples left out."""
-    return np.asarray(np.nanmean(force, axis=0))
+    mean = force.mean(axis=0)
+    return np.asarray(mean if np.isfinite(mean).all() else np.nanmean(force, axis=0))
 
 
 WITNESS = StandingForce

@@ -64,7 +64,7 @@ def metres_per_unit(
     return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
 
 
-_FRAMES = 1024
+_FRAMES = 256
 """Frames whose size is looked at, spread over the recording."""
 
 
