@@ -151,7 +151,9 @@ class Trial:
         others = [p.wrench for p in self.plates[1:]]
         if any(one.time is not time and not np.array_equal(one.time, time) for one in others):
             raise TrialRefused(f"Trial {self.name}: the plates have different time bases; prepare the trial first.")
-        return Wrench(time, sum((one.value for one in others), self.plates[0].wrench.value))
+        value = sum((one.value for one in others), self.plates[0].wrench.value)
+        value.setflags(write=False)  # the record keeps it without a copy
+        return Wrench(time, value)
 
 
 @dataclass(frozen=True, eq=False)

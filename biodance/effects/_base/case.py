@@ -150,7 +150,9 @@ class Case:
 
     def with_added(self, plate: Plate, change: Array) -> "Case":
         """Return the case with ``change`` (T, 6) about the lab origin added to what ``plate`` measured."""
-        changed = replace(plate, wrench=Wrench(plate.wrench.time, plate.wrench.value + change))
+        value = plate.wrench.value + change
+        value.setflags(write=False)  # the record keeps it without a copy
+        changed = replace(plate, wrench=Wrench(plate.wrench.time, value))
         plates = tuple(changed if p.name == plate.name else p for p in self.trial.plates)
         changed_trial = replace(self.trial, plates=plates)
         return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")
