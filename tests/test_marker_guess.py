@@ -19,8 +19,8 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.names import meanings
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.read import read_trial
-from biodance.lab.session.init import init_session
 from biodance.lab.session.read import read_session
+from biodance.lab.session.write import init_session
 from biodance.motion.kinematics import poses
 from biodance.motion.track import upright_trunk
 from biodance.records import Markers, Source, Subject, Trial

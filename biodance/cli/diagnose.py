@@ -6,10 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress
 from biodance.cli.identify import diagnose_robot
 from biodance.cli.options import NO_ROBOT, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
-from biodance.cli.progress import progress
 from biodance.cli.session import examine_with_reference, tabled
 
 
@@ -40,9 +39,10 @@ def foresee_command(
         tell("foreseeing what the dance will see")
         if out is not None:
             refuse_page(out, force=force)
-        document = foresight_document(foresee_dance(dance))
+        found, protocol, seated = foresee_dance(dance)
+        document = foresight_document(found, seated=seated)
         if out is not None:
-            page = foresight_page(document, f"the dance {dance.resolve().parent.name}")
+            page = foresight_page(document, f"the dance “{protocol}”" if protocol else "the dance")
             out.write_text(page, encoding="utf-8", newline="\n")
     if json:
         print_json(document)
@@ -83,9 +83,8 @@ def diagnose_command(
 
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
-    from biodance.pipeline.carry import read_lab
+    from biodance.pipeline.carry import read_lab, write_mended
     from biodance.pipeline.front_movement import describe_movement
-    from biodance.pipeline.mended import write_mended
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
