@@ -131,18 +131,18 @@ def test_data_a_hundred_thousand_deviations_away_are_solved(seed: int) -> None:
 def test_an_inaccurate_answer_is_asked_for_again_and_never_taken(monkeypatch) -> None:
     body, R, _ = rows_of(0)
     belief = posterior(Information(R, 40), replace(body.sip, covariance=1e4 * body.sip.covariance))
-    right, solve, asked = physical_fit(belief, body), physical.solve_convex, []
+    right, solve, asked = physical_fit(belief, body), physical.shortest_inside, []
     assert right.moved.any()
 
-    def inaccurate(problem) -> str:
-        asked.append(solve(problem))
-        return "optimal_inaccurate" if len(asked) == 1 else asked[-1]
+    def inaccurate(*problem) -> tuple:
+        asked.append(solve(*problem))
+        return (None, "optimal_inaccurate") if len(asked) == 1 else asked[-1]
 
-    monkeypatch.setattr(physical, "solve_convex", inaccurate)
+    monkeypatch.setattr(physical, "shortest_inside", inaccurate)
     again = physical_fit(belief, body)
     assert len(asked) > 1
     assert_same(right, again)
-    monkeypatch.setattr(physical, "solve_convex", lambda _: "optimal_inaccurate")
+    monkeypatch.setattr(physical, "shortest_inside", lambda *_: (None, "optimal_inaccurate"))
     failed = physical_fit(belief, body)
     assert isinstance(failed, FailedFit)
     assert failed.status == "failed"

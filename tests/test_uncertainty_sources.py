@@ -202,16 +202,24 @@ def test_squares_are_those_of_the_residuals() -> None:
 
 
 def test_derivatives_of_a_wave() -> None:
-    time = np.arange(200) / 25.0
-    second, first = derivatives(200)
-    wave = np.sin(2 * np.pi * 4.0 * time)
-    inside = slice(10, -10)
-    np.testing.assert_allclose(
-        25 * (first @ wave)[inside], 8 * np.pi * np.cos(8 * np.pi * time)[inside], atol=0.01 * 8 * np.pi
-    )
-    np.testing.assert_allclose(
-        25**2 * (second @ wave)[inside], -((8 * np.pi) ** 2) * wave[inside], atol=0.02 * (8 * np.pi) ** 2
-    )
+    time = np.arange(300) / 25.0
+    second, first = derivatives(300)
+    wave = np.sin(2 * np.pi * 4.0 * time)[:, None]
+    slope, bend = np.zeros((2, 300, 1))
+    first.add(25.0, wave, slope)
+    second.add(25.0**2, wave, bend)
+    inside, w = slice(10, -10), 8 * np.pi
+    np.testing.assert_allclose(slope[inside, 0], w * np.cos(w * time)[inside], atol=0.01 * w)
+    np.testing.assert_allclose(bend[inside], -(w**2) * wave[inside], atol=0.02 * w**2)
+
+
+def test_a_derivative_is_the_transpose_of_its_transpose() -> None:
+    here, there = np.random.default_rng(0).normal(size=(2, 300, 2))
+    for one in derivatives(300):
+        forth, back = np.zeros((2, 300, 2))
+        one.add(3.0, here, forth)
+        one.add_transposed(3.0, there, back)
+        assert np.sum(forth * there) == pytest.approx(np.sum(here * back), rel=1e-12)
 
 
 def test_the_brute_wrench_is_the_predicted_one() -> None:

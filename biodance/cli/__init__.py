@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 
-_NEW_OBJECTS = 50_000
+_NEW_OBJECTS = 250_000
 """How many objects may be new before circles among them are looked for: modules alone are more than Python's 700."""
 
 

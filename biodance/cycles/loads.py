@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.cycles.curves import CycleCurve, over_cycle, seen_from, side_and_name
 from biodance.cycles.cut import Cycle
-from biodance.identification.torques import ground_torques, torque_regressor
+from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import chains
 from biodance.records import SIDES, Array, Motion, Sip, Wrench
 
@@ -40,16 +40,18 @@ def load_curves(
         for foot, side in enumerate(SIDES)
     }
     known = {side: here.determined & told[chosen, foot] for foot, side in enumerate(SIDES)}
-    regressor, given = torque_regressor(body, here), ground_torques(body, here, ground)
+    regressor, given = torque_regressor_of_links(body, here), ground_torques(body, here, ground)
     rates, mass = here.v[:, body.n_root :], float(sip.mass.sum())
 
     rows, needed, names, units = _rows(body, regressor, given, rates)
-    variance = np.sum((rows @ sip.covariance) * rows, axis=-1)
-    value, sd = (rows @ sip.phi - needed) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
-    for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-        if (seen := seen_from(cycle, name.removesuffix("_moment").removesuffix("_power"))) is None:
-            continue
-        side, _, sign = seen
+    whose = [seen_from(cycle, name.removesuffix("_moment").removesuffix("_power")) for name in names]
+    rows = rows[:, [seen is not None for seen in whose]]
+    needed = needed[:, [seen is not None for seen in whose]]
+    share = np.eye(sip.phi.size) if body.sharing is None else body.sharing
+    variance = np.sum((rows @ (share @ sip.covariance @ share.T)) * rows, axis=-1)
+    value, sd = (rows @ (share @ sip.phi) - needed) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
+    told_of = [(name, unit, seen) for name, unit, seen in zip(names, units, whose, strict=True) if seen is not None]
+    for k, (name, unit, (side, _, sign)) in enumerate(told_of):
         sign = 1.0 if unit == "W/kg" else sign
         shown = np.where(_is_known(name, known, here), 1.0, np.nan)
         quantity = side_and_name(name)[1]

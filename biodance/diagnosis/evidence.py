@@ -55,6 +55,12 @@ class Belief:
         """Return H (K, k) with H' H = C' A^-1 C of ``cross`` C = X' Z (K, k)."""
         return np.asarray(dtrtrs(self.factor[0], cross, lower=self.factor[1])[0]) if cross.size else cross
 
+    def free(self, Z: Array) -> Array:
+        """Return what of whitened columns ``Z`` (r, k) no error can explain: any target's score under these columns is
+        its product with them.
+        """
+        return np.asarray(Z - self.X @ _solved(self.factor, self.X.T @ Z))
+
 
 def _solved(factor: tuple[Array, bool], b: Array) -> Array:
     """Return A^-1 b (K, ...) from the Cholesky factor of A; LAPACK at once, for it is asked a thousand times."""

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -48,7 +49,7 @@ class Testimony:
     seconds: Mapping[str, float] = field(default_factory=dict)
     recorded: tuple[SeenTrial, ...] = ()
 
-    @property
+    @cached_property
     def counting(self) -> "Testimony":
         """Only what counts as evidence."""
         kept = np.array([one.counts for one in self.observations], dtype=bool)
@@ -61,7 +62,7 @@ class Testimony:
             self.recorded,
         )
 
-    @property
+    @cached_property
     def shared(self) -> Array:
         """(n, k) what one standard deviation of each shared part of the expectations adds."""
         names = list(dict.fromkeys(name for one in self.observations for name in one.norms))

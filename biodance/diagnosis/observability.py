@@ -10,13 +10,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, Candidate, changes
 from biodance.diagnosis.consequence import least, unit_at
 from biodance.diagnosis.diagnosis import Unobservable
-from biodance.diagnosis.evidence import Belief, smallest
+from biodance.diagnosis.evidence import smallest
 from biodance.diagnosis.model import Model
 from biodance.diagnosis.naming import TOGETHER
 from biodance.motion.ik.functional_joints import fixed_point
@@ -58,14 +59,26 @@ class Visibility:
         (first parameter, its own unit) is expected to be fixed + growth a².
         """
         way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
-        pull = self.G[:, cut] @ way
-        growth = np.array([0.5 * pull[c] @ inner @ pull[c] for c, inner in zip(self.cuts, self._inner, strict=True)])
+        pull = (self.G[:, cut] @ way)[self._places]
+        growth = 0.5 * np.einsum("ci,cij,cj->c", pull, self._padded, pull, optimize=True)
         return self._fixed[index] - self._fixed, growth[index] - growth
 
     @cached_property
     def _inner(self) -> tuple[Array, ...]:
         """Posterior covariance of every cause's coefficients."""
         return tuple(np.asarray(np.linalg.inv(np.eye(c.stop - c.start) + self.G[c, c]), dtype=float) for c in self.cuts)
+
+    @cached_property
+    def _places(self) -> NDArray[np.intp]:
+        """(C, w) where each cause's coefficients lie in G; what is wider than its basis points anywhere."""
+        starts = np.array([c.start for c in self.cuts])[:, None]
+        return np.minimum(starts + np.arange(max(c.stop - c.start for c in self.cuts)), len(self.G) - 1)
+
+    @cached_property
+    def _padded(self) -> Array:
+        """(C, w, w) `_inner`, zero where a basis is narrower than the widest."""
+        wide = self._places.shape[1]
+        return np.stack([np.pad(one, (0, wide - len(one))) for one in self._inner])
 
     @cached_property
     def _fixed(self) -> Array:
@@ -96,12 +109,13 @@ def _really_seen(found: Model, one: Candidate, size: float, threshold: float) ->
     the ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
     """
     Z, first = found.white(one.basis), np.eye(len(one.silent))[0]
-    _, G = found.belief.score(Z)
+    free = found.belief.free(Z)
+    G = Z.T @ free
     inner = np.linalg.inv(np.eye(len(G)) + G)
     chance = 0.5 * float(np.trace(inner @ G) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
     for grown in size * np.geomspace(1.0, _SEARCHED, _STEPS) if np.isfinite(size) else ():
         rows = changes(found.problem, one.effect, grown * first)
-        s = Z.T @ Belief.known(found.belief.X, found.belief.factor, found.white(rows[:, None])[:, 0]).left
+        s = found.white(rows[:, None])[:, 0] @ free
         if 0.5 * float(s @ inner @ s) + chance >= threshold:
             return float(grown)
     return float("inf")

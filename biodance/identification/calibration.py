@@ -2,7 +2,7 @@
 kinematics takes from the parameters given back.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from biodance.body.body import Body
 from biodance.identification.dilution import carried_away, undiluted
@@ -37,7 +37,7 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
     """Return the data of ``total`` whitened by ``noise``, less what twins and plates disturb (``found``), sizes chosen
     by evidence under the table ``room`` that may carry a load.
     """
-    data = total.information(noise)
+    data = replace(total).information(noise)  # a copy of its own, see `learn_noise`
     if found is None:
         return Calibrated(data, Sizes(0.0, 1.0), noise)
     sizes = evident_sizes(data, found, room)

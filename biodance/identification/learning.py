@@ -24,6 +24,7 @@ def learn_noise(
     """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
     beyond ``tolerance``; ``start`` (6, 6) N², N·m, N²·m² as for people by default.
     """
+    data = replace(data)  # a copy of its own: what that keeps in order to learn (12 MB) goes with it
 
     def improved(noise: Noise) -> Noise:
         belief = posterior(data.information(noise), prior)

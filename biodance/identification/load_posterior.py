@@ -8,6 +8,7 @@ the interval of the mass are read from the same numbers and cannot contradict ea
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -86,8 +87,8 @@ class LoadView:
 
     def log_ratio_if(self, true: float, masses: Array) -> Array:
         """Return the same (n,) if the data showed a load of ``true`` kg at the mean place and nothing else."""
-        shown, surprise = true * self.squares, true * self.unit
-        return _log_ratio(masses[:, None], shown, self.squares, surprise, self.unit, self.strength)
+        own, wide = _at_the_mean(self, masses.tobytes())
+        return (true * masses - 0.5 * masses**2) * self.squares + 0.5 * (masses**2 * (true - masses) ** 2 * own - wide)
 
     def place(self, weight: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation (3,) m of the load's CoM in the segment's frame, over masses of
@@ -99,6 +100,15 @@ class LoadView:
         share = weight / weight.sum()
         mean = share @ place
         return mean, np.sqrt(share @ (narrow @ (self.ways[1:4] ** 2).T + (place - mean) ** 2))
+
+
+@lru_cache(maxsize=128)
+def _at_the_mean(view: LoadView, masses: bytes) -> tuple[Array, Array]:
+    """Return sum u² / (1 + m² D D') and sum log(1 + m² D D') (n,) of ``masses``: asked for again for every load that
+    might be there.
+    """
+    wide = 1 + np.frombuffer(masses)[:, None] ** 2 * view.strength
+    return (view.unit**2 / wide).sum(axis=1), np.log(wide).sum(axis=1)
 
 
 def _log_ratio(m: Array, shown: float, squares: float, surprise: Array, unit: Array, strength: Array) -> Array:

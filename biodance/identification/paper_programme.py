@@ -8,6 +8,7 @@ eps = 1e-3 kg·m² exceeds the smallest moments of inertia of the table's own fe
 would be infeasible; eps is taken relative to the table's smallest eigenvalue of each segment.
 """
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -16,10 +17,12 @@ import numpy as np
 from biodance.body.inertia import TENSOR
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.information import Information
-from biodance.identification.physical import FailedFit, solve_convex
+from biodance.identification.physical import FailedFit
 from biodance.records import Array
 
 if TYPE_CHECKING:
+    import cvxpy as cp
+
     from biodance.body.body import Body
 
 RELATIVE_EPS = 0.1
@@ -103,6 +106,21 @@ def paper_programme(data: Information, body: "Body") -> PaperFit | FailedFit:
         f"The paper's programme has no solution ({word}), not even without equalities: the CoM boxes contradict each "
         f"other."
     )
+
+
+def solve_convex(problem: "cp.Problem") -> str:
+    """Solve ``problem`` in place and return "optimal", or the solver's word for what it ran into: then no value is
+    to be used.
+    """
+    import cvxpy as cp
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that an answer is inaccurate is said by the word
+            problem.solve(solver=cp.CLARABEL, ignore_dpp=True)
+    except cp.error.SolverError as error:
+        return str(error).split(". ")[0]
+    return str(problem.status)
 
 
 def _solve(data: Information, body: "Body", E: Array, e: Array) -> tuple[Array | None, str]:

@@ -1,6 +1,7 @@
-"""Convex programmes: solved, or a word why not; an answer that the solver itself calls inaccurate is none."""
+"""The possible body nearest to what the data say, or a word why there is none; an answer that the solver itself calls
+inaccurate is none.
+"""
 
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -9,30 +10,13 @@ from numpy.typing import NDArray
 
 from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
 from biodance.errors import NotSolved
+from biodance.identification.cones import shortest_inside
 from biodance.identification.posterior import Posterior
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 
 if TYPE_CHECKING:
-    import cvxpy as cp
-
     from biodance.body.body import Body
-
-
-def solve_convex(problem: "cp.Problem") -> str:
-    """Solve ``problem`` in place and return "optimal", or the solver's word for what it ran into: then no value is
-    to be used.
-    """
-    import cvxpy as cp
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that an answer is inaccurate is said by the word
-            problem.solve(solver=cp.CLARABEL, ignore_dpp=True)
-    except cp.error.SolverError as error:
-        return str(error).split(". ")[0]
-    return str(problem.status)
-
 
 RELATIVE_FLOOR = 1e-3
 """Smallest eigenvalue allowed, as a share of the prior segment's own smallest eigenvalue (an absolute floor
@@ -171,22 +155,17 @@ def _solve(local: Array, mean: Array, limits: _Limits, bound: NDArray[np.intp]) 
     """Return the smallest z for which mean + local z of the segments ``bound`` is inside the limits, and the
     solver's word.
     """
-    import cvxpy as cp
-
-    z = cp.Variable(local.shape[1])
-    constraints, sides, levels = [], [], []
+    matrices, sides, levels = [], [], []
     for k, i in enumerate(bound):
         slope, level = local[10 * k : 10 * k + 10], mean[10 * k : 10 * k + 10]
         free = _free_axes(limits.cone[i] @ np.column_stack([slope, level]))
         axes, count = np.kron(free, free), len(free)
         least = axes @ limits.floor[i].ravel() + GAP * np.eye(count).ravel()
-        matrix = (axes @ limits.cone[i] @ slope) @ z + (axes @ limits.cone[i] @ level - least)
-        constraints.append(cp.reshape(matrix, (count, count), order="C") >> 0)
+        inside = (axes @ limits.cone[i] @ slope, axes @ limits.cone[i] @ level - least)
+        matrices.append((inside[0].reshape(count, count, -1), inside[1].reshape(count, count)))
         sides.append(limits.sides[i] @ slope)
         levels.append(limits.sides[i] @ level)
-    constraints.append(np.concatenate(sides) @ z + np.concatenate(levels) >= 0)
-    word = solve_convex(cp.Problem(cp.Minimize(cp.sum_squares(z)), constraints))
-    return (np.asarray(z.value) if word == "optimal" else None), word
+    return shortest_inside(matrices, np.concatenate(sides), np.concatenate(levels))
 
 
 def _free_axes(matrices: Array) -> Array:

@@ -6,7 +6,9 @@ mass, a parameter that the prior fixes), and no weight is tuned by hand - the ta
 of the data decide.
 """
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -52,12 +54,22 @@ class Posterior:
 
 
 def prior_factor(prior: Sip) -> Array:
-    """Return S (p, k) with S S' = the prior covariance; directions without variance are dropped."""
-    scale = np.sqrt(np.diag(prior.covariance))
+    """Return S (p, k), read-only, with S S' = the prior covariance; directions without variance are dropped."""
+    return _factor_of(prior.covariance.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _factor_of(covariance: bytes) -> Array:
+    """Return the factor of a covariance by its bytes: learning asks for that of one prior some twenty times."""
+    table = np.frombuffer(covariance)
+    table = table.reshape(math.isqrt(table.size), -1)
+    scale = np.sqrt(np.diag(table))
     safe = np.where(scale > 0, scale, 1.0)
-    value, vector = np.linalg.eigh(prior.covariance / np.outer(safe, safe))
+    value, vector = np.linalg.eigh(table / np.outer(safe, safe))
     keep = value > 1e-12 * value.max(initial=0.0)
-    return scale[:, None] * vector[:, keep] * np.sqrt(value[keep])
+    factor = scale[:, None] * vector[:, keep] * np.sqrt(value[keep])
+    factor.setflags(write=False)
+    return np.asarray(factor)
 
 
 def posterior(data: Information, prior: Sip) -> Posterior:

@@ -4,10 +4,10 @@ memory.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
@@ -15,6 +15,7 @@ from biodance.identification.information import Information
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import predict_wrench, regressor_of
 from biodance.records import Array, Motion, Wrench
+from biodance.records.moving import any_near
 from biodance.settings import Settings
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS, Bands
@@ -52,6 +53,10 @@ class Fit:
             raise TrialRefused(f"Trial {self.name}: the wrench is NaN in a frame that is to be used; mask the frame.")
 
 
+_PAIRS = np.triu_indices(6)
+"""Pairs of channels, each once."""
+
+
 @dataclass(frozen=True, eq=False)
 class Statistics:
     """``gram`` (B, 6, p + 1, 6, p + 1) second moments of [W y] per band, wrench about ``layout.about``; ``count`` (B,)
@@ -82,7 +87,8 @@ class Statistics:
     def information(self, noise: Noise) -> Information:
         """Return the R factor of the data whitened by ``noise`` (same bands)."""
         weight = np.linalg.inv(noise.covariance)
-        H = np.einsum("bcd,bcidj->ij", weight, self.gram)
+        half = np.tensordot(weight[:, *_PAIRS] * np.where(_PAIRS[0] == _PAIRS[1], 0.5, 1.0), self._pairs, axes=2)
+        H = half + half.T
         scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
         value, vector = np.linalg.eigh(H / np.outer(scale, scale))
         rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
@@ -95,7 +101,14 @@ class Statistics:
         z = np.append(-phi, 1.0)
         second = np.outer(z, z)
         second[:-1, :-1] += covariance
-        return Moments(np.einsum("bcidj,ij->bcd", self.gram, second), self.count.astype(float))
+        squares = np.empty((len(self.gram), 6, 6))
+        squares[:, *_PAIRS] = squares[:, *_PAIRS[::-1]] = np.tensordot(self._pairs, second, axes=2)
+        return Moments(squares, self.count.astype(float))
+
+    @cached_property
+    def _pairs(self) -> Array:
+        """(B, 21, p + 1, p + 1) of ``gram``, each pair of channels once: learning asks for all of it in every round."""
+        return np.ascontiguousarray(self.gram.transpose(0, 1, 3, 2, 4)[:, *_PAIRS])
 
 
 def layout_for(about: Array, bands: Bands = BANDS) -> Noise:
@@ -173,7 +186,7 @@ def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
     wrong = fit.use & (size > limit)
     if not wrong.any():
         return fit, ""
-    wide = binary_dilation(wrong, iterations=max(1, round(_AROUND * fit.motion.rate)))
+    wide = any_near(wrong, max(1, round(_AROUND * fit.motion.rate)))
     left = fit.use & ~wide
     where = fit.motion.time[int(np.argmax(np.where(fit.use, size, -1.0)))]
     return replace(fit, use=left), (

@@ -80,9 +80,16 @@ def _beyond_joints(body: Body, motion: Motion) -> Iterator[tuple[NDArray[np.intp
 
 def torque_regressor(body: Body, motion: Motion) -> Array:
     """Return Y (T, n, 10N): what each parameter needs about each joint's axis, N·m per unit."""
-    W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
-    Y = _about_axes(_axes(body, motion), W) * np.repeat(below(body), 10, axis=1)
+    Y = torque_regressor_of_links(body, motion)
     return np.asarray(Y if body.sharing is None else Y @ body.sharing)
+
+
+def torque_regressor_of_links(body: Body, motion: Motion) -> Array:
+    """Return Y (T, n, 10L): the same for the parameters of the links (`Body.links`), of which a segment has several
+    where it has parts.
+    """
+    W = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    return np.asarray(_about_axes(_axes(body, motion), W) * np.repeat(below(body), 10, axis=1))
 
 
 def ground_torques(body: Body, motion: Motion, ground: Mapping[str, Wrench]) -> Array:

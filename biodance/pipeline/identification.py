@@ -4,6 +4,7 @@ load.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -18,15 +19,14 @@ from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
-from biodance.identification.torques import TorqueBands, torque_bands
+from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
-from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
+from biodance.pipeline.torques import torques_in
 from biodance.pipeline.trial_result import Check, TrialResult, trial_fit
-from biodance.records import ROLES, SIDES, Role, Sip
-from biodance.threads import one_thread
+from biodance.records import ROLES, Role, Sip
+from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.plates import around_zero
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ KEPT_ROLES: tuple[Role, ...] = ("validate", "check")
 
 
 @dataclass(frozen=True, eq=False)
-class SessionIdentification:
+class SessionIdentification(Sendable):
     """All that identification found in a visit.
 
     Parameters
@@ -58,11 +58,9 @@ class SessionIdentification:
         The loads looked for, against ``search.reference``.
     changes : tuple
         Since the reference session; () without one.
-    torques : TorqueBands or None
-        Of the joints in the first trial kept (else fitted); None where the feet's wrenches are not known.
-    impacts : tuple of Impact
-        How far each quantity was pulled from its prior and what it means for knee and hip in the trial of ``torques``,
-        the largest impact first.
+    shown : TrialResult or None
+        The first trial kept (else fitted) whose plates tell what each foot carries: of its joints are `torques` and
+        `impacts`.
     performance : PerformanceScore or None
         How well the dance that was shown was danced; None where none was named.
     notes : tuple of str
@@ -85,8 +83,7 @@ class SessionIdentification:
     gain: ResidualRatio | None
     search: LoadSearch
     changes: tuple[Difference, ...] = ()
-    torques: TorqueBands | None = None
-    impacts: tuple[Impact, ...] = ()
+    shown: TrialResult | None = None
     performance: "PerformanceScore | None" = None
     notes: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
@@ -105,6 +102,20 @@ class SessionIdentification:
     def status(self) -> Literal["solved", "failed"]:
         """Whether the fit was solved; a failed one keeps the table's values and says so."""
         return self.identification.status
+
+    @cached_property
+    def torques(self) -> TorqueBands | None:
+        """Joint torques with bands in the trial ``shown``, computed when asked for; None without one."""
+        return torques_in(self.identification, self.shown) if self.shown else None
+
+    @cached_property
+    def impacts(self) -> tuple[Impact, ...]:
+        """How far each quantity was pulled from its prior and what it means for knee and hip in the trial of
+        `torques`, the largest impact first.
+        """
+        if self.torques is None or self.shown is None or self.shown.motion is None:
+            return ()
+        return impacts(self.identification, self.shown.motion, self.torques.use)
 
     def table(self, quantity: str = "mass") -> "pd.DataFrame":
         """Return one row for each segment, see `Identification.table`.
@@ -250,33 +261,21 @@ def _predicted(
             "validate."
         )
     notes += weight_notes(fitted, -float(found.body.gravity[2]))
-    torques = _torques(found, results)
-    shown = next((one for one in results if torques and one.name == torques.trial), None)
     return replace(
         one,
         fitted=fitted,
         validations=kept,
         agreements={fit.name: _at_origin(identified, fit) for fit in _fits(results, ROLES)},
         gain=_gain(kept, notes),
-        torques=torques,
-        impacts=impacts(found, shown.motion, torques.use) if torques and shown and shown.motion else (),
+        shown=_shown(results),
         notes=tuple(notes),
     )
 
 
-def _torques(found: Identification, results: tuple[TrialResult, ...]) -> TorqueBands | None:
-    """Return the joint torques of the first trial kept, else of the first fitted, whose plates tell what each foot
-    carries.
-    """
-    for role in (*KEPT_ROLES, *FITTED_ROLES):
-        for one in results:
-            if one.trial.role != role or one.motion is None or one.comparison is None or not one.trial.plates:
-                continue
-            soles = soles_from_body(found.body, one.motion)
-            feet = foot_wrenches(one.trial, ground_contact(one.trial, soles, mass=found.sip.mass.sum()), soles)
-            ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
-            return torque_bands(found, one.motion, ground, trial=one.trial.name, use=one.comparison.used)
-    return None
+def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
+    """Return the first trial kept, else the first fitted, whose plates tell what each foot carries."""
+    told = [one for one in results if one.motion is not None and one.comparison is not None and one.trial.plates]
+    return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
 
 
 def _at_origin(identified: Body, fit: Fit) -> Agreement:

@@ -58,7 +58,7 @@ def assign(record: object, **values: object) -> None:
 def check_time(time: ArrayLike, what: str) -> Array:
     """Return times (T,) s as a read-only array; BiodanceError where they do not increase."""
     time = frozen_array(time, (None,), f"{what}.time")
-    if time.size > 1 and not np.all(np.diff(time) > 0):
+    if not (time[1:] > time[:-1]).all():
         frame = int(np.argmin(np.diff(time) > 0))
         raise BiodanceError(
             f"{what}.time does not increase at sample {frame + 1} ({time[frame]:g} s, {time[frame + 1]:g} s)."
@@ -96,5 +96,5 @@ def in_time(time: Array, values: Array, columns: Iterable[str]) -> "pd.DataFrame
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]

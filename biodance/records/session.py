@@ -148,9 +148,12 @@ class Trial:
                 f"Trial {self.name}: no force plate was recorded, so there is no wrench. Record with the plates on."
             )
         time = self.plates[0].wrench.time
-        if any(not np.array_equal(p.wrench.time, time) for p in self.plates):
+        others = [p.wrench for p in self.plates[1:]]
+        if any(one.time is not time and not np.array_equal(one.time, time) for one in others):
             raise TrialRefused(f"Trial {self.name}: the plates have different time bases; prepare the trial first.")
-        return Wrench(time, np.sum([p.wrench.value for p in self.plates], axis=0))
+        value = sum((one.value for one in others), self.plates[0].wrench.value)
+        value.setflags(write=False)  # the record keeps it without a copy
+        return Wrench(time, value)
 
 
 @dataclass(frozen=True, eq=False)

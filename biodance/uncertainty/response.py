@@ -33,6 +33,8 @@ _REACH = 100
 """Samples from an end beyond which a spline does not feel it: 2.3^-100 is 1e-36."""
 _TOGETHER = 64
 """Frames worked on at once where every frame stands alone."""
+_ROWS = 96
+"""Rows of the derivatives taken together: as many again lie beside them."""
 _NOTHING = 1e-17
 """Share of the largest coefficient below which a double cannot show what is left out."""
 
@@ -123,8 +125,10 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         rate = self.motion.rate
         parts = functional.reshape(len(functional), 3, -1)
-        value = rate**2 * (second @ parts[:, 0]) + rate * (first @ parts[:, 1]) + parts[:, 2]
-        return np.asarray(value).reshape(len(functional), 6, -1)
+        value = np.array(parts[:, 2])
+        second.add(rate**2, parts[:, 0], value)
+        first.add(rate, parts[:, 1], value)
+        return value.reshape(len(functional), 6, -1)
 
     def back(self, weight: Array) -> Array:
         """Return what ``weight`` (F, 6, p) on the wrench weighs on functionals (F, 18, p): the transpose of
@@ -133,14 +137,47 @@ class Response:
         second, first = derivatives(self.motion.time.size)
         frames, rate = len(weight), self.motion.rate
         flat = weight.reshape(frames, -1)
-        parts = [rate**2 * (second.T @ flat), rate * (first.T @ flat), flat]
-        return np.stack(parts, axis=1).reshape(frames, 18, -1)
+        out = np.zeros((frames, 3, flat.shape[1]))
+        out[:, 2] = flat
+        second.add_transposed(rate**2, flat, out[:, 0])
+        first.add_transposed(rate, flat, out[:, 1])
+        return out.reshape(frames, 18, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Banded:
+    """A matrix (n, n) that is zero far from its diagonal, as ``blocks`` of some rows together: which rows, which
+    columns, and what stands there.
+    """
+
+    blocks: tuple[tuple[slice, slice, Array], ...]
+
+    @classmethod
+    def of(cls, matrix: csr_array) -> "Banded":
+        """Return a sparse matrix (n, n) as such."""
+        found, count = [], matrix.shape[0]
+        for start in range(0, count, _ROWS):
+            rows = slice(start, min(start + _ROWS, count))
+            at = matrix.indices[matrix.indptr[rows.start] : matrix.indptr[rows.stop]]
+            columns = slice(int(at.min(initial=rows.start)), int(at.max(initial=rows.start)) + 1)
+            found.append((rows, columns, matrix[rows, columns].toarray()))
+        return cls(tuple(found))
+
+    def add(self, size: float, values: Array, out: Array) -> None:
+        """Add ``size`` times the matrix times ``values`` (n, m) to ``out`` (n, m)."""
+        for rows, columns, block in self.blocks:
+            out[rows] += (size * block) @ values[columns]
+
+    def add_transposed(self, size: float, values: Array, out: Array) -> None:
+        """Add ``size`` times the transposed matrix times ``values`` (n, m) to ``out`` (n, m)."""
+        for rows, columns, block in self.blocks:
+            out[columns] += (size * block.T) @ values[rows]
 
 
 @lru_cache(maxsize=8)
-def derivatives(count: int) -> tuple[csr_array, csr_array]:
-    """Return (n, n) twice, sparse: second and first derivative, at ``count`` samples one unit apart, of the quintic
-    spline through them.
+def derivatives(count: int) -> tuple[Banded, Banded]:
+    """Return (n, n) twice: second and first derivative, at ``count`` samples one unit apart, of the quintic spline
+    through them.
 
     A sample's influence on the spline falls by a factor of 2.3 per sample: rows farther than `_REACH` from both ends
     are one row, moved along.
@@ -148,7 +185,8 @@ def derivatives(count: int) -> tuple[csr_array, csr_array]:
     some = min(count, 2 * _REACH + 1)
     time = np.arange(some, dtype=float)
     spline = make_interp_spline(time, np.eye(some), k=min(5, some - 1))
-    return _lengthened(spline.derivative(2)(time), count), _lengthened(spline.derivative(1)(time), count)
+    second, first = (Banded.of(_lengthened(spline.derivative(order)(time), count)) for order in (2, 1))
+    return second, first
 
 
 def _lengthened(rows: Array, count: int) -> csr_array:

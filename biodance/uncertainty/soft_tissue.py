@@ -67,7 +67,17 @@ class Slide(_WithAngles):
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, on, rows, near in self._parts:
-            yield trial.of_markers(self._moved(trial, s, on), rows), near
+            if self._alone[s]:
+                answer = trial.answer[:, :, rows].reshape(len(trial.answer), -1, 3)
+                yield -(answer @ trial.pose.rotation[:, s]).reshape(len(answer), 18, -1), near
+            else:
+                yield trial.of_markers(self._moved(trial, s, on), rows), near
+
+    @cached_property
+    def _alone(self) -> tuple[bool, ...]:
+        """Whether every marker of a segment slides by itself: its patterns then are the axes of the segment."""
+        flat = (one.reshape(3 * len(one), -1 if one.size else 0) for one in self.patterns)
+        return tuple(np.array_equal(one, np.eye(one.shape[1])) for one in flat)
 
     def _left(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         """Yield for every segment what its patterns leave of the markers (F, 3M, P) m per radian, and the angles."""

@@ -94,6 +94,15 @@ def _about_centre(seen: SeenTrial, name: str, change: Callable[[Array], Array]) 
     return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value)))
 
 
+def _in_channel(seen: SeenTrial, name: str, k: int, added: Array | float) -> SeenTrial:
+    """Return the recording with ``added`` (S,) or always the same in channel ``k`` of a plate, about its centre."""
+    plate = seen.plate(name)
+    unit = wrench_about_origin(np.eye(6)[k], plate.centre)
+    value = plate.wrench.value + np.multiply.outer(added, unit)
+    value.setflags(write=False)  # the record keeps it without a copy
+    return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value)))
+
+
 def _late(seen: SeenTrial, delay: float) -> SeenTrial:
     plates = tuple(replace(p, wrench=Wrench(p.wrench.time + delay, p.wrench.value)) for p in seen.trial.plates)
     return replace(seen, trial=replace(seen.trial, plates=plates))
@@ -121,17 +130,17 @@ def _offset(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
         plate = seen.plate(name)
         if was_zeroed(plate):
             return _with(seen, replace(plate, zero=plate.zero + offset * np.eye(6)[k][:3]))
-        return _about_centre(seen, name, lambda w: w + offset * np.eye(6)[k])
+        return _in_channel(seen, name, k, offset)
 
     return alter
 
 
 def _gained(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    return lambda seen, gain: _about_centre(seen, name, lambda w: w * (1 + gain * np.eye(6)[k]))
+    return lambda seen, gain: _in_channel(seen, name, k, gain * seen.plate(name).wrench.value[:, k])
 
 
 def _crossed(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    return lambda seen, ratio: _about_centre(seen, name, lambda w: w + ratio * w[:, 2:3] * np.eye(6)[k])
+    return lambda seen, ratio: _in_channel(seen, name, k, ratio * seen.plate(name).wrench.value[:, 2])
 
 
 def _mirrored(name: str, channel: str) -> Callable[[SeenTrial], SeenTrial]:

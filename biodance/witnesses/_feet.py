@@ -29,6 +29,7 @@ class FootPath:
     toe: Array
     centred: bool = True
     _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _ways: dict[bytes, tuple[Array, Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
     _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
 
     def at(self, time: Array) -> tuple[Array, Array]:
@@ -60,11 +61,24 @@ class FootPath:
         """Return how far ``point`` (n, 2) m lies ahead of the heel marker and outwards of the line to the toe marker,
         m (n,), and the horizontal distance of the two markers (n,) m.
         """
-        heel, toe = (path[:, :2] for path in self.at(time))
-        length = np.linalg.norm(toe - heel, axis=1)
-        ahead = (toe - heel) / length[:, None]
-        out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
-        return np.sum((point - heel) * ahead, axis=1), np.sum((point - heel) * out, axis=1), length
+        heel, ahead, out, length = self._lines(time)
+        x, y = (point - heel).T
+        return x * ahead[:, 0] + y * ahead[:, 1], x * out[:, 0] + y * out[:, 1], length
+
+    def _lines(self, time: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the heel (n, 2) m, the directions ahead and outwards (n, 2) and the length (n,) m of the foot; kept,
+        like the places.
+        """
+        key = time.tobytes()
+        if key not in self._ways:
+            if len(self._ways) >= _KEPT:
+                self._ways.pop(next(iter(self._ways)))
+            heel, toe = (path[:, :2] for path in self.at(time))
+            length = np.linalg.norm(toe - heel, axis=1)
+            ahead = (toe - heel) / length[:, None]
+            out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
+            self._ways[key] = heel, ahead, out, length
+        return self._ways[key]
 
     @property
     def rate(self) -> float:

@@ -64,7 +64,8 @@ class FootStep:
 class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
     markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and
-    whether somebody stands ``still`` throughout.
+    whether somebody stands ``still`` throughout. ``moments`` keeps what witnesses computed of the pelvis at some times:
+    a recording whose plates are altered has the same.
     """
 
     trial: Trial
@@ -73,6 +74,7 @@ class SeenTrial:
     steps: tuple[FootStep, ...]
     pelvis: Array | None
     still: bool
+    moments: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _stances: dict[FootStep, slice | None] = field(default_factory=dict, init=False, repr=False)
 
     def plate(self, name: str) -> Plate:

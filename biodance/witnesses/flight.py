@@ -1,5 +1,7 @@
 """Flight: nobody touches anything, so every plate reads exactly zero and gravity is the only force."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from biodance.records import Array, runs
@@ -28,9 +30,7 @@ class Flight(Witness):
         heights = [plate.height for plate in seen.trial.plates]
         if not seen.feet or not heights or max(heights) - min(heights) > _LEVEL:
             return ()
-        air = np.min([_height(foot) for foot in seen.feet], axis=0) > _HIGH
-        time = seen.feet[0].time
-        spans = [(time[a], time[b - 1]) for a, b in runs(air) if b - a >= max(2, _SHORTEST * seen.feet[0].rate)]
+        spans = _in_air(seen.feet)
         found = []
         for plate in seen.trial.plates:
             wrench = plate.wrench
@@ -41,6 +41,13 @@ class Flight(Witness):
                 value, what = float(wrench.force[inside, axis].mean()), f"{plate.name} {channel} in flight"
                 found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name))
         return tuple(found)
+
+
+@lru_cache(maxsize=8)
+def _in_air(feet: tuple[FootPath, ...]) -> tuple[tuple[float, float], ...]:
+    """Return first and last time s of every flight; of the last feet it is kept."""
+    air, time = np.min([_height(foot) for foot in feet], axis=0) > _HIGH, feet[0].time
+    return tuple((time[a], time[b - 1]) for a, b in runs(air) if b - a >= max(2, _SHORTEST * feet[0].rate))
 
 
 def _height(foot: FootPath) -> Array:

@@ -31,7 +31,7 @@ class StandingForce(Witness):
         plates = [p for p in seen.trial.plates if p.wrench.time.size and p.wrench.force[:, 2].mean() > ONSET]
         if not plates or not seen.still or not seen.mass > 0:
             return ()
-        total, weight = seen.trial.wrench, seen.mass * seen.trial.settings.gravity
+        total, weight = seen.total, seen.mass * seen.trial.settings.gravity
         force = mean_force(total.force)
         if total.time.size < _SHORTEST * total.rate or not _ON_PLATES[0] < force[2] / weight < _ON_PLATES[1]:
             return ()
@@ -57,7 +57,8 @@ def _level(axis: int) -> float:
 
 def mean_force(force: Array) -> Array:
     """Return the mean (3,) N of forces (S, 3) N, NaN samples left out."""
-    return np.asarray(np.nanmean(force, axis=0))
+    mean = force.mean(axis=0)
+    return np.asarray(mean if np.isfinite(mean).all() else np.nanmean(force, axis=0))
 
 
 WITNESS = StandingForce

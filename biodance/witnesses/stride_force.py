@@ -32,6 +32,8 @@ _ONE = (0.2, 0.8)
 """Start and stop, as shares of stance, of the time in which the other foot swings."""
 _SHORTEST = 0.15
 """s that one foot alone must be seen."""
+_KEPT = 64
+"""Sets of times of which the pelvis' part is kept."""
 
 
 class StrideForce(Witness):
@@ -116,13 +118,25 @@ def _means(seen: SeenTrial, time: Array, force: Array) -> Array:
     """Return the mean force (3,) N and the mean acceleration (3,) m/s² of the pelvis, with weights that begin and end
     as a cosine does: the acceleration is that of the path, weighed with the weights' second derivative.
     """
+    key = time.tobytes()
+    if key not in seen.moments:
+        if len(seen.moments) >= _KEPT:
+            seen.moments.pop(next(iter(seen.moments)))
+        seen.moments[key] = _fading(seen, time)
+    share, moved = seen.moments[key]
+    return np.stack([share @ force, moved])
+
+
+def _fading(seen: SeenTrial, time: Array) -> tuple[Array, Array]:
+    """Return the share (n,) of each of the times (n,) s in a mean, and the pelvis' mean acceleration (3,) m/s²."""
     lasts = time[-1] - time[0]
     edge = np.minimum((time - time[0]) / lasts, (time[-1] - time) / lasts) / _FADES
     weight = np.where(edge < 1, 0.5 * (1 - np.cos(np.pi * edge)), 1.0)
     bend = np.where(edge < 1, 0.5 * (np.pi / (_FADES * lasts)) ** 2 * np.cos(np.pi * edge), 0.0)
     path = seen.pelvis_at(time)
-    both = np.stack([weight[:, None] * force, bend[:, None] * (path - path.mean(axis=0))])
-    return np.asarray(np.trapezoid(both, time, axis=1) / np.trapezoid(weight, time))
+    width = np.diff(time, prepend=time[:1]) + np.diff(time, append=time[-1:])
+    total = width @ weight
+    return width * weight / total, (width * bend) @ (path - path.mean(axis=0)) / total
 
 
 def _mass(seen: SeenTrial, means: Array) -> float:

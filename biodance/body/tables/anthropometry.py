@@ -72,7 +72,7 @@ class AnthropometricTable:
         """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``; may
         be empty.
         """
-        return tuple(row for row in self.rows if all(row[column] == text for column, text in wanted.items()))
+        return _rows_where(self, tuple(wanted.items()))
 
     def row(self, **wanted: str) -> TableRow:
         """Return the one row that matches.
@@ -89,6 +89,11 @@ class AnthropometricTable:
                 f"{column} of table {self.name} (with {wanted})", text, sorted({row[column] for row in self.rows})
             )
         return found[0]
+
+
+@functools.cache
+def _rows_where(table: AnthropometricTable, wanted: tuple[tuple[str, str], ...]) -> tuple[TableRow, ...]:
+    return tuple(row for row in table.rows if all(row[column] == text for column, text in wanted))
 
 
 def row_numbers(row: TableRow, columns: str) -> tuple[float, ...]:

@@ -43,7 +43,7 @@ class Case:
         frames = self.motion.time.size
         object.__setattr__(self, "phi", frozen_array(self.phi, (10 * len(self.body.segments),), "Case.phi"))
         object.__setattr__(self, "session_time", frozen_array(self.session_time, (frames,), "Case.session_time"))
-        if self.trial.wrench.time.size != frames:
+        if len(self.measured) != frames:
             raise TrialRefused(
                 f"Trial {self.trial.name}: {frames} frames of motion, other samples of force; prepare the trial first."
             )
@@ -65,10 +65,15 @@ class Case:
         """
         return wrench_of_segments(self.body, self.segments, self.phi)
 
-    @property
+    @cached_property
+    def measured(self) -> Array:
+        """(T, 6) N, N·m wrench of all plates about the lab origin."""
+        return self.trial.wrench.value
+
+    @cached_property
     def residual(self) -> Array:
         """(T, 6) N, N·m measured minus predicted wrench about the lab origin."""
-        return self.trial.wrench.value - self.predicted
+        return self.measured - self.predicted
 
     @cached_property
     def poses(self) -> Poses:
@@ -137,7 +142,7 @@ class Case:
         """Return the predicted wrench (T, 6) of one plate about its centre, lab axes: its share of the vertical
         force times the whole.
         """
-        total = self.trial.wrench.value[:, 2]
+        total = self.measured[:, 2]
         safe = np.where(np.abs(total) > 1.0, total, 1.0)
         share = np.where(np.abs(total) > 1.0, plate.wrench.value[:, 2] / safe, 1.0 / len(self.trial.plates))
         value = self.predicted * (np.ones_like(share) if len(self.trial.plates) == 1 else share)[:, None]
@@ -145,7 +150,9 @@ class Case:
 
     def with_added(self, plate: Plate, change: Array) -> "Case":
         """Return the case with ``change`` (T, 6) about the lab origin added to what ``plate`` measured."""
-        changed = replace(plate, wrench=Wrench(plate.wrench.time, plate.wrench.value + change))
+        value = plate.wrench.value + change
+        value.setflags(write=False)  # the record keeps it without a copy
+        changed = replace(plate, wrench=Wrench(plate.wrench.time, value))
         plates = tuple(changed if p.name == plate.name else p for p in self.trial.plates)
         changed_trial = replace(self.trial, plates=plates)
         return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")

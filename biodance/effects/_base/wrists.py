@@ -47,8 +47,10 @@ def travels(markers: Markers) -> bool:
     """Return whether the person goes from one place to another: only then, and in a static trial, do both arms hang
     alike.
     """
-    place = np.nanmean(markers.xyz[..., :2], axis=1) if markers.seen.any(axis=1).all() else np.zeros((1, 2))
-    return bool(np.linalg.norm(place[-1] - place[0]) > _FAR_AWAY)
+    if not (markers.time.size and markers.seen.any(axis=1).all()):
+        return False
+    first, last = np.nanmean(markers.xyz[[0, -1], :, :2], axis=1)
+    return bool(np.linalg.norm(last - first) > _FAR_AWAY)
 
 
 def _palm_behind(markers: Markers, side: str) -> bool:

@@ -78,6 +78,8 @@ def metres_per_unit(
 
 _FRAMES = 4096
 """Frames looked at at once: little memory, however long the recording."""
+_SIZED = 256
+"""Frames whose size is looked at, spread over the recording."""
 
 
 def _extents(points: Array) -> Array:
@@ -90,8 +92,7 @@ def _extents(points: Array) -> Array:
 
 def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     """Return a length in file units, what it should be in metres, and its name; NaN if the file holds none."""
-    parts = [_extents(points[start : start + _FRAMES]) for start in range(0, len(points), _FRAMES)]
-    extents = np.concatenate([*parts, np.empty(0)])
+    extents = _extents(points[:: max(1, len(points) // _SIZED)])
     if extents.size:
         extent = float(np.median(extents))
         if 0 < extent < math.inf:

@@ -46,15 +46,13 @@ def _distances_between(points: Array, feet: Array) -> Array:
     there, infinity where they are not.
     """
     i, j = np.triu_indices(feet.shape[1], 1)
-    there = np.isfinite(feet[:, i, 0]) & np.isfinite(feet[:, j, 0])
-    frame, pair = np.nonzero(there)
-    (x, y), (to_x, to_y) = feet[frame, i[pair]].T, feet[frame, j[pair]].T
-    px, py = points[frame].T
-    ax, ay = to_x - x, to_y - y
-    share = np.clip(((px - x) * ax + (py - y) * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
-    found = np.full(there.shape, np.inf)
-    found[frame, pair] = np.hypot(x + share * ax - px, y + share * ay - py)
-    return found.min(axis=1)
+    away = feet - points[:, None]
+    with np.errstate(invalid="ignore"):  # feet that are not there give NaN
+        x, y = away[:, i, 0], away[:, i, 1]
+        ax, ay = away[:, j, 0] - x, away[:, j, 1] - y
+        share = np.clip(-(x * ax + y * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
+        square = (x + share * ax) ** 2 + (y + share * ay) ** 2
+    return np.sqrt(np.where(np.isnan(square), np.inf, square).min(axis=1))
 
 
 UNDER_THE_FOOT, NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted

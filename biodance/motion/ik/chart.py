@@ -35,9 +35,10 @@ def balls(body: Body) -> Balls:
         one, two, three = body.joints[i : i + 3]
         axes = np.array([joint.axis for joint in (one, two, three)])
         in_a_row = two.parent == i and three.parent == i + 1 and parents.count(i) == parents.count(i + 1) == 1
+        if not (in_a_row and one.segment == two.segment == NO_SEGMENT):
+            continue
         one_point = all(np.allclose(j.translation, 0) and np.allclose(j.rotation, np.eye(3)) for j in (two, three))
-        bare = one.segment == two.segment == NO_SEGMENT
-        if in_a_row and one_point and bare and np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
+        if one_point and np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
             first.append(i)
             sign.append(np.linalg.det(axes))
     return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.motion.kinematics import poses
 from biodance.records import Array
+from biodance.spatial import cross
 
 _LEVER = 0.1
 """m, what one radian is compared with: one metre of root translation counts as 10 rad."""
@@ -59,8 +60,8 @@ def _normal(jacobian: Array, weight: Array) -> Array:
     moves = np.abs(jacobian).max(axis=1) > 0
     moved = weight @ moves
     scale = 1 / np.sqrt(np.where(moved > 0, moved, 1.0))
-    pairs = np.einsum("kim,kin->kmn", jacobian, jacobian)
-    return np.einsum("pk,kmn->pmn", weight, pairs, optimize=True) * scale[:, :, None] * scale[:, None]
+    pairs = np.swapaxes(jacobian, 1, 2) @ jacobian
+    return np.asarray(np.tensordot(weight, pairs, axes=1) * scale[:, :, None] * scale[:, None])
 
 
 def _open(normal: Array) -> NDArray[np.bool_]:
@@ -79,11 +80,9 @@ def _jacobian(body: Body, columns: list[int]) -> Array:
     if body.n_root:
         out[:, :, :3] = np.eye(3)
         out[:, :, 3:6] = np.cross(np.eye(3), points[:, None]).transpose(0, 2, 1) / _LEVER
-    carried = _carried(body)
-    for i, joint in enumerate(body.joints):
-        axis = pose.joint_rotation[0, i] @ joint.axis
-        moved = carried[i, segment][:, None]
-        out[:, :, body.n_root + i] = moved * np.cross(axis, points - pose.joint_position[0, i]) / _LEVER
+    axes = (pose.joint_rotation[0] @ np.array([joint.axis for joint in body.joints]).reshape(-1, 3, 1))[..., 0]
+    turned = cross(axes[:, None], points - pose.joint_position[0][:, None])
+    out[:, :, body.n_root :] = np.moveaxis(_carried(body)[:, segment, None] * turned, 0, 2) / _LEVER
     return out
 
 

@@ -18,7 +18,7 @@ from biodance.report.wording import format_number
 
 STEPS = 4000
 """Steps along each axis of a plot: a value is read to 1/4000 of what the axis spans."""
-_PLACES = 400
+_PLACES = 360
 """Places along a curve that are told apart: of longer ones each place shows the lowest and the highest value."""
 _FAR = 8 * STEPS
 """Steps beyond which a value outside the axes is cut."""

@@ -3,6 +3,7 @@ hash.
 """
 
 import functools
+import os
 import re
 import zipfile
 from base64 import b64encode
@@ -69,11 +70,19 @@ def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequenc
 
 @functools.cache
 def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, FileSystemBytecodeCache, FunctionLoader, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    kept = Path(__file__).parent / "__pycache__"  # what Python itself keeps of modules, jinja keeps of templates
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=FunctionLoader(template_text),
+        bytecode_cache=FileSystemBytecodeCache(str(kept)) if os.access(kept, os.W_OK) else None,
+    )
     environment.filters.update(number=format_number, mm=millimetres, **dict(filters))
-    return environment.from_string(template_text(name))
+    return environment.get_template(name)
 
 
 def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:

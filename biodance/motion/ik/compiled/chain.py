@@ -24,6 +24,7 @@ from biodance.body.body import Body
 from biodance.motion.ik.chart import balls
 from biodance.motion.ik.compiled import compiled
 from biodance.records import Array
+from biodance.spatial import skew
 
 _LENGTH = 0.1
 """m, turns an angle into a typical marker displacement: makes gradients, damping and pivots of different coordinates
@@ -75,7 +76,7 @@ class Sums(NamedTuple):
 
 def chain_of(body: Body, segment: list[int], local: Array) -> MarkerChain:
     """Return the chain of ``body`` with markers at ``local`` (K, 3) m in ``segment`` (K)."""
-    cross = [np.cross(np.eye(3), joint.axis) for joint in body.joints]
+    cross = [skew(joint.axis) for joint in body.joints]
     parts = [[j.rotation, j.rotation @ c, j.rotation @ c @ c] for j, c in zip(body.joints, cross, strict=True)]
     parents = [joint.parent for joint in body.joints]
     paths, joints = [list(range(k + 1)) for k in range(body.n_root)], balls(body)
