@@ -13,8 +13,6 @@ from typing import Literal
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.cycles.tops import find_tops
-from biodance.lab.recursive import butterworth_sections, run_both_ways
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.kinematics import poses
@@ -173,13 +171,14 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
     """Return the times s at which a foot begins (``down``) or ends to go with the ground, from its ``path`` (T,) m
     ahead of the pelvis.
     """
+    from scipy.signal import butter, find_peaks, sosfiltfilt
+
     rate = motion.rate
     if rate > 2.5 * _EVENT_CUTOFF:
-        sections = butterworth_sections(2, float(np.tan(np.pi * _EVENT_CUTOFF / rate)))
-        path = run_both_ways(sections, path[:, None], min(20, path.size - 1))[:, 0]
+        path = sosfiltfilt(butter(2, _EVENT_CUTOFF, fs=rate, output="sos"), path, padlen=min(20, path.size - 1))
     speed = np.gradient(path, motion.time)
     ground = float(np.median(speed[speed < 0]))
-    tops = find_tops(path if down else -path, prominence=prominence, apart=max(1, round(_APART * rate)))
+    tops, _ = find_peaks(path if down else -path, prominence=prominence, distance=max(1, round(_APART * rate)))
     step, level = (1, _STRIKES * ground) if down else (-1, _LEAVES * ground)
     found = []
     for top in tops[motion.determined[tops]]:

@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Verdict
 from biodance.diagnosis.evidence import believe
 from biodance.diagnosis.model import Model
 from biodance.records import CHANNELS, Array, Motion
-from biodance.records.moving import moving_mean
 from biodance.uncertainty.bands import BANDS
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def _when(found: Model, row: Adequacy) -> float:
         full[band >= 0] = left[start : start + int(np.sum(band >= 0))]
         start += int(np.sum(band >= 0))
         full[band != BANDS.edges.index(row.band_hz[0])] = 0.0
-        power = moving_mean(bands.samples(full) ** 2, max(1, round(bands.rate)), ends="symmetric")
+        power = uniform_filter1d(bands.samples(full) ** 2, max(1, round(bands.rate)))
         if power.max() > best:
             best, second = float(power.max()), float(time[pick[int(np.argmax(power))]])
     return second

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
@@ -15,7 +16,6 @@ from biodance.identification.information import Information
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import predict_wrench, regressor_of
 from biodance.records import Array, Motion, Wrench
-from biodance.records.moving import any_near
 from biodance.settings import Settings
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS, Bands
@@ -186,7 +186,7 @@ def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
     wrong = fit.use & (size > limit)
     if not wrong.any():
         return fit, ""
-    wide = any_near(wrong, max(1, round(_AROUND * fit.motion.rate)))
+    wide = binary_dilation(wrong, iterations=max(1, round(_AROUND * fit.motion.rate)))
     left = fit.use & ~wide
     where = fit.motion.time[int(np.argmax(np.where(fit.use, size, -1.0)))]
     return replace(fit, use=left), (

@@ -12,9 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError
-from biodance.lab.recursive import butterworth_sections, first_order_section, run_both_ways
 from biodance.records import Array, runs
 from biodance.settings import FilterKind, FilterSettings, Settings
 
@@ -78,9 +78,9 @@ def design_low_pass(settings: LowPass, rate: float) -> Array:
     wanted = np.tan(np.pi * settings.cutoff / rate)
     if settings.kind == "critically_damped":
         raised = wanted / np.sqrt(2 ** (0.5 / settings.order) - 1)
-        return np.tile(first_order_section(raised), (settings.order, 1))
+        return np.tile(butter(1, np.arctan(raised) * rate / np.pi, fs=rate, output="sos"), (settings.order, 1))
     raised = wanted * (np.sqrt(2) - 1) ** (-0.5 / settings.order)
-    return butterworth_sections(settings.order, raised)
+    return butter(settings.order, np.arctan(raised) * rate / np.pi, fs=rate, output="sos")
 
 
 def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
@@ -108,12 +108,11 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     out = columns.copy()
     whole = ~np.isnan(columns).any(axis=0)
     if whole.any():
-        out[:, whole] = run_both_ways(sections, columns if whole.all() else columns[:, whole], need - 1)
+        out[:, whole] = sosfiltfilt(sections, columns[:, whole], axis=0, padlen=need - 1)
     for column in np.flatnonzero(~whole):
         for start, stop in runs(~np.isnan(columns[:, column])):
             if stop - start >= need:
-                one = columns[start:stop, column : column + 1]
-                out[start:stop, column] = run_both_ways(sections, one, need - 1)[:, 0]
+                out[start:stop, column] = sosfiltfilt(sections, columns[start:stop, column], padlen=need - 1)
     return out.reshape(values.shape)
 
 

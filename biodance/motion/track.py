@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
@@ -12,7 +13,6 @@ from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics
 from biodance.motion.kinematics import poses
 from biodance.motion.smoothing import smooth
 from biodance.records import Array, Markers, Motion, Trial
-from biodance.records.moving import moving_mean
 from biodance.threads import one_thread
 
 _STRIDE = 1.0
@@ -30,7 +30,7 @@ def upright_trunk(body: Body, q: Array, rate: float) -> Array:
     pelvis = poses(body, q).rotation[:, 0]
     facing = np.unwrap(np.arctan2(pelvis[:, 1, 0], pelvis[:, 0, 0]))
     width = min(len(q), max(1, round(_STRIDE * rate)))
-    heading = moving_mean(facing, width, ends="edge") if len(q) > 1 else facing
+    heading = uniform_filter1d(facing, width, mode="nearest") if len(q) > 1 else facing
     relative = np.swapaxes(pelvis @ body.joints[chain[0]].rotation, 1, 2) @ _upright(heading)
     out = np.array(q)
     first = body.nq - len(body.joints)

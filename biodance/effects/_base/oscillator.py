@@ -5,10 +5,9 @@ only sets the place of rest. The ground then carries m (a + x'') instead of m a,
 """
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
 from biodance.effects._base.case import Case
-from biodance.lab.recursive import run_forwards
 from biodance.records import Array
 from biodance.spatial import cross
 
@@ -21,30 +20,14 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     point.
     """
     w = 2 * np.pi * frequency
-    place, speed = (run_forwards(section, acceleration) for section in _sections(w, damping, 1 / rate))
-    return place, -acceleration - w * w * place - 2 * damping * w * speed
-
-
-def _sections(w: float, damping: float, dt: float) -> tuple[Array, Array]:
-    """Return the filters (1, 6) from samples every ``dt`` s of the point's acceleration to x and to x', exact where it
-    is linear in between.
-
-    One exponential holds the step of the state (A), of a constant input and of a ramp (Franklin, Powell and Workman,
-    Digital Control of Dynamic Systems, section 6.3.2). With C the row of x or x', the filter is C (z - A)^-1 B + D.
-    """
-    block = np.zeros((4, 4))
-    block[:2, :3] = [[0.0, dt, 0.0], [-w * w * dt, -2 * damping * w * dt, -dt]]
-    block[2, 3] = 1.0
-    step = expm(block)
-    A, flat, ramp = step[:2, :2], step[:2, 2], step[:2, 3]
-    B = flat - ramp + A @ ramp
-    pole = np.array([1.0, -np.trace(A), np.linalg.det(A)])
-    seen = (A - np.outer(B, row) for row in np.eye(2))
-    rest = (np.array([1.0, -np.trace(one), np.linalg.det(one)]) for one in seen)
-    x, speed = (
-        np.concatenate([top + (through - 1) * pole, pole])[None] for top, through in zip(rest, ramp, strict=True)
+    system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
+    A, B, C, D, _ = cont2discrete(system, 1 / rate, method="foh")
+    numerators, denominator = ss2tf(A, B, C, D)
+    place, speed = (
+        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0]
+        for b in numerators
     )
-    return x, speed
+    return place, -acceleration - w * w * place - 2 * damping * w * speed
 
 
 def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:

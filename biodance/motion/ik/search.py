@@ -3,6 +3,7 @@
 from functools import reduce
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
@@ -10,7 +11,6 @@ from biodance.motion.ik.compiled.interpolation import interpolate
 from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, better, minimise_markers
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Index
-from biodance.records.moving import moving_median
 
 _OTHERS = 0.01
 """Weight of the other segments' markers in the root's rigid fit: enough where the root's own markers are hidden."""
@@ -124,7 +124,7 @@ def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
     on both sides.
     """
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
-    doubtful = rms > DOUBT[0] * moving_median(rms, min(NEIGHBOURS, len(rms))) + DOUBT[1]
+    doubtful = rms > DOUBT[0] * median_filter(rms, min(NEIGHBOURS, len(rms)), mode="mirror") + DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)
     if not (bad.size and sound.size):
         return found
