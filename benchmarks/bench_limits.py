@@ -27,6 +27,7 @@ from biodance.pipeline.looked_at import cases_of, looked_at
 from biodance.records import Array
 
 TIMES = (1.0, 3.0, 10.0)
+_CLOCKS = ("time_delay", "clock_drift")
 START, END = "<!-- limits: begin -->", "<!-- limits: end -->"
 
 
@@ -83,8 +84,15 @@ def with_hidden(cases: tuple[Case, ...], looks: tuple[Look, ...], effect: Effect
             replace(look, motion=effect.corrected(case, -theta).motion) for case, look in zip(cases, looks, strict=True)
         )
     return tuple(
-        replace(look, trial=effect.transform(case, theta).trial) for case, look in zip(cases, looks, strict=True)
+        replace(look, trial=_faulty(case, effect, theta).trial) for case, look in zip(cases, looks, strict=True)
     )
+
+
+def _faulty(case: Case, effect: Effect, theta: Array) -> Case:
+    """Return the case with a cause in it; clocks move all that was measured, not only what the table's body needs."""
+    if effect.name in _CLOCKS:
+        return case.with_added(effect.plate_of(case), -effect.removed(case, -theta))
+    return effect.transform(case, theta)
 
 
 def held(body: Body, cases: tuple[Case, ...], effect: Effect, theta: Array) -> Body:

@@ -180,7 +180,7 @@ def truth(one: Answer) -> float:
     effect, _, size, _ = FOREIGN[index]
     mass = PEOPLE[_person(index, int(first or 601))][2]
     units = {"body_mass": mass, "plate_rotation": np.pi / 180, "lab_tilt": np.pi / 180, "plate_drift": _JUDGED}
-    alike = effect not in {"head_joint", "trunk_joint", "filter_mismatch", "clock_drift"}
+    alike = effect not in {"head_joint", "trunk_joint", "filter_mismatch", "clock_drift", "external_contact"}
     return float(size) * units.get(effect, 1.0) if size and alike else float("nan")
 
 
