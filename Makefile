@@ -4,6 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 BUNDLE := biodance/report/feedback/bundle
+ROOM   ?= yes
 
 .PHONY: demo test hidden lint docs tutorials bundle bundle-if-possible clean
 demo: $(STAMP) bundle-if-possible
@@ -38,6 +39,7 @@ bundle-if-possible: $(STAMP)
 	@$(MAKE) --no-print-directory bundle || echo "Without npm the page that leads does not follow the person; all else works."
 
 $(STAMP): pyproject.toml constraints.txt
+	@[ $(ROOM) = no ] || $(PYTHON) .ci/room.py $(VENV)=$(if $(wildcard $(VENV)),1,3) "$${TMPDIR:-/tmp}=1" # of 2.8 and 0.8 GB
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,docs]"

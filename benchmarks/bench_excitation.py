@@ -12,7 +12,6 @@ continued.
 
 import hashlib
 import os
-import pickle
 import sys
 import tempfile
 import time
@@ -22,6 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from kept_files import kept
 from virtual_visits import subjects
 
 from biodance.dance.dance import Dance
@@ -78,13 +78,7 @@ class Row:
 
 def cached(name: str, make: Callable[[], object]) -> object:
     """Return what ``make`` gives, from disk if it was made before."""
-    path = CACHE / f"{hashlib.sha256(name.encode()).hexdigest()[:20]}.pickle"
-    if not path.is_file():
-        CACHE.mkdir(parents=True, exist_ok=True)
-        made = make()
-        path.with_suffix(".part").write_bytes(pickle.dumps(made))
-        path.with_suffix(".part").replace(path)
-    return pickle.loads(path.read_bytes())
+    return kept(CACHE / f"{hashlib.sha256(name.encode()).hexdigest()[:20]}.pickle", make)
 
 
 def designed(protocol: str) -> Dance:

@@ -27,7 +27,7 @@ from biodance.body.parts import UPRIGHT
 from biodance.lab.opensim.trc import write_trc
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
-from biodance.pipeline.export import opensim_coordinates
+from biodance.pipeline.program_folders import opensim_coordinates
 from biodance.records import Array, Markers, Motion, Subject
 
 RATE = 100.0

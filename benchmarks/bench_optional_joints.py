@@ -15,8 +15,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.optional_joints import marker_groups
 from biodance.lab.session.read import read_session
-from biodance.pipeline.body import body_of
-from biodance.pipeline.shown_joints import shown_joints
+from biodance.pipeline.body import body_of, shown_joints
 from biodance.pipeline.trial import Prepared, examine_trial, prepare_trial
 
 SESSIONS = (*(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55)), "adl_gait", "pycgm")

@@ -3,10 +3,10 @@ unchanged.
 """
 
 import hashlib
-import pickle
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from kept_files import kept
 from virtual_visits import CACHE, TrackedVisit, visit
 
 import biodance
@@ -58,13 +58,7 @@ def gather(
     code = b"".join(path.read_bytes() for path in parts)
     key = f"{subject}-{protocol}-{seed}-{session}-{load}".encode() + code
     path = CACHE / f"gathered-{hashlib.sha256(key).hexdigest()[:20]}.pickle"
-    if path.is_file():
-        with open(path, "rb") as stream:
-            return pickle.load(stream)
-    made = _gathered(visit(subject, protocol, seed=seed, session=session, load=load))
-    with open(path, "wb") as stream:
-        pickle.dump(made, stream)
-    return made
+    return kept(path, lambda: _gathered(visit(subject, protocol, seed=seed, session=session, load=load)))
 
 
 def _gathered(one: TrackedVisit) -> Gathered:

@@ -8,7 +8,6 @@ what is there is not made again, so that a run that was stopped goes on where it
 import copyreg
 import hashlib
 import os
-import pickle
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -18,6 +17,8 @@ from types import MappingProxyType
 from unittest.mock import patch
 
 import numpy as np
+from kept_files import kept
+from kept_files import store as store
 from virtual_visits import subjects
 
 from biodance.body.body import Body
@@ -102,23 +103,20 @@ def session_folder(scenario: Scenario) -> Path:
 
 def examined(scenario: Scenario) -> SessionResult:
     """Return the session after reading, preparing, scaling and tracking; identified only where gains are judged."""
-    path = CACHE / "examined" / f"{scenario.key}.pickle"
-    if path.is_file():
-        with open(path, "rb") as stream:
-            return pickle.load(stream)
+    return kept(CACHE / "examined" / f"{scenario.key}.pickle", lambda: _examined(scenario))
+
+
+def _examined(scenario: Scenario) -> SessionResult:
     session = read_session(session_folder(scenario))
     if scenario.judged:
-        result = examine(session)
-    else:
-        session = replace(session, trials=tuple(trial for trial in session.trials if trial.role != "validate"))
-        with (
-            patch("biodance.pipeline.session.can_identify", return_value=False),
-            patch("biodance.pipeline.body.placed_by_movement", _placed),
-            patch("biodance.pipeline.trial.track", _tracked),
-        ):
-            result = examine(session)
-    store(path, result)
-    return result
+        return examine(session)
+    session = replace(session, trials=tuple(trial for trial in session.trials if trial.role != "validate"))
+    with (
+        patch("biodance.pipeline.session.can_identify", return_value=False),
+        patch("biodance.pipeline.body.placed_by_movement", _placed),
+        patch("biodance.pipeline.trial.track", _tracked),
+    ):
+        return examine(session)
 
 
 class Memory(dict[str, object]):
@@ -171,12 +169,3 @@ def _performed(person: Person, plan: TrialPlan, session: int, **how: object) -> 
     )
     made = PERFORMANCES.recall(said, lambda: perform(person, plan, session, **how))  # type: ignore[arg-type]
     return made  # type: ignore[return-value]
-
-
-def store(path: Path, value: object) -> None:
-    """Pickle ``value`` to ``path`` at once or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    with open(part, "wb") as stream:
-        pickle.dump(value, stream, protocol=pickle.HIGHEST_PROTOCOL)
-    os.replace(part, path)

@@ -11,14 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.problem.excitation import (
-    condition,
-    dynamic_grams,
-    excitation_blocks,
-    static_grams,
-    total,
-    uprights,
-)
+from biodance.dance.problem.excitation import condition, dynamic_grams, excitation_blocks, static_grams, total, uprights
 from biodance.records import Array
 
 _LITTLE, _RATE = 1e-6, 100.0

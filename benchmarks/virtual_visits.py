@@ -7,12 +7,12 @@ parameters beside it.
 
 import hashlib
 import os
-import pickle
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kept_files import kept
 
 from biodance.body.body import Body
 from biodance.identification.statistics import Fit
@@ -77,15 +77,7 @@ def visit(
     """Return one visit, from the cache if it was made before; ``load`` (one of the 12 segments, kg)."""
     key = f"{subject.mass}-{subject.stature}-{subject.sex}-{protocol}-{seed}-{session}-{load}"
     path = CACHE / f"{hashlib.sha256(key.encode()).hexdigest()[:20]}.pickle"
-    if path.is_file():
-        with open(path, "rb") as stream:
-            return pickle.load(stream)
-    made = _make(subject, protocol, seed, session, load)
-    CACHE.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=CACHE, delete=False) as stream:
-        pickle.dump(made, stream)
-    os.replace(stream.name, path)
-    return made
+    return kept(path, lambda: _make(subject, protocol, seed, session, load))
 
 
 def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[str, float] | None) -> TrackedVisit:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from biodance.cli import progress as told
+from biodance.cli.app import TimeLeft, _plain, progress, seconds_in_words
 from biodance.cli.options import Results
 
 
@@ -20,7 +20,7 @@ class Clock:
 
 def test_the_time_left_is_what_the_stage_took_so_far_times_what_is_left():
     clock = Clock()
-    left = told.TimeLeft(clock)
+    left = TimeLeft(clock)
     assert left.said("scaling the body") == "scaling the body"
     assert left.said("tracking walk_1, 1 of 5") == "tracking walk_1, 1 of 5"
     clock.now = 4.0
@@ -32,13 +32,13 @@ def test_the_time_left_is_what_the_stage_took_so_far_times_what_is_left():
 
 @pytest.mark.parametrize(("seconds", "words"), [(0.2, "1 s"), (89, "89 s"), (100, "2 min"), (9000, "2.5 h")])
 def test_durations_in_words(seconds, words):
-    assert told.seconds_in_words(seconds) == words
+    assert seconds_in_words(seconds) == words
 
 
 def test_without_a_terminal_a_line_comes_every_few_seconds_and_a_short_run_is_silent(capsys, monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(told.time, "monotonic", clock)
-    tell = told._plain(told.TimeLeft(clock), clock)
+    monkeypatch.setattr("time.monotonic", clock)
+    tell = _plain(TimeLeft(clock), clock)
     for k in range(1, 13):
         clock.now = float(k)
         tell(f"tracking walk_{k}, {k} of 12")
@@ -46,7 +46,7 @@ def test_without_a_terminal_a_line_comes_every_few_seconds_and_a_short_run_is_si
         "tracking walk_5, 5 of 12, about 8 s left",
         "tracking walk_10, 10 of 12, about 3 s left",
     ]
-    with told.progress() as short:
+    with progress() as short:
         short("reading")
     assert capsys.readouterr().err == ""
 

@@ -18,13 +18,11 @@ from biodance.cycles.curves import (
     normal_of,
     normal_toml,
 )
-from biodance.cycles.cut import Cycle, gait_cycles, repetitions
-from biodance.cycles.events import agreement_of_events, joined_events, kinematic_events
+from biodance.cycles.cut import Cycle, gait_cycles, mean_values, repetitions, strides
+from biodance.cycles.events import FootEvent, agreement_of_events, joined_events, kinematic_events
 from biodance.cycles.file_outputs import compare_angles, compare_events
 from biodance.cycles.loads import load_curves
-from biodance.cycles.steps import mean_values, strides
 from biodance.lab.c3d.subject import FileEvent, FileOutputs
-from biodance.motion.contact.events import FootEvent
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses

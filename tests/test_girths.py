@@ -12,8 +12,8 @@ from biodance.body.body_file import parse_body
 from biodance.body.human.girths import stadium, stadium_stack
 from biodance.body.human.human import human
 from biodance.errors import SessionRefused
-from biodance.lab.girths import legal_girths, usual_girths
 from biodance.lab.session.file import read_session_file
+from biodance.lab.shape import legal_girths, usual_girths
 from biodance.records import Subject
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))

@@ -20,7 +20,7 @@ from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Gate, effects
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.attention import EXPLAINS, headline, is_well, session_attention, told
-from biodance.pipeline.results import Check
+from biodance.pipeline.trial_result import Check
 from biodance.records import Motion, Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.uncertainty.tolerances import shipped, table_sizes, without_habits

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
-from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_mass, surprised
+from biodance.identification.added_mass import LoadCandidate, LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.learning import learn_noise
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.identification.loads import compact_load, load_moments, may_carry
+from biodance.identification.rival_bodies import surprised
 from biodance.identification.statistics import layout_for, standing_point, statistics
 from biodance.records import Sip
 from biodance.spatial import point_mass

@@ -8,42 +8,13 @@ from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import model_outputs
 from biodance.lab.c3d.read import read_c3d
 
-LABELS = (
-    "LASI",
-    "RASI",
-    "LPSI",
-    "RPSI",
-    "LHEE",
-    "RHEE",
-    "LTOE",
-    "RTOE",
-    "C7",
-    "CLAV",
-    "T10",
-    "STRN",
-    "LKNE",
-    "RKNE",
-    "LANK",
-    "RANK",
-)
-LABELS += (
-    "LTHI",
-    "RTHI",
-    "LTIB",
-    "RTIB",
-    "LSHO",
-    "RSHO",
-    "LELB",
-    "RELB",
-    "LWRA",
-    "RWRA",
-    "LWRB",
-    "RWRB",
-    "LFHD",
-    "RFHD",
-    "LBHD",
-    "RBHD",
-)
+
+def _sided(*places):
+    return tuple(f"{side}{place}" for place in places for side in "LR")
+
+
+LABELS = (*_sided("ASI", "PSI", "HEE", "TOE"), "C7", "CLAV", "T10", "STRN", *_sided("KNE", "ANK"))
+LABELS += (*_sided("THI", "TIB", "SHO", "ELB"), "LWRA", "RWRA", "LWRB", "RWRB", *_sided("FHD", "BHD"))
 HEIGHTS = dict.fromkeys(LABELS, 1.0) | dict.fromkeys(("LFHD", "RFHD", "LBHD", "RBHD"), 1.65)
 HEIGHTS |= dict.fromkeys(("LHEE", "RHEE", "LTOE", "RTOE"), 0.05) | dict.fromkeys(("C7", "LSHO", "RSHO"), 1.45)
 FRAMES = 4

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError
-from biodance.lab.filters import LowPass, left_raw, low_pass, runs
+from biodance.lab.filters import LowPass, left_raw, low_pass
+from biodance.records import runs
 
 
 def tone(frequency: float, rate: float, seconds: float = 20.0) -> np.ndarray:

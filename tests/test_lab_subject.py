@@ -64,6 +64,20 @@ def test_unknown_mass_and_stature_stay_nan_and_are_said(tmp_path):
         session.subject.require("mass", "stature")
 
 
+def test_without_plates_a_middling_mass_is_taken_and_said(tmp_path):
+    write_trial(tmp_path, "static", mass=None)
+    session = read_session(tmp_path)
+    assert session.subject.mass == pytest.approx(22.5 * STATURE**2, rel=0.02)
+    assert "mass" in session.subject.guessed
+    assert "the movement does not depend on it, forces and loads do" in said(session)
+
+
+def test_beside_plates_no_mass_is_made_up(tmp_path):
+    write_trial(tmp_path, "static", mass=None)
+    write_trial(tmp_path, "walk", speed=1.2)
+    assert np.isnan(read_session(tmp_path).subject.mass)
+
+
 def test_plates_that_contradict_the_declared_mass_are_said(folder):
     (folder / "session.toml").write_text("[subject]\nmass_kg = 70\n")
     session = read_session(folder)

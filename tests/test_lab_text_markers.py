@@ -128,6 +128,19 @@ def test_z_up_file_is_recognised_by_the_person_in_it(tmp_path):
     assert "z up" in " ".join(trial.warnings)
 
 
+def test_labels_tell_which_axis_points_up(tmp_path):
+    """Somebody with arms stretched sideways, in a file with z up: wider than high."""
+    head = ["PathFileType\t4\t(X/Y/Z)\tx.trc", "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"]
+    at = {"C7": (0, 0, 1450), "RASI": (100, -120, 950), "LASI": (100, 120, 950), "RKNE": (0, -150, 480)}
+    at |= {"LKNE": (0, 150, 480), "RANK": (0, -120, 90), "LANK": (0, 120, 90), "RWRA": (0, -800, 1400)}
+    at |= {"LWRA": (0, 800, 1400), "RTOE": (150, -120, 40), "LTOE": (150, 120, 40)}
+    numbers = "\t".join(str(x) for point in at.values() for x in point)
+    rows = [f"100\t100\t2\t{len(at)}\tmm", "Frame#\tTime\t" + "\t\t\t".join(at), "", f"1\t0\t{numbers}"]
+    path = tmp_path / "t_pose.trc"
+    path.write_text("\n".join([*head, *rows, f"2\t0.01\t{numbers}"]) + "\n")
+    np.testing.assert_allclose(read_trc(path).markers["C7"][0], [0.0, 0.0, 1.45])
+
+
 def test_repeated_label_gets_a_number(tmp_path):
     trial = read_trc(handmade(tmp_path, ["1\t0\t1\t2\t3\t4\t5\t6"], names="A\t\t\tA\t\t"))
     assert trial.markers.names == ("A", "A_2")

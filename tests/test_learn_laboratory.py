@@ -16,7 +16,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.carry import read_lab
 from biodance.pipeline.learn import LearnedLaboratory, LearnedSession, learned_session, learned_together
 from biodance.pipeline.session import examine
-from biodance.report.lab_file import lab_file_text, write_lab_file
+from biodance.report.laboratory import lab_file_text, write_lab_file
 from biodance.uncertainty.tolerances import InstrumentNoise, shipped
 
 BAND = np.repeat(np.arange(len(shipped().noise)), 12)

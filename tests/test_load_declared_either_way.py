@@ -10,7 +10,8 @@ from biodance.identification.rival_bodies import weighing
 from biodance.identification.sessions import differences
 from biodance.pipeline.checks import load_doubts
 from biodance.pipeline.identification import SessionIdentification, identify_trials
-from biodance.pipeline.results import Check, SessionResult
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import Check
 from biodance.report.documents.identification import identification_document
 
 LOAD = 2.4

@@ -16,11 +16,12 @@ from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.inspect import inspect_paths
 from biodance.lab.markers.dress import dress
 from biodance.lab.markers.guess import guess_set
-from biodance.lab.markers.names import meanings
+from biodance.lab.markers.names import meanings, meanings_of
 from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.read import read_trial
-from biodance.lab.session.init import init_session
 from biodance.lab.session.read import read_session
+from biodance.lab.session.write import init_session
 from biodance.motion.kinematics import poses
 from biodance.motion.track import upright_trunk
 from biodance.records import Markers, Source, Subject, Trial
@@ -87,6 +88,55 @@ def test_a_guess_that_the_person_contradicts_is_none() -> None:
     assert guess_set(stand(upside)).name == ""
     nameless = guess_set(stand({place: f"M{k:02d}" for k, place in enumerate(OWN)}))
     assert (nameless.name, nameless.map) == ("", {})
+
+
+SPEAKERS = {
+    "French, side last": "{}D {}G EIAS EIPS GENE MALE TALON MT2 ACR",
+    "German": "{}_rechts {}_links SIAS SIPS Knie_aussen Knoechel_aussen Ferse MT2 Schulter",
+    "Italian": "{}-dx {}-sx SIAS SIPS GinocchioEst MalleoloEst Tallone MT2 Spalla",
+    "Spanish": "{}_der {}_izq EIAS EIPS Rodilla_ext Tobillo_ext Talon MT2 Hombro",
+    "a subject and a shared letter": "Ann:pRight{} Ann:pLeft{} ASI PSI KneeLat AnkleLat Heel MT2 Acromion",
+    "condyles": "R_{} L_{} ASIS PSIS LFC LMAL CALC MT2 ACRO",
+}
+"""How a laboratory says right and left, and what it calls the landmarks of SPOKEN."""
+SPOKEN = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "toe", "acromion")
+
+
+@pytest.mark.parametrize("words", SPEAKERS.values(), ids=SPEAKERS)
+def test_a_set_tells_its_own_language_and_sides(words: str) -> None:
+    right, left, *names = words.split()
+    spoken = {
+        f"{side}_{place}": way.format(name)
+        for place, name in zip(SPOKEN, names, strict=True)
+        for side, way in (("right", right), ("left", left))
+    }
+    guess = guess_set(stand(spoken))
+    assert guess.map == {label: place for place, label in spoken.items()}, guess.doubts
+
+
+def test_computed_and_unlabelled_points_and_bone_axes_mark_nothing() -> None:
+    computed = ["*13", "Unlabeled 7", "RHJC", "L_knee_centre", "MidASIS", "virtual_toe", "PELO", "PELA", "PELL", "PELP"]
+    labels = ["S01:RKNE", "S01:LKNE", *(f"S01:{label}" for label in computed)]
+    assert plain_labels(labels) == {"S01:RKNE": "RKNE", "S01:LKNE": "LKNE"}
+
+
+def test_a_side_is_said_as_the_whole_set_says_it() -> None:
+    french = meanings_of(["CLD", "CLG", "EIASD", "EIASG", "MLD", "MLG"])
+    assert {label: ways[0].place for label, ways in french.items() if label[0] == "E"} == {
+        "EIASD": "right_asis",
+        "EIASG": "left_asis",
+    }
+    assert "left_knee_lateral" in {one.place for one in french["CLG"]}
+
+
+def test_an_unnamed_marker_at_the_mirror_image_is_taken_and_said() -> None:
+    typo = OWN | {"left_knee_lateral": "Quter Xnee L", "right_heel": "R strap"}
+    guess = guess_set(stand(typo))
+    assert guess.map["Quter Xnee L"] == "left_knee_lateral"
+    assert guess.map["R strap"] == "right_heel"
+    assert "mirror image" in " ".join(guess.doubts)
+    gone = guess_set(stand({place: label for place, label in OWN.items() if place != "left_knee_lateral"}))
+    assert (gone.name, gone.doubts[0]) == ("", "No marker could be taken for: left knee lateral.")
 
 
 def trial_of(markers: Markers, role: str, name: str) -> Trial:

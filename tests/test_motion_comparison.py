@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.comparison import compare
+from biodance.motion.regressor import compare
 from biodance.records import Wrench
 
 

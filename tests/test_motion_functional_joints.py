@@ -16,15 +16,14 @@ from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.body.human.skeleton import JOINTS
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.anthropometry import error_size
 from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
-from biodance.motion.ik.elsewhere import MarkerSlopes, elsewhere
 from biodance.motion.ik.functional_joints import functional_joints
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.ik.joint_fit import evaluate_joints, spread_postures
+from biodance.motion.ik.joint_fit import MarkerSlopes, elsewhere, evaluate_joints, spread_postures
 from biodance.motion.ik.joint_unknowns import (
     FAULTY,
     HINGES,
@@ -218,6 +217,8 @@ def test_a_hip_that_the_movement_hardly_shows_is_placed_only_where_it_is_contrad
         assert f"{1e3 * found.moved['right_hip']:.0f} mm" in warned[0]
         assert errors["right_hip"].contradicted
         assert not errors["right_knee"].contradicted
+        assert found.moved["right_hip"] <= errors["right_hip"].reach
+        assert abs(errors["right_hip"].reach - far) < 2 * errors["right_hip"].reach_sd < 0.04
         assert placing_leaves(errors["right_hip"]) < 0.5 * (errors["right_hip"].centre / centre_sd("right_hip")) ** 2
     else:
         assert not off.any()

@@ -19,9 +19,8 @@ from biodance.motion.kinematics import chains, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt, joint_of
-from biodance.uncertainty.response import Response, derivatives
+from biodance.uncertainty.response import ErrorSource, Response, derivatives, neighbours
 from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
-from biodance.uncertainty.source import ErrorSource, neighbours
 from biodance.uncertainty.sources import forward, of_clusters, of_markers, transpose
 
 SMALL = 1e-4

@@ -1,4 +1,4 @@
-"""Witnesses see what was made, hide no fault, and the family keeps its contract."""
+"""Witnesses see what was made and hide no fault."""
 
 import json
 from dataclasses import replace
@@ -11,23 +11,15 @@ from walking import FOOT, MASS, STANCE, Wrong, standing, walk
 
 from biodance.diagnosis.heard import hear, put_right, sights
 from biodance.diagnosis.testimony import size_by, weigh
-from biodance.effects import causes
-from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import GUESSED
 from biodance.records import SIDES, Session, Subject, Trial, Wrench
 from biodance.witnesses import (
-    FAMILY,
     Observation,
-    SeenTrial,
-    Witness,
     observe,
     possible_causes,
     recording,
     traces,
-    witnesses,
 )
-
-NAMES = tuple(path.stem for path in Path(FAMILY.package.replace(".", "/")).glob("[a-z]*.py"))
 
 
 def seen(trial: Trial, witness: str, mass: float = MASS) -> dict[str, Observation]:
@@ -247,33 +239,6 @@ def test_one_odd_step_names_nothing() -> None:
     others = [walk(name=f"walk{i}") for i in range(3)]
     shifted = weigh(hear(session(*others, odd))).findings
     assert not [one for one in shifted if one.effect != "time_delay"]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_every_file_of_the_folder_is_a_witness(name: str) -> None:
-    member = witnesses()[name]
-    assert member.name == name
-    assert set(member.sees) <= set(causes())
-    assert member.needs.endswith(".")
-    assert member.look(recording(replace(walk(), markers=None, plates=()))) == ()
-    for one in member.look(recording(walk(), mass=MASS)):
-        assert one.witness == name
-        assert one.sd > 0
-        assert one.expected_sd >= one.sd
-
-
-def test_objects_join_and_strangers_are_refused() -> None:
-    class Loud(Witness):
-        """Hears one thing."""
-
-        name, sees, needs, source = "loud", ("time_delay",), "Silence.", "nobody"
-
-        def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
-            return (Observation("loud", "noise", seen.trial.name, 1.0, 1.0, 0.0, "1"),)
-
-    assert [one.witness for one in observe(recording(walk()), ["foot_outline", Loud()])][-1] == "loud"
-    with pytest.raises(BiodanceError, match="it is no witness"):
-        witnesses([object()])  # type: ignore[list-item]
 
 
 def test_seconds_of_single_contact_count() -> None:

@@ -10,14 +10,7 @@ from typing import Any
 from biodance.batch.engines import Work, run_here, run_on_dask
 from biodance.batch.ledger import Ledger
 from biodance.batch.summary import SESSIONS, folder_name, write_summary
-from biodance.batch.work import (
-    Outcome,
-    SessionStatus,
-    SessionTask,
-    fingerprint_of,
-    outcome_of,
-    process_session,
-)
+from biodance.batch.work import Outcome, SessionStatus, SessionTask, fingerprint_of, outcome_of, process_session
 from biodance.errors import BiodanceError
 from biodance.lab.session.archive import archive_folders
 from biodance.settings import assignments

@@ -15,16 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
-from biodance.body.joint_tree import JointTree
-from biodance.body.parts import (
-    GRAVITY,
-    Foot,
-    Joint,
-    JointError,
-    JointLimits,
-    Part,
-    SegmentMarkers,
-)
+from biodance.body.parts import GRAVITY, Foot, Joint, JointError, JointLimits, JointTree, Part, SegmentMarkers
 from biodance.body.pinocchio_model import build
 from biodance.errors import BiodanceError
 from biodance.records import Array, Sip, frozen_array

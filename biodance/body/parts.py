@@ -1,11 +1,13 @@
-"""What a Body is made of: joints, marker places, limits and soles; the constants of its frames."""
+"""What a Body is made of: joints and their tree, marker places, limits and soles; the constants of its frames."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from biodance.errors import BiodanceError
+from biodance.body.inertia import shift_matter
+from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, frozen_array
 from biodance.settings import STANDARD_GRAVITY
 
@@ -84,7 +86,8 @@ class JointError(NamedTuple):
     ``axis`` rad of a hinge's flexion axis (0 for other joints); ``contradicted`` where the movement contradicts the
     place that the static trial gave the joint, which was ``moved`` so many m from there; ``spared`` the marker beside
     it that seems to have moved since the static trial and did not count in placing it (``moved`` is then how far the
-    joint would lie with it), "" for none.
+    joint would lie with it), "" for none. Of a contradicted one ``reach`` m, how far it lies from there if it may be as
+    far off as joints are that are wrong, and its standard deviation ``reach_sd`` (0: not told).
     """
 
     joint: str
@@ -93,6 +96,8 @@ class JointError(NamedTuple):
     contradicted: bool = False
     moved: float = 0.0
     spared: str = ""
+    reach: float = 0.0
+    reach_sd: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,3 +131,133 @@ class Foot:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", frozen_array(self.outline, (None, 3), "Foot.outline"))
+
+
+class JointTree:
+    """What a body's segments, joints and parts say about their order; the base of `Body`, which holds them."""
+
+    segments: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    root: Literal["free_flyer", "fixed"]
+    parts: tuple[Part, ...]
+
+    @property
+    def n_root(self) -> int:
+        """Velocity coordinates of the root: 6 or 0."""
+        return 6 if self.root == "free_flyer" else 0
+
+    @property
+    def nq(self) -> int:
+        """Number of position coordinates."""
+        return len(self.joints) + (7 if self.n_root else 0)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocity coordinates."""
+        return len(self.joints) + self.n_root
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the N segments and, behind them, of the P parts."""
+        return (*self.segments, *(part.name for part in self.parts))
+
+    @cached_property
+    def segment_joint(self) -> tuple[int, ...]:
+        """Index in `joints` of the joint that carries each of the `links`, (N + P); -1 for the root's segment."""
+        carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
+        return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
+
+    def place_on_segment(self, joint: int) -> tuple[int, Array]:
+        """Return which segment a joint hangs on, and where.
+
+        Parameters
+        ----------
+        joint : int
+            Index in ``joints``.
+
+        Returns
+        -------
+        tuple
+            Index of the segment, parts passed over, and the joint's place (3,) m in its frame in the neutral posture.
+
+        Examples
+        --------
+        >>> result.body.place_on_segment(result.body.joint_index("right_hip_flexion"))[0]
+        0
+        """
+        place, above = self.joints[joint].translation, self.joints[joint].parent
+        while above >= 0 and not 0 <= self.joints[above].segment < len(self.segments):
+            place = self.joints[above].translation + self.joints[above].rotation @ place
+            above = self.joints[above].parent
+        return (self.joints[above].segment if above >= 0 else 0), place
+
+    @cached_property
+    def sharing(self) -> Array | None:
+        """(10 (N + P), 10 N): the parameters of the `links` from those of the segments, each of which means the whole;
+        None without parts.
+        """
+        if not self.parts:
+            return None
+        count = 10 * len(self.segments)
+        table = np.eye(count + 10 * len(self.parts), count)
+        for k, part in enumerate(self.parts):
+            mass, rest = 10 * part.segment, slice(10 * part.segment, 10 * part.segment + 10)
+            table[count + 10 * k : count + 10 * k + 10, mass] = part.share
+            _, origin = self.place_on_segment(self.segment_joint[len(self.segments) + k])
+            table[rest, mass] -= shift_matter(origin) @ part.share
+        return table
+
+    def joint_index(self, name: str) -> int:
+        """Return the index of a joint in ``joints``.
+
+        Parameters
+        ----------
+        name : str
+            Of a joint angle, as ``left_knee_flexion``.
+
+        Returns
+        -------
+        int
+            Its column is 7 + index in q and 6 + index in v for a free-flyer root.
+
+        Raises
+        ------
+        UnknownName
+            There is no such joint; the legal names are listed.
+
+        Examples
+        --------
+        >>> result.body.joint_index("right_hip_flexion")
+        0
+        """
+        names = tuple(joint.name for joint in self.joints)
+        if name not in names:
+            raise UnknownName.of("joint", name, names)
+        return names.index(name)
+
+    def segment_index(self, name: str) -> int:
+        """Return the index of a segment by name.
+
+        Parameters
+        ----------
+        name : str
+            Of a segment, as ``left_thigh``.
+
+        Returns
+        -------
+        int
+            Its row in every table of segments.
+
+        Raises
+        ------
+        UnknownName
+            There is no such segment; the legal names are listed.
+
+        Examples
+        --------
+        >>> result.body.segment_index("pelvis")
+        0
+        """
+        if name not in self.segments:
+            raise UnknownName.of("segment", name, self.segments)
+        return self.segments.index(name)

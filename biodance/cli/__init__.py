@@ -11,23 +11,12 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
-from biodance.cli import (
-    archive,
-    begin,
-    dance,
-    diagnose,
-    files,
-    identify,
-    live,
-    session,
-    virtual,
-)
+from biodance.cli import archive, dance, diagnose, files, identify, live, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
     "app",
     "archive",
-    "begin",
     "dance",
     "diagnose",
     "files",

@@ -6,9 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress, say
 from biodance.cli.options import ForceOption, JsonOption, OutOption, Set
-from biodance.cli.progress import progress
 
 
 @app.command(name="batch")
@@ -69,8 +68,8 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
 
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.plates import judge_plates
+    from biodance.report.laboratory import print_plates
     from biodance.report.pages.plates import write_plates
-    from biodance.report.terminal_plates import print_plates
 
     with progress() as tell:
         folder = results_folder(out, archive, force=force)
@@ -102,8 +101,7 @@ def learn_command(
     from rich.console import Console
 
     from biodance.pipeline.learn import learn_laboratory
-    from biodance.report.lab_file import learned_document, refuse_existing, write_lab_file
-    from biodance.report.terminal_plates import print_learned
+    from biodance.report.laboratory import learned_document, print_learned, refuse_existing, write_lab_file
 
     refuse_existing(out)
     with progress() as tell:

@@ -6,10 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json
+from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress
 from biodance.cli.identify import diagnose_robot
 from biodance.cli.options import NO_ROBOT, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
-from biodance.cli.progress import progress
 from biodance.cli.session import examine_with_reference, tabled
 
 
@@ -84,9 +83,8 @@ def diagnose_command(
 
     from biodance.pipeline import front
     from biodance.pipeline.attention import is_well
-    from biodance.pipeline.carry import read_lab
+    from biodance.pipeline.carry import read_lab, write_mended
     from biodance.pipeline.front_movement import describe_movement
-    from biodance.pipeline.mended import write_mended
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 

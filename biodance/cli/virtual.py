@@ -7,9 +7,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, app
+from biodance.cli.app import DONE, app, progress
 from biodance.cli.options import NOBODY, ForceOption, OutOption, PersonFacts
-from biodance.cli.progress import progress
 from biodance.cli.session import print_reported, report_session
 
 

@@ -1,5 +1,8 @@
-"""A trial cut into what repeats: gait cycles of each foot, squats, rises from a chair."""
+"""A trial cut into what repeats: gait cycles of each foot, squats, rises from a chair; and the spatio-temporal values
+of walking: cadence, speed, stride and step length, step width, stance and double support.
+"""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -8,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.motion.contact.events import FootEvent
+from biodance.cycles.events import FootEvent, heel_and_toe
 from biodance.motion.contact.soles import Soles
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.records import SIDES, Array, Motion, runs
@@ -148,3 +151,105 @@ def _slide(soles: Soles, first: int, last: int) -> float:
     """Return the farthest that a sole's centre goes between two frames, m."""
     path = soles.centre[first : last + 1, :, :2]
     return float(np.linalg.norm(path - path[:1], axis=-1).max())
+
+
+_BELT = 0.15
+"""m/s of a standing foot from which the ground is a belt."""
+_FLAT = (20.0, 40.0)
+"""% of a cycle in which the foot stands flat and tells how fast the ground moves."""
+STRIDE_UNITS: Mapping[str, str] = {
+    "cadence": "steps/min",
+    "speed": "m/s",
+    "stride_length": "m",
+    "stride_time": "s",
+    "step_length": "m",
+    "step_time": "s",
+    "step_width": "m",
+    "stance": "%",
+    "double_support": "%",
+}
+"""Spatio-temporal quantity -> unit."""
+
+
+@dataclass(frozen=True)
+class Stride:
+    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that the trial does not tell is
+    missing.
+    """
+
+    cycle: Cycle
+    values: Mapping[str, float]
+
+
+def strides(cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, soles: Soles) -> tuple[Stride, ...]:
+    """Return the values of all gait cycles.
+
+    Lengths are horizontal: a stride from a heel's place at one strike to its next, relative to the ground, which on a
+    treadmill is as fast as the foot that stands on it. A step goes from the other foot's strike to this foot's, its
+    length along the stride, its width across it, negative where the feet cross.
+    """
+    heel = heel_and_toe(body, soles.outline)[0][..., :2]
+    gait = [one for one in cycles if one.kind == "gait"]
+    return tuple(Stride(one, _values(one, _others(one, events), heel, soles.time)) for one in gait)
+
+
+def mean_values(found: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:
+    """Return mean, standard deviation (NaN for one stride) and number of every value that the strides tell."""
+    out = {}
+    for name in STRIDE_UNITS:
+        some = [s.values[name] for s in found if name in s.values and side in ("both", s.cycle.side)]
+        if some:
+            out[name] = (float(np.mean(some)), float(np.std(some, ddof=1)) if len(some) > 1 else np.nan, len(some))
+    return out
+
+
+@dataclass(frozen=True)
+class _Other:
+    """What the other foot does in a cycle: it leaves at ``off`` and strikes at ``strike`` s; NaN = not known."""
+
+    off: float
+    strike: float
+
+
+def _others(cycle: Cycle, events: Sequence[FootEvent]) -> _Other:
+    inside = [one for one in events if one.side != cycle.side and cycle.start < one.time < cycle.end]
+    strikes, offs = ([one.time for one in inside if one.down is down] for down in (True, False))
+    strike = strikes[0] if len(strikes) == 1 else np.nan
+    before = [time for time in offs if time < strike]
+    return _Other(before[0] if len(before) == 1 else np.nan, strike)
+
+
+def _values(cycle: Cycle, other: _Other, heel: Array, time: Array) -> dict[str, float]:
+    foot = SIDES.index(cycle.side)
+    ground = _ground(cycle, heel[:, foot], time)
+    start, end = (_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
+    stride = end - start - ground * cycle.duration
+    length = float(np.linalg.norm(stride))
+    values = {
+        "cadence": 120.0 / cycle.duration,
+        "speed": length / cycle.duration,
+        "stride_length": length,
+        "stride_time": cycle.duration,
+    }
+    if np.isfinite(cycle.off):
+        values["stance"] = cycle.off_percent
+    if np.isfinite(other.strike) and length > 0:
+        across = end - _at(heel[:, 1 - foot], time, other.strike) - ground * (cycle.end - other.strike)
+        along = stride / length
+        values["step_time"] = cycle.end - other.strike
+        values["step_length"] = float(across @ along)
+        to_right = float(across[0] * along[1] - across[1] * along[0])
+        values["step_width"] = to_right if cycle.side == "right" else -to_right
+    double = other.off - cycle.start + max(0.0, cycle.off - other.strike)
+    return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
+
+
+def _ground(cycle: Cycle, heel: Array, time: Array) -> Array:
+    """Return the velocity (2,) m/s of what the foot stands on; zero for a floor."""
+    first, last = (cycle.start + share / 100 * cycle.duration for share in _FLAT)
+    velocity = (_at(heel, time, last) - _at(heel, time, first)) / (last - first)
+    return velocity if np.linalg.norm(velocity) > _BELT else np.zeros(2)
+
+
+def _at(path: Array, time: Array, when: float) -> Array:
+    return np.array([np.interp(when, time, column) for column in path.T])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.cycles.events import FootEvent
 from biodance.lab.c3d.subject import FileOutputs
-from biodance.motion.contact.events import FootEvent
 from biodance.records import Motion
 
 PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {

@@ -1,5 +1,5 @@
 """The root regressor: the ground wrench that a motion needs, linear in the standard inertial parameters (paper eq. 3,
-upper part).
+upper part); and how such a wrench agrees with a measured one, channel by channel.
 
 For every segment with origin p, rotation R, angular velocity w and acceleration dw (lab frame) and origin acceleration
 a, with g the gravity vector, first moment h = R mc and inertia J = R I R' about the segment origin:
@@ -10,14 +10,17 @@ a, with g the gravity vector, first moment h = R mc and inertia J = R I R' about
 and the wrench about the lab origin is [f; n + p x f]. Both are linear in [m, mc, I]: the columns of W.
 """
 
+from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.errors import BiodanceError, TrialRefused
 from biodance.motion.ik.compiled.tree import fill_regressor, fill_wrench
 from biodance.motion.kinematics import SegmentMotion, in_blocks, segment_motion
-from biodance.records import Array, Motion, Wrench
+from biodance.records import CHANNELS, Array, Motion, Wrench
 
 _NEEDED: WeakKeyDictionary[Motion, WeakKeyDictionary[Body, Wrench]] = WeakKeyDictionary()
 """What motions need with a body's own parameters, kept as long as both live: many stages of a session ask for it."""
@@ -95,3 +98,70 @@ def wrench_of_segments(body: Body, move: SegmentMotion, phi: Array) -> Array:
     value, drive = np.zeros((len(move.position), 6)), move.acceleration - body.gravity
     fill_wrench(move.rotation, move.position, move.angular_velocity, move.angular_acceleration, drive, links, value)
     return value
+
+
+LEAST_FRAMES = 3
+"""A correlation of fewer frames says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How two wrenches agree over ``frames`` frames.
+
+    ``rms`` (6,) N, N·m, root mean square of the difference per channel Fx Fy Fz Mx My Mz; ``correlation`` (6)
+    Pearson's, None where it is not defined; ``notes`` say why not.
+    """
+
+    frames: int
+    rms: Array
+    correlation: tuple[float | None, ...]
+    notes: tuple[str, ...] = ()
+
+
+def compare(measured: Wrench, simulated: Wrench, mask: NDArray[np.bool_] | None = None) -> Agreement:
+    """Compare two wrenches of the same times over the frames where ``mask`` (T,) is True (all frames without it).
+
+    Frames in which either wrench is not known (NaN) are left out, and said.
+
+    Raises
+    ------
+    BiodanceError
+        The two wrenches do not have the same times, or the mask has another length.
+    TrialRefused
+        No frame is left to compare.
+    """
+    if measured.time.shape != simulated.time.shape or not np.allclose(measured.time, simulated.time, rtol=0, atol=1e-6):
+        raise BiodanceError(
+            f"The wrenches have different times ({measured.time.size} and {simulated.time.size} frames). Prepare the "
+            f"trial first."
+        )
+    chosen = np.ones(measured.time.size, dtype=bool) if mask is None else np.asarray(mask, dtype=bool)
+    if chosen.shape != measured.time.shape:
+        raise BiodanceError(f"The mask has {chosen.size} frames, the wrenches have {measured.time.size}.")
+    known = np.isfinite(measured.value).all(axis=1) & np.isfinite(simulated.value).all(axis=1)
+    used = chosen & known
+    if not used.any():
+        raise TrialRefused(
+            f"No frame is left to compare: {chosen.sum()} of {chosen.size} may be used, and none of them is known in "
+            f"both."
+        )
+    first, second = measured.value[used], simulated.value[used]
+    rms = np.sqrt(np.mean((first - second) ** 2, axis=0))
+    correlation = tuple(_pearson(a, b) for a, b in zip(first.T, second.T, strict=True))
+    notes = [f"{int((chosen & ~known).sum())} frames left out: not known in both."] if np.any(chosen & ~known) else []
+    flat = [name for name, value in zip(CHANNELS, correlation, strict=True) if value is None]
+    if flat:
+        why = f"only {used.sum()} frames" if used.sum() < LEAST_FRAMES else "constant"
+        notes.append(f"No correlation of {', '.join(flat)}: {why}.")
+    return Agreement(int(used.sum()), rms, correlation, tuple(notes))
+
+
+def _pearson(first: Array, second: Array) -> float | None:
+    """Return Pearson's correlation of two signals (T,); None where one of them does not vary or there are too few
+    samples.
+    """
+    if first.size < LEAST_FRAMES:
+        return None
+    a, b = first - first.mean(), second - second.mean()
+    flat = [np.linalg.norm(centred) <= 1e-9 * np.linalg.norm(signal) for centred, signal in ((a, first), (b, second))]
+    return None if any(flat) else float(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1.0, 1.0))

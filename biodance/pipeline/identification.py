@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.anthropometry import error_size
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
@@ -20,10 +20,9 @@ from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import TorqueBands, torque_bands
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
-from biodance.motion.comparison import Agreement, compare
 from biodance.motion.contact.contact import foot_wrenches, ground_contact
 from biodance.motion.contact.soles import soles_from_body
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
 from biodance.pipeline.trial_result import Check, TrialResult, trial_fit
 from biodance.records import ROLES, SIDES, Role, Sip

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.body.body import Body
 from biodance.cycles.curves import NormalCurve
+from biodance.cycles.cut import STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement, trial_movement
-from biodance.cycles.steps import STRIDE_UNITS
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.c3d.subject import FileOutputs, read_outputs
 from biodance.motion.contact.contact import Contact, ground_contact

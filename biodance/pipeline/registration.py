@@ -10,7 +10,7 @@ from biodance.diagnosis.problem import Look
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
-from biodance.lab.session.registered import registered_folder, write_registered
+from biodance.lab.session.write import registered_folder, write_registered
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track

@@ -20,9 +20,8 @@ from biodance.identification.validation import TrialValidation, residual_ratio
 from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.robot.recording import RobotRecording, read_robot_recording
 from biodance.motion.clocks import fit_plate, onto_plate
-from biodance.motion.comparison import Agreement, compare
 from biodance.motion.grounded import RATE
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import cause_words, misweighed, of_file, refusals, told_of, weights

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biodance.cycles.cut import PERCENT
+from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.steps import STRIDE_UNITS
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.identification import SessionIdentification

@@ -13,10 +13,9 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.gaps import MarkerGaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
-from biodance.motion.comparison import compare
 from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.regressor import compare, predict_wrench
 from biodance.motion.track import track
 from biodance.pipeline.standing import quiet_standing
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison

@@ -9,8 +9,7 @@ from biodance.body.human.skeleton import kind_of
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array, Index
 from biodance.spatial import skew
-from biodance.uncertainty.response import Response, centres_of_mass
-from biodance.uncertainty.source import ErrorSource, mean_local, mean_squares
+from biodance.uncertainty.response import ErrorSource, Response, centres_of_mass, mean_local, mean_squares
 
 
 @dataclass(frozen=True, eq=False)

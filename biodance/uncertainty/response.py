@@ -1,5 +1,5 @@
 """How a trial answers small displacements: of its markers, of its centres of mass, of its segments - and the same
-backwards.
+backwards; and what one kind of elementary error must be able to say of itself.
 
 Markers moved by x (m) are followed by the coordinates, dq = -(J'DJ)^-1 J'D x with D the marker weights (first order
 of the inverse kinematics). A displacement u (m, lab) of a segment's CoM and a turn r (rad, lab) of the segment change
@@ -11,6 +11,7 @@ from the rate of momentum and angular momentum (docs/derivations.md, section 16)
 `Response.wrench` goes forward, `Response.back` is its exact transpose.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -21,7 +22,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, SegmentMotion, place_jacobian, poses, segment_motion, tangent_of
+from biodance.motion.kinematics import Poses, SegmentMotion, chains, place_jacobian, poses, segment_motion, tangent_of
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -197,3 +198,59 @@ def central_inertia(body: Body) -> Array:
         tensor[:, i, j] = tensor[:, j, i] = table[:, column]
     square = np.sum(com**2, axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
     return np.asarray(tensor - table[:, 0, None, None] * square)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorSource(ABC):
+    """One kind of error of ``body``: K elementary errors of unit size."""
+
+    body: Body
+
+    @property
+    @abstractmethod
+    def groups(self) -> tuple[str, ...]:
+        """(K,) kind and place of every error, sides alike, as in the table of sizes: ``slide thigh``."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """(K,) the joint of the body that every error belongs to, ``right_hip``; "" for errors of skin and flesh."""
+        return ("",) * len(self.groups)
+
+    @abstractmethod
+    def functional(self, trial: Response) -> Array:
+        """Return the functionals (F, 18, K) of the wrench of every error in a trial."""
+
+    @abstractmethod
+    def residual(self, trial: Response) -> Array:
+        """Return the mean residual (M, 3, K) m of every marker, model less measured, in segment axes."""
+
+    def transpose(self, trial: Response, back: Array) -> Array:
+        """Return (K, p): sum over time of what ``back`` (F, 18, p) weighs on functionals, times those of every
+        error.
+        """
+        return np.tensordot(self.functional(trial), back, axes=((0, 1), (0, 1)))
+
+    @abstractmethod
+    def squares(self, trial: Response) -> Array:
+        """Return (K,) mean square distance (m²) between markers and model that every error leaves."""
+
+
+def neighbours(body: Body) -> Array:
+    """Return (n, N) 1 where an anatomical joint (all its axes) is at an end of a segment."""
+    table = np.zeros((len(body.joints), len(body.segments)))
+    for chain in chains(body):
+        child, above = body.joints[chain[-1]].segment, body.joints[chain[0]].parent
+        table[np.ix_(chain, (child, 0 if above < 0 else body.joints[above].segment))] = 1.0
+    return table
+
+
+def mean_local(trial: Response, residual: Array, weight: Array) -> Array:
+    """Return (M, 3, P * n): mean over time of residuals (F, 3M, P) in segment axes, times ``weight`` (F, n)."""
+    frames, worn = len(residual), list(trial.body.markers.segment)
+    local = np.swapaxes(trial.pose.rotation[:, worn], -1, -2) @ residual.reshape(frames, len(worn), 3, -1)
+    return np.asarray(local.reshape(frames, -1).T @ weight / frames).reshape(len(worn), 3, -1)
+
+
+def mean_squares(left: Array) -> Array:
+    """Return (K,) mean square distance of markers that are ``left`` (F, 3M, K) m from the model."""
+    return np.asarray(3 * np.mean(left**2, axis=(0, 1)))

@@ -11,8 +11,7 @@ from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
 from biodance.records import Array, Index
 from biodance.spatial import cross
-from biodance.uncertainty.response import Response
-from biodance.uncertainty.source import ErrorSource, mean_local, mean_squares, neighbours
+from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares, neighbours
 
 
 class _WithAngles(ErrorSource):

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.body.tables.anthropometry import error_size, joint_size
 from biodance.errors import UnknownName
 from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt
-from biodance.uncertainty.response import Response
+from biodance.uncertainty.response import ErrorSource, Response
 from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
-from biodance.uncertainty.source import ErrorSource
 
 
 def deviations(body: Body, sources: tuple[ErrorSource, ...]) -> Array:

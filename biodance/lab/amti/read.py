@@ -11,8 +11,7 @@ from biodance.lab.amti.text import parse_amti_text
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.parameters import INCH, POUND
-from biodance.lab.plates.signs import DEEPEST, gravity_sign, sensor_below
-from biodance.lab.plates.wrench import wrench_in_lab
+from biodance.lab.plates.wrench import DEEPEST, gravity_sign, sensor_below, wrench_in_lab
 from biodance.lab.plates.zero import find_baseline
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY

@@ -13,7 +13,7 @@ from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.plain_text import read_text
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
-from biodance.lab.plates.signs import DEEPEST
+from biodance.lab.plates.wrench import DEEPEST
 from biodance.library import read_toml
 from biodance.records import CHANNELS, Array
 

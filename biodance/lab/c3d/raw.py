@@ -1,8 +1,9 @@
-"""What a C3D file says, in its own units and axes: bytes made safe, markers and model outputs told apart, nothing
-interpreted yet.
+"""What a C3D file says, in its own axes: bytes made safe, markers and model outputs told apart; and which length its
+numbers mean: POINT:UNITS says it, the size of a person and of a plate checks it.
 """
 
 import hashlib
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -14,12 +15,94 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.layout import Layout, read_layout, texts
+from biodance.lab.c3d.layout import Layout, parameter_numbers, read_layout, texts
 from biodance.lab.c3d.numbers import Numbers, read_numbers, second_opinion
 from biodance.lab.c3d.parameters import RESAVE, Parameters, read_header, read_parameters
-from biodance.lab.c3d.units import metres_per_unit
 from biodance.lab.plain_text import refuse_huge
 from biodance.records import Array
+
+_METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
+SPELLINGS = {
+    "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
+    "cm": ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
+    "dm": ("dm", "decimeter", "decimeters", "decimetre", "decimetres"),
+    "m": ("m", "meter", "meters", "metre", "metres"),
+    "in": ("in", "inch", "inches"),
+}
+GUESSES = ("mm", "cm", "m")
+PERSON = 1.5
+"""m, the largest extent of the markers on a person: about 0.9 m for legs alone, up to 2.3 m with arms spread or
+raised.
+"""
+
+PLATE = 0.6
+"""m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets."""
+
+_CORNERS = ("FORCE_PLATFORM", "CORNERS")
+BELIEVABLE = (0.05, 4.75)
+"""Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is
+overruled.
+"""
+
+
+def metres_per_unit(
+    parameters: Parameters, points: Array, *, where: str
+) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
+    """Return the length of one file unit in metres, history and warnings.
+
+    ``points`` (T, K, 3) are the markers in file units. A missing or unknown unit, and one that would make the person or
+    the plates smaller than 5 cm or larger than 4.75 m, is decided by sense among mm, cm and m, and said so.
+
+    Raises
+    ------
+    FileRefused
+        The unit is missing and neither markers nor plates tell it.
+    """
+    written = next(iter(texts(parameters, "POINT", "UNITS")), "")
+    unit = next((unit for unit, spellings in SPELLINGS.items() if written.strip(" .").casefold() in spellings), "")
+    size, expected, what = _size(parameters, points)
+    if unit and (math.isnan(size) or BELIEVABLE[0] <= size * _METRES[unit] <= BELIEVABLE[1]):
+        return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
+    if math.isnan(size) and not np.isfinite(points).any() and not parameter_numbers(parameters, *_CORNERS).size:
+        return _METRES["mm"], ("The file holds no lengths, so its unit of length does not matter.",), ()
+    if math.isnan(size):
+        raise FileRefused(
+            f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
+            f"m). "
+            "Write the unit into the file and read it again."
+        )
+    guess = min(GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
+    said = f"POINT:UNITS is {written!r}; {what} of {size:.4g} can only be in {guess}, so lengths are in {guess}."
+    return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
+
+
+_FRAMES = 4096
+"""Frames looked at at once: little memory, however long the recording."""
+
+
+def _extents(points: Array) -> Array:
+    """Return the largest side of the box about the markers (T, K, 3) in frames that show four of them."""
+    frames = points[np.isfinite(points).all(axis=2).sum(axis=1) >= 4]
+    if not len(frames):
+        return np.empty(0)
+    return np.asarray((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1))
+
+
+def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
+    """Return a length in file units, what it should be in metres, and its name; NaN if the file holds none."""
+    parts = [_extents(points[start : start + _FRAMES]) for start in range(0, len(points), _FRAMES)]
+    extents = np.concatenate([*parts, np.empty(0)])
+    if extents.size:
+        extent = float(np.median(extents))
+        if 0 < extent < math.inf:
+            return extent, PERSON, "a cloud of markers"
+    corners = parameter_numbers(parameters, *_CORNERS)
+    if corners.size >= 12 and np.isfinite(corners).all():
+        longest = float(np.linalg.norm(np.diff(corners[:12].reshape(4, 3), axis=0), axis=1).max())
+        if 0 < longest < math.inf:
+            return longest, PLATE, "a plate side"
+    return math.nan, PERSON, ""
+
 
 GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
 """Parameters of POINT in which the results are listed; POINT:TYPE_GROUPS may name more."""
@@ -159,10 +242,6 @@ def _smells(
     if opinion == "confirmed":
         return (f"{smell}; ezc3d finds the same numbers.",), "biodance, ezc3d"
     return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
-
-
-_FRAMES = 4096
-"""Frames looked at at once: little memory, however long the recording."""
 
 
 def _leaps(points: Array, parameters: Parameters) -> int:

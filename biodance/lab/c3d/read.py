@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
-from biodance.lab.c3d.units import metres_per_unit
 from biodance.lab.c3d.vertical import turn_to_z_up
 from biodance.lab.markers.sets import recognise
 from biodance.records import Array, Markers, Plate, Role, Source, Trial

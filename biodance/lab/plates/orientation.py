@@ -9,8 +9,7 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.lab.plates.corners import half_sides, plate_axes
 from biodance.lab.plates.signals import LEAST_BESIDE, PlateReading
-from biodance.lab.plates.signs import gravity_sign, sway_sign
-from biodance.lab.plates.wrench import FOUR_SENSORS, centre_of_pressure, wrench_in_lab
+from biodance.lab.plates.wrench import FOUR_SENSORS, centre_of_pressure, gravity_sign, sway_sign, wrench_in_lab
 from biodance.records import Array, Markers, Plate, Wrench
 
 LOW = 0.15  # m above the surface: markers of a standing foot, ankle included

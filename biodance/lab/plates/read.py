@@ -12,7 +12,7 @@ from biodance.lab.plates.corners import plate_axes
 from biodance.lab.plates.orientation import oriented
 from biodance.lab.plates.parameters import POUND, count_plates, plate_parameters
 from biodance.lab.plates.signals import PlateReading, read_plate_signals
-from biodance.lab.plates.signs import gravity_sign
+from biodance.lab.plates.wrench import gravity_sign
 from biodance.lab.weight import movement, steady_mass
 from biodance.records import Array, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules

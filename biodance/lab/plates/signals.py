@@ -11,12 +11,14 @@ from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.plates.corners import corners_in_lab, half_sides, plate_axes
 from biodance.lab.plates.parameters import CONTENT, PlateParameters, unit_factors, zero_window
-from biodance.lab.plates.signs import DEEPEST, loaded_samples, sensor_below
 from biodance.lab.plates.wrench import (
+    DEEPEST,
     FOUR_SENSORS,
     calibrated,
     centre_of_pressure,
+    loaded_samples,
     polynomial_corrected,
+    sensor_below,
     sensor_wrench,
     surface_vector,
 )

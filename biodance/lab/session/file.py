@@ -19,9 +19,9 @@ filter.cutoff = 6
 ``[markers] map = {LASI = "left_asis", BACK4 = "trunk_head"}`` says it here: which label is which landmark, or sits on
 which segment.
 
-``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.girths`),
+``[subject] girths_cm = {thigh = 54, right_shank = 37}`` says how thick the person is (`lab.shape`),
 ``foot_outline = {length = 26, breadth = 10, heel_breadth = 7}`` (cm) or ``"feet.csv"`` how large the feet are
-(`lab.foot_outline`), ``scan = "body.obj"`` names the closed surface of the standing person, in m (``scan_up`` its axis
+(`lab.shape`), ``scan = "body.obj"`` names the closed surface of the standing person, in m (``scan_up`` its axis
 that points up, by default z).
 
 ``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
@@ -41,8 +41,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.foot_outline import traced_outline, typed_outline
-from biodance.lab.girths import legal_girths
+from biodance.lab.shape import legal_girths, traced_outline, typed_outline
 from biodance.library import read_toml
 from biodance.records import FootSizes, Role
 from biodance.settings import USUAL, Settings

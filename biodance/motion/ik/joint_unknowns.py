@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.human.static_centres import Centres
-from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.body.tables.anthropometry import error_size, joint_size
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import SIDES, Array
 from biodance.spatial import axis_rotation, skew
@@ -30,6 +30,12 @@ FAULTY = 3.0
 """Times its standard deviation by which a centre that the movement contradicts may be off, or a marker that has moved:
 such an error is a fault, and faults are as rare and as large as the diagnosis takes them
 (`biodance.diagnosis.candidates.SCALE`).
+"""
+
+
+MISSED = 0.015
+"""m per axis by which a centre is typically off where it is wrong: regressions for the hip miss by 12.3 mm (Harrington)
+to 25 mm (Davis; Mantovani 2016).
 """
 
 

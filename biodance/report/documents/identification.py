@@ -13,7 +13,7 @@ from biodance.identification.load_words import say_load
 from biodance.identification.sessions import Difference
 from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import ResidualRatio, TrialValidation
-from biodance.motion.comparison import Agreement
+from biodance.motion.regressor import Agreement
 from biodance.pipeline.identification import SessionIdentification
 
 _TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")

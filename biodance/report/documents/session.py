@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from biodance.cycles.curves import CurveGroup
-from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.cut import PERCENT, STRIDE_UNITS, Cycle
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.steps import STRIDE_UNITS
-from biodance.motion.comparison import Agreement
+from biodance.motion.regressor import Agreement
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult

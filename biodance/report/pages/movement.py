@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.cycles.curves import CurveGroup, NormalCurve
-from biodance.cycles.cut import PERCENT
+from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.steps import STRIDE_UNITS
 from biodance.display import GREY
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.movement import SessionMovement

@@ -18,7 +18,7 @@ from biodance.lab.c3d.write import PlateRecording
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters, unit_factors
 from biodance.lab.plates.signals import vector_under_load
-from biodance.lab.plates.signs import gravity_sign, sensor_below
+from biodance.lab.plates.wrench import gravity_sign, sensor_below
 from biodance.records import Array, Markers
 from biodance.virtual_lab.recording.laboratory import Fault, Recording
 

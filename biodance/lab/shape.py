@@ -1,17 +1,80 @@
-"""Both feet's outlines as somebody drew round or measured them: length, breadth, breadth of the heel; given in cm, in a
-table or as traced points.
+"""What somebody measured of a person's shape: girths, which are known by name and which values a person can have
+(`anthropometry/human/girths.csv`); and the outlines of both feet in cm, in a table, or as traced points.
 """
 
 import csv
+import functools
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from biodance.errors import SessionRefused
+from biodance.library import locate
 from biodance.records import SIDES, Array, FootSizes
 
-_LEGAL = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}
+_ALIASES = {"calf": "shank"}
+"""What else a girth is called."""
+_LEGAL = (0.4, 2.2)
+"""Of the usual girth: smaller or larger ones are another unit or a slip of the pen."""
+_MIDDLE = ("hip", "waist", "chest", "neck", "head")
+
+
+@functools.cache
+def usual_girths() -> Mapping[str, float]:
+    """Return the usual girth of an adult in m, by name, the sexes' mean."""
+    with locate("anthropometry/human", "girths", ".csv").open(encoding="utf-8") as file:
+        found = {row["girth"]: (float(row["F"]) + float(row["M"])) / 2 for row in csv.DictReader(file)}
+    return MappingProxyType(found)
+
+
+def legal_girths(given: Mapping[str, float]) -> dict[str, float]:
+    """Return girths (m) by name: ``thigh`` of both sides, ``right_thigh`` of one; a calf is the girth of the shank.
+
+    Raises
+    ------
+    SessionRefused
+        A name is not known, stands for two entries, has a side that it cannot have, or the value is no person's.
+    """
+    found: dict[str, float] = {}
+    for said, value in given.items():
+        side = next((f"{side}_" for side in SIDES if said.startswith(f"{side}_")), "")
+        short = said.removeprefix(side)
+        name = _ALIASES.get(short, short)
+        if name not in usual_girths() or (side and name in _MIDDLE):
+            raise SessionRefused(_unknown(said))
+        if f"{side}{name}" in found:
+            raise SessionRefused(f"girths_cm: {side}{name} is given twice (also as {said!r}). Keep one of the two.")
+        _refuse_impossible(said, value, usual_girths()[name])
+        found[f"{side}{name}"] = float(value)
+    return found
+
+
+def _unknown(said: str) -> str:
+    legal = (*usual_girths(), *_ALIASES)
+    close = get_close_matches(said, legal, n=1)
+    hint = f" Did you mean {close[0]!r}?" if close else ""
+    return (
+        f"girths_cm: there is no girth {said!r}.{hint} Legal: {', '.join(legal)}; with right_ or left_ before those "
+        "of arms and legs."
+    )
+
+
+def _refuse_impossible(said: str, value: float, usual: float) -> None:
+    low, high = (share * usual for share in _LEGAL)
+    if low <= value <= high:
+        return
+    units = {"mm": value / 10, "m": value * 100, "inch": value * 2.54}
+    unit = next((unit for unit, one in units.items() if 0.6 * usual <= one <= 1.6 * usual), "")
+    hint = f" It looks like {unit}: write {100 * units[unit]:.1f}." if unit else " Measure again, in cm."
+    raise SessionRefused(
+        f"girths_cm: {said} = {100 * value:g} cm is no person's. Legal: {100 * low:.0f} to {100 * high:.0f} cm.{hint}"
+    )
+
+
+_LEGAL_SIZES = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}
 """m."""
 _HEEL = 0.15
 """Share of the length, from the heel, at which its breadth is measured."""
@@ -27,15 +90,15 @@ def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:
     """
     for name, value in given.items():
         short = next((name.removeprefix(f"{side}_") for side in SIDES if name.startswith(f"{side}_")), name)
-        if short not in _LEGAL:
+        if short not in _LEGAL_SIZES:
             raise SessionRefused(
-                f"foot_outline: there is no size {name!r}. Legal: {', '.join(_LEGAL)}, with right_ or left_ before "
-                "for one foot."
+                f"foot_outline: there is no size {name!r}. Legal: {', '.join(_LEGAL_SIZES)}, with right_ or left_ "
+                "before for one foot."
             )
-        _refuse_impossible(name, value, short)
+        _refuse_impossible_size(name, value, short)
     found: dict[str, FootSizes] = {}
     for side in SIDES if given else ():
-        sizes = {name: given.get(f"{side}_{name}", given.get(name)) for name in _LEGAL}
+        sizes = {name: given.get(f"{side}_{name}", given.get(name)) for name in _LEGAL_SIZES}
         missing = [name for name, value in sizes.items() if value is None]
         if missing:
             raise SessionRefused(
@@ -45,8 +108,8 @@ def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:
     return found
 
 
-def _refuse_impossible(name: str, value: float, short: str) -> None:
-    low, high = _LEGAL[short]
+def _refuse_impossible_size(name: str, value: float, short: str) -> None:
+    low, high = _LEGAL_SIZES[short]
     if low <= value <= high:
         return
     unit = next((unit for unit, one in (("mm", value / 10), ("m", value * 100)) if low <= one <= high), "")
@@ -94,7 +157,7 @@ def _sizes(points: Array) -> FootSizes:
     heel = _breadth(x, points[:, 1], _HEEL * length)
     sizes = {"length": length, "breadth": float(np.ptp(points[:, 1])), "heel_breadth": heel}
     for name, value in sizes.items():
-        _refuse_impossible(name, value, name)
+        _refuse_impossible_size(name, value, name)
     return FootSizes(**sizes)
 
 

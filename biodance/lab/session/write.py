@@ -1,0 +1,258 @@
+"""A session's own files: ``biodance init`` writes what was guessed into session.toml, to be confirmed or corrected;
+markers and registered plates are written as an ordinary session, one C3D file with both.
+"""
+
+import json
+import math
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biodance.errors import SessionRefused
+from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.markers.sets import GUESSED
+from biodance.lab.session.file import FILES
+from biodance.lab.session.read import read_session
+from biodance.lab.session.results_folder import made_folder
+from biodance.records import Array, Markers, Plate, Session, Subject, Trial
+from biodance.spatial import wrench_about_point
+
+FILE = "session.toml"
+
+
+def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict[str, Any]:
+    """Read a session and write what was found and guessed of it into its session.toml.
+
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        With the recordings of one visit, and no session.toml yet.
+    subject_name : str, optional
+        Chooses the person in C3D files that hold several.
+
+    Returns
+    -------
+    dict
+        ``file`` that was written; ``subject`` {name, mass_kg, height_m, sex, age, guessed: [names]}; ``trials``
+        [{name, role, why}]; ``marker_set`` name, "guessed" or None; ``marker_map`` label -> landmark or segment where
+        it was guessed, else None; ``plates`` [{trial, name, type, decisions}]; ``refused`` file -> reason; ``notes``.
+
+    Raises
+    ------
+    SessionRefused
+        There is a session.toml already, or the session cannot be read.
+
+    Examples
+    --------
+    >>> from biodance.lab.session.write import init_session
+    >>> init_session("visit")
+    Traceback (most recent call last):
+    biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
+    """
+    target = Path(folder) / FILE
+    _refuse_existing(target)
+    session = read_session(folder, subject_name=subject_name)
+    found = _found(session, target)
+    _refuse_existing(target)
+    lines = [" ".join(line.split()) for line in _lines(found)]
+    with open(target, "x", encoding="utf-8") as stream:
+        stream.write("\n".join(lines) + "\n")
+    return found
+
+
+def _refuse_existing(target: Path) -> None:
+    if target.exists():
+        raise SessionRefused(
+            f"{target} is there already, and nothing of yours is overwritten. Correct it, or move it away and run this "
+            f"again."
+        )
+
+
+def _found(session: Session, target: Path) -> dict[str, Any]:
+    """Return what the file will say, as plain values."""
+    worn = next((trial.marker_set for trial in _statics_first(session) if trial.marker_set), "")
+    plates = [
+        {"trial": trial.name, "name": plate.name, "type": plate.type, "decisions": list(plate.decisions)}
+        for trial in session.trials
+        for plate in trial.plates
+    ]
+    return {
+        "file": str(target),
+        "subject": _subject(session.subject),
+        "trials": [
+            {"name": trial.source.path.stem, "role": trial.role, "why": _why(session, trial)}
+            for trial in session.trials
+        ],
+        "marker_set": worn.partition(" {")[0] or None,
+        "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
+        "plates": plates,
+        "refused": dict(session.refused),
+        "notes": list(session.notes),
+    }
+
+
+def _statics_first(session: Session) -> list[Trial]:
+    return sorted(session.trials, key=lambda trial: trial.role != "static")
+
+
+def _subject(subject: Subject) -> dict[str, Any]:
+    numbers = {"mass_kg": subject.mass, "height_m": subject.stature, "age": subject.age}
+    known = {key: float(f"{value:.4g}") if math.isfinite(value) else None for key, value in numbers.items()}
+    return {"name": subject.name, **known, "sex": subject.sex, "guessed": list(subject.guessed)}
+
+
+def _why(session: Session, trial: Trial) -> str:
+    start = f"{trial.name} has the role {trial.role}: "
+    return next((note.removeprefix(start).rstrip(".") for note in session.notes if note.startswith(start)), "")
+
+
+def _lines(found: dict[str, Any]) -> Iterator[str]:
+    """Yield the lines of the file; every guess and every doubt is a comment beside what it is about."""
+    yield "# Written by biodance init: what the recordings say, and what was guessed. Correct what is wrong."
+    for note in found["notes"]:
+        if " has the role " not in note and "the map was guessed" not in note:
+            yield f"# {note}"
+    for file, reason in found["refused"].items():
+        yield f"# {file} was refused: {reason}"
+    yield from ("", "[subject]")
+    subject = found["subject"]
+    guessed = {"mass_kg": "mass", "height_m": "stature", "sex": "sex"}
+    for key in ("mass_kg", "height_m", "sex", "age"):
+        value = subject[key]
+        remark = "  # guessed" if guessed.get(key) in subject["guessed"] else ""
+        yield f"{key} = {json.dumps(value)}{remark}" if value is not None else f"# {key} =   not known"
+    for trial in {trial["name"]: trial for trial in found["trials"]}.values():
+        yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'role = "{trial["role"]}"  # {trial["why"]}')
+    yield from ("", *_marker_lines(found))
+    for plate in found["plates"]:
+        yield f"# {plate['trial']}: {plate['name']}, TYPE {plate['type']}. {' '.join(plate['decisions'])}".rstrip()
+
+
+def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
+    if found["marker_map"] is None:
+        worn = found["marker_set"]
+        yield "[markers]" if worn else '# [markers]  no marker set is known; file = "set.toml", or map = {...}'
+        if worn:
+            yield f"file = {json.dumps(worn)}  # recognised by its labels"
+    else:
+        yield "# Guessed from the names and from where the markers are on the standing person; a wrong map is worse"
+        yield "# than none: compare it with what you placed. Legal are landmarks (left_asis) and segments (left_thigh)."
+        yield "[markers.map]"
+        for label, place in sorted(found["marker_map"].items(), key=lambda item: (item[1].split("_")[-2:], item[0])):
+            yield f"{json.dumps(label)} = {json.dumps(place)}"
+    yield ""
+
+
+MARK = "registration.json"
+"""Name of the file that says that a folder was written by `biodance register`."""
+_BESIDE = (".mp", ".vsk", ".enf", ".toml")
+"""What belongs to a session beside its recordings."""
+
+
+def registered_folder(folder: Path, *, force: bool) -> Path:
+    """Return the folder for a registered session, which is missing, empty, or with ``force`` an earlier one; nothing is
+    made or removed yet.
+
+    Raises
+    ------
+    SessionRefused
+        It is a file, or holds files: others' always, those of an earlier registration without ``force``.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise SessionRefused(f"{folder}: is a file; a session needs a folder. Choose another name.")
+    files = sorted(folder.iterdir()) if folder.is_dir() else []
+    if files and not (folder / MARK).is_file():
+        raise SessionRefused(
+            f"{folder}: holds files that biodance did not write ({files[0].name}). Choose another name."
+        )
+    if files and not force:
+        raise SessionRefused(f"{folder}: holds an earlier registration. Choose another name, or --force.")
+    return folder
+
+
+def write_registered(
+    folder: Path, session: Session, trial: Trial, plates: Sequence[Plate], *, said: Mapping[str, Any]
+) -> Path:
+    """Write ``trial`` (as read, any format) with ``plates`` in the room and on the markers' clock into ``folder``, the
+    static trials and the subject's files of its ``session`` beside it, and what was ``said`` of the plates as
+    `registration.json`; return the C3D file. An earlier registration in the folder is replaced.
+
+    Frames of markers that the plates do not cover are left out, as C3D holds no unknown force.
+
+    Raises
+    ------
+    SessionRefused
+        The two share no time.
+    """
+    assert trial.markers is not None
+    markers, recordings, rate = _common(trial.markers, plates)
+    _emptied(made_folder(folder))
+    path = folder / f"{trial.source.path.stem}.c3d"
+    first = trial.source.first_frame + int(np.searchsorted(trial.markers.time, markers.time[0]))
+    measures = {name: value if "mass" in name.lower() else 1000.0 * value for name, value in trial.measurements.items()}
+    write_c3d(
+        path,
+        markers=markers,
+        plates=recordings,
+        analog_rate=rate,
+        parameters={"PROCESSING": dict(measures)} if measures else None,
+        first_frame=first,
+    )
+    own = trial.source.path.parent
+    for static in session.of_role("static"):
+        if static.source.path != trial.source.path:
+            shutil.copyfile(static.source.path, folder / static.source.path.name)
+    for file in sorted(own.iterdir()):
+        if file.is_file() and file.suffix.lower() in _BESIDE:
+            shutil.copyfile(file, folder / file.name)
+    for name in FILES:
+        if (own.resolve().parent / name).is_file() and not (folder / name).exists():
+            shutil.copyfile(own.resolve().parent / name, folder / name)
+    (folder / MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def _emptied(folder: Path) -> None:
+    """Remove what an earlier registration wrote."""
+    if (folder / MARK).is_file():
+        for file in folder.iterdir():
+            if file.is_file() and (file.suffix == ".c3d" or file.name in FILES or file.name == MARK):
+                file.unlink()
+
+
+def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[PlateRecording], float]:
+    """Return the markers within the plates' time and what the plates record at a whole multiple of their rate."""
+    from scipy.interpolate import make_interp_spline
+
+    time = plates[0].wrench.time
+    many = max(1, round(plates[0].wrench.rate / markers.rate))
+    step = 1.0 / markers.rate
+    kept = np.flatnonzero((markers.time >= time[0]) & (markers.time + (many - 1) / many * step <= time[-1]))
+    if kept.size < 2:
+        raise SessionRefused("Markers and plates share no time, so there is nothing to write.")
+    seen = Markers(markers.names, markers.time[kept], markers.xyz[kept])
+    fine = (seen.time[:, None] + step / many * np.arange(many)).ravel()
+    recordings = []
+    for plate in plates:
+        value = make_interp_spline(time, plate.wrench.value, k=3)(fine)
+        recordings.append(_recording(plate.corners, np.asarray(value)))
+    return seen, recordings, many * markers.rate
+
+
+def _recording(corners: Array, value: Array) -> PlateRecording:
+    """Return a plate of TYPE 2, z down, from the wrench (S, 6) about the room's origin."""
+    right, up = corners[[0, 3]].mean(axis=0) - corners[[1, 2]].mean(axis=0), corners[[0, 1]].mean(axis=0)
+    y = up - corners[[2, 3]].mean(axis=0)
+    if np.cross(right, y)[2] > 0:
+        corners = corners[[1, 0, 3, 2]]
+        right = -right
+    x = right / np.linalg.norm(right)
+    z = np.cross(x, y)
+    z = z / np.linalg.norm(z)
+    turn = np.stack([x, np.cross(z, x), z], axis=1)
+    local = wrench_about_point(value, corners.mean(axis=0))
+    channels = np.concatenate([local[:, :3] @ turn, local[:, 3:] @ turn], axis=1)
+    return PlateRecording(2, corners, np.zeros(3), channels)

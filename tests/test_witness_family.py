@@ -1,0 +1,40 @@
+"""The family of witnesses keeps its contract: every file is a member, objects join, strangers are refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from walking import MASS, walk
+
+from biodance.effects import causes
+from biodance.errors import BiodanceError
+from biodance.witnesses import FAMILY, Observation, SeenTrial, Witness, observe, recording, witnesses
+
+NAMES = tuple(path.stem for path in Path(FAMILY.package.replace(".", "/")).glob("[a-z]*.py"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_file_of_the_folder_is_a_witness(name: str) -> None:
+    member = witnesses()[name]
+    assert member.name == name
+    assert set(member.sees) <= set(causes())
+    assert member.needs.endswith(".")
+    assert member.look(recording(replace(walk(), markers=None, plates=()))) == ()
+    for one in member.look(recording(walk(), mass=MASS)):
+        assert one.witness == name
+        assert one.sd > 0
+        assert one.expected_sd >= one.sd
+
+
+def test_objects_join_and_strangers_are_refused() -> None:
+    class Loud(Witness):
+        """Hears one thing."""
+
+        name, sees, needs, source = "loud", ("time_delay",), "Silence.", "nobody"
+
+        def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+            return (Observation("loud", "noise", seen.trial.name, 1.0, 1.0, 0.0, "1"),)
+
+    assert [one.witness for one in observe(recording(walk()), ["foot_outline", Loud()])][-1] == "loud"
+    with pytest.raises(BiodanceError, match="it is no witness"):
+        witnesses([object()])  # type: ignore[list-item]
