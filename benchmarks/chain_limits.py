@@ -92,10 +92,7 @@ def main() -> None:
         for way, rows in found.items():
             rows.append(row(chosen.folder, number, way, visit))
     print(f"{len(who)} sessions a way")
-    print(
-        "| dance | mass, kg: table, danced | removed | CoM, mm: table, danced | removed | left by the table | added by"
-    )
-    print("  the data | 95 % intervals hold mass, CoM |\n|" + "---|" * 8)
+    print(_HEADING)
     for way, rows in found.items():
         print(line(way, rows))
 
