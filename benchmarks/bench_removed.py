@@ -37,6 +37,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
+from biodance.records import CHANNELS
 from biodance.virtual_lab.faults.causes import parse_cause
 
 UNKNOWN = "unknown"
@@ -67,6 +68,12 @@ SAME = {
 """Other names of the same thing: a bone of another length is a joint elsewhere; a drift from zero on is a drift about
 its middle and an offset. The foreign clock drifts about the middle of a session of which only the dances are judged:
 their mean delay is -7 ms."""
+_DRAWN = {
+    "plate_position": ("position_error_m", 0.0), "plate_rotation": ("rotation_error_rad", 0.0),
+    "time_delay": ("force_late_s", 0.0), "plate_gain": ("gain", 1.0), "plate_offset": ("offset", 0.0),
+    "plate_crosstalk": ("crosstalk", 0.0), "lab_tilt": ("gravity_tilt_rad", 0.0),
+}  # fmt: skip
+"""What the independent laboratory's own truth says of an instrument in all, and what it says of a perfect one."""
 WRONG_FROM_THE_START = ("marker_misplaced", "marker_misplaced")
 """Effect and cause of the foreign laboratory of a marker that is wrong in the static trial, too: the joint that it
 places lies elsewhere then, and that is what can be found."""
@@ -119,20 +126,23 @@ def foreign(index: int, first: int = 601) -> SessionResult:
 def written(index: int, first: int) -> Path:
     """Return the folder of a session of the independent laboratory, written once."""
     folder = CACHE / "removed_sessions" / f"{first + index}"
-    if (folder / "session.toml").is_file():
+    told = folder.with_suffix(".truth.json")
+    if (folder / "session.toml").is_file() and told.is_file():
         return folder
     _, cause, size, target = FOREIGN[index]
     sex, height, mass = PEOPLE[_person(index, first)]
     given = {"--sex": sex, "--height": height, "--mass": mass, "--cause": cause, "--size": size, "--target": target}
-    told = [str(text) for pair in given.items() if pair[1] for text in pair]
+    asked = [str(text) for pair in given.items() if pair[1] for text in pair]
     script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
-    command = [sys.executable, str(script), "--seed", str(first + index), *ROOM, *told, "--trials", "4"]
+    command = [sys.executable, str(script), "--seed", str(first + index), *ROOM, *asked, "--trials", "4"]
     with tempfile.TemporaryDirectory() as there:
         subprocess.run([*command, "--out", f"{there}/s"], check=True, stdout=subprocess.DEVNULL)
         for squat in Path(there, "s").glob("squat*"):
             squat.unlink()
+        shutil.rmtree(folder, ignore_errors=True)
         folder.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(f"{there}/s", folder)
+        shutil.move(f"{there}/s.truth.json", told)
     return folder
 
 
@@ -172,6 +182,22 @@ def truth(one: Answer) -> float:
     units = {"body_mass": mass, "plate_rotation": np.pi / 180, "lab_tilt": np.pi / 180, "plate_drift": _JUDGED}
     alike = effect not in {"head_joint", "trunk_joint", "filter_mismatch", "clock_drift"}
     return float(size) * units.get(effect, 1.0) if size and alike else float("nan")
+
+
+def there(one: Answer) -> float:
+    """Return the size that is there, as `size_of` gives it: what was hidden, and what the independent laboratory drew
+    of its own in the same channel, axis or clock, which nobody can tell from it; as `truth` where it draws none.
+    """
+    hidden, _, first = one.hidden.partition(" of ")
+    if one.column == "own" or one.effect not in _DRAWN:
+        return truth(one)
+    index = next(k for k, row in enumerate(FOREIGN) if " ".join(filter(None, row[1:])) == hidden)
+    name, nothing = _DRAWN[one.effect]
+    folder = written(index, int(first or 601))
+    drawn = json.loads(folder.with_suffix(".truth.json").read_text())["plate"][name]
+    places = ("xyz", CHANNELS)[FOREIGN[index][3] in CHANNELS]
+    own = drawn if isinstance(drawn, float) else drawn[places.index(FOREIGN[index][3])]
+    return abs(own - nothing)
 
 
 def answered(column: str, effect: str, said: str, result: SessionResult, *, without: bool) -> Answer:
@@ -218,8 +244,9 @@ def per_cause(found: list[Answer], column: str) -> None:
         print("", one.hidden, one.verdict, ", ".join(one.named), size, ", ".join(one.resembled),
               f"{other.verdict} {', '.join(other.named)}".strip(), "", sep=" | ")  # fmt: skip
     sized = [one for one in found if not one.without and one.column == column and one.size and truth(one) == truth(one)]
-    inside = sum(abs(one.size[0] - truth(one)) <= 1.96 * one.size[1] for one in sized)
-    print(f"intervals that cover: {inside} of {len(sized)}")
+    for size, said in ((truth, "what was written"), (there, "what is there, the laboratory's own errors included")):
+        inside = sum(abs(one.size[0] - size(one)) <= 1.96 * one.size[1] for one in sized)
+        print(f"intervals that cover {said}: {inside} of {len(sized)}")
 
 
 def main() -> None:

@@ -7,6 +7,8 @@ import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.body.human.human import human
+from biodance.body.human.optional_joints import with_optional
+from biodance.body.inertia import shift_matter
 from biodance.body.parts import JointError
 from biodance.body.tables.anthropometry import error_size
 from biodance.identification.information import Information
@@ -17,9 +19,11 @@ from biodance.identification.mismatch import (
     evident_sizes,
     mismatch,
     nothing,
+    share_errors,
     temper,
 )
 from biodance.identification.posterior import posterior
+from biodance.identification.statistics import layout_for, statistics
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import CHANNELS, Subject
 from biodance.uncertainty.bands import Bands
@@ -27,6 +31,8 @@ from biodance.uncertainty.joints import joint_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import around_zero, plate_sources
 from biodance.uncertainty.response import neighbours
+from biodance.uncertainty.plates import PLATE_SOURCES, around_zero, plate_sources
+from biodance.uncertainty.source import neighbours
 from biodance.uncertainty.sources import deviations, of_markers
 
 BANDS = Bands((0.0, 1.0, 10.0), 25.0)
@@ -157,6 +163,30 @@ def test_no_frames_make_no_scores() -> None:
     assert np.abs(some.kinematics).max() > 0
     short = replace(fit, use=np.arange(100) < 5)
     assert not np.any(mismatch(body, (short,), Noise.unit(np.zeros(3), BANDS)).kinematics)
+
+
+def test_a_heavy_head_that_nods_does_not_make_a_heavy_trunk() -> None:
+    body, rng = with_optional(human(Subject(70.0, 1.75, "M", 30.0)), "neck", {}), np.random.default_rng(9)
+    errors, trunk, (head,) = share_errors(body), body.segment_index("trunk_head"), body.parts
+    assert share_errors(human(Subject(70.0, 1.75, "M", 30.0))).shape == (120, 0)
+    _, neck = body.place_on_segment(body.segment_joint[-1])
+    np.testing.assert_allclose(shift_matter(neck) @ errors[120:] + errors[10 * trunk : 10 * trunk + 10], 0, atol=1e-12)
+    np.testing.assert_allclose(
+        errors[120, 0], error_size("segment_mass", "floor") * head.share[0] * body.sip.mass[trunk]
+    )
+    heavy = replace(body, parts=(replace(head, share=1.3 * head.share),))
+    fit = noisy_fit(heavy, smooth_motion(body, rng, frames=600, size=0.3), body.sip.phi, rng)
+    noise = layout_for(np.zeros(3))
+    total = statistics(body, fit, noise)
+    noise = replace(noise, covariance=noise.covariance * np.outer([2.0] * 3 + [0.5] * 3, [2.0] * 3 + [0.5] * 3))
+    found = mismatch(body, (fit,), noise)
+    off = [
+        posterior(temper(total.information(noise), some, Sizes(0.0, 1.7)), body.sip).mean[10 * trunk]
+        - body.sip.mass[trunk]
+        for some in (found, replace(found, plates=found.plates[:, :PLATE_SOURCES]))
+    ]
+    assert abs(off[0]) < 0.25 * abs(off[1]), off
+    assert abs(off[1]) > 1.0, "a constant share makes the whole trunk as much heavier as its head"
 
 
 def test_plates_have_the_sizes_of_the_table() -> None:

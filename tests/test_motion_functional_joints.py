@@ -217,6 +217,8 @@ def test_a_hip_that_the_movement_hardly_shows_is_placed_only_where_it_is_contrad
         assert f"{1e3 * found.moved['right_hip']:.0f} mm" in warned[0]
         assert errors["right_hip"].contradicted
         assert not errors["right_knee"].contradicted
+        assert found.moved["right_hip"] <= errors["right_hip"].reach
+        assert abs(errors["right_hip"].reach - far) < 2 * errors["right_hip"].reach_sd < 0.04
         assert placing_leaves(errors["right_hip"]) < 0.5 * (errors["right_hip"].centre / centre_sd("right_hip")) ** 2
     else:
         assert not off.any()

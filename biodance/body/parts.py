@@ -86,7 +86,8 @@ class JointError(NamedTuple):
     ``axis`` rad of a hinge's flexion axis (0 for other joints); ``contradicted`` where the movement contradicts the
     place that the static trial gave the joint, which was ``moved`` so many m from there; ``spared`` the marker beside
     it that seems to have moved since the static trial and did not count in placing it (``moved`` is then how far the
-    joint would lie with it), "" for none.
+    joint would lie with it), "" for none. Of a contradicted one ``reach`` m, how far it lies from there if it may be as
+    far off as joints are that are wrong, and its standard deviation ``reach_sd`` (0: not told).
     """
 
     joint: str
@@ -95,6 +96,8 @@ class JointError(NamedTuple):
     contradicted: bool = False
     moved: float = 0.0
     spared: str = ""
+    reach: float = 0.0
+    reach_sd: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

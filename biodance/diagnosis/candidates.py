@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
@@ -19,6 +20,8 @@ SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
 _EMPTY = 50.0
 """N that a plate carries at most that is always empty."""
+_AT_ONCE = 32
+"""Causes whose columns are computed at once: little memory, however many there are."""
 _NOTHING = 1e-7
 """Share of the largest column below which a column is zero."""
 
@@ -59,9 +62,11 @@ def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candida
     empty = empty_plates(problem.cases)
     every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
     every = [one for one in every if not (one.by_load and one.target.partition(":")[0] in empty)]
-    if not every:
-        return ()
-    found = [candidate(problem, effect, columns) for effect, columns in zip(every, problem.columns(every), strict=True)]
+    found = [
+        candidate(problem, effect, columns)
+        for some in (every[start : start + _AT_ONCE] for start in range(0, len(every), _AT_ONCE))
+        for effect, columns in zip(some, problem.columns(some), strict=True)
+    ]
     return tuple(one for one in found if one.basis.shape[1])
 
 
@@ -102,22 +107,16 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
     return first + [bend for bend in second if np.linalg.norm(bend) > _NOTHING * np.linalg.norm(middle)]
 
 
-def local_basis(problem: Problem, effect: Effect) -> Array | None:
-    """Return (r, k): the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
+def local_basis(problem: Problem, effect: Effect) -> ByTrial | None:
+    """Return the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
     blocks = []
     for index, case in enumerate(problem.cases):
         samples = effect.local(case)
         if samples is None:
             return None
-        blocks.append(problem.spectrum.of_trial(index, samples))
-    width = np.cumsum([0, *(block.shape[2] for block in blocks)])
-    out = np.zeros((len(problem.target), int(width[-1])))
-    row = 0
-    for block, start in zip(blocks, width, strict=False):
-        rows = 6 * len(block)
-        out[row : row + rows, start : start + block.shape[2]] = block.reshape(rows, block.shape[2])
-        row += rows
-    return out
+        block = problem.spectrum.of_trial(index, samples)
+        blocks.append(block.reshape(6 * len(block), -1))
+    return ByTrial.of(blocks)
 
 
 def changes(problem: Problem, effect: Effect, theta: Array) -> Array:

@@ -17,7 +17,7 @@ from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import named_of
 from biodance.diagnosis.problem import Problem
-from biodance.diagnosis.screening import shared, taken
+from biodance.diagnosis.screening import absorbed
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
 
@@ -78,10 +78,11 @@ def felt(found: Model, named: NamedCause) -> bool:
 def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:
     over, columns = zip(*_traces(found.problem, named), strict=True)
     Z = found.white(np.stack(columns, axis=1))
-    s, G = found.belief.score(Z)
+    half = found.belief.half(found.belief.X.T @ Z)
+    s, alone = Z.T @ found.belief.left, np.sum(Z**2, axis=0) - np.sum(half**2, axis=0)
     unlike = max(_UNLIKE, found.tolerances.unlike(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
-    seen = np.diag(G) - np.diag(shared(found, taken(found), Z))
+    seen = alone - np.sum(absorbed(found, Z, half) ** 2, axis=0)
     for name, score, own in zip(over, s, seen, strict=True):
         if own > least:
             share, sd = float(score / own), float(np.hypot(own**-0.5, unlike))

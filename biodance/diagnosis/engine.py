@@ -144,6 +144,7 @@ def _as_loud(
     louder = 1.0 if still else loudness(naming.found)
     if louder <= LOUDER:
         return naming, ()
+    del naming  # no two of them at once: they are the largest that a diagnosis keeps
     return named(replace(known, noise=louder**2 * known.noise)), (LOUD.format(louder),)
 
 

@@ -10,10 +10,11 @@ G.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor
-from scipy.linalg.lapack import dpotrs
+from scipy.linalg.lapack import dpotrs, dtrtrs
 
 from biodance.records import Array
 
@@ -31,7 +32,7 @@ class Belief:
     factor: tuple[Array, bool]
     mean: Array
 
-    @property
+    @cached_property
     def left(self) -> Array:
         """(r,) whitened residual at the posterior mean."""
         return self.y - self.X @ self.mean
@@ -47,8 +48,12 @@ class Belief:
 
     def score(self, Z: Array) -> tuple[Array, Array]:
         """Return s (k,) and G (k, k) of whitened columns ``Z`` (r, k)."""
-        cross = self.X.T @ Z
-        return Z.T @ self.y - cross.T @ self.mean, Z.T @ Z - cross.T @ _solved(self.factor, cross)
+        half = self.half(self.X.T @ Z)
+        return Z.T @ self.left, Z.T @ Z - half.T @ half
+
+    def half(self, cross: Array) -> Array:
+        """Return H (K, k) with H' H = C' A^-1 C of ``cross`` C = X' Z (K, k)."""
+        return np.asarray(dtrtrs(self.factor[0], cross, lower=self.factor[1])[0]) if cross.size else cross
 
 
 def _solved(factor: tuple[Array, bool], b: Array) -> Array:
@@ -82,7 +87,12 @@ def evidence(s: Array, G: Array, length: float) -> Evidence:
     inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
     mean = inner @ s
     value = -0.5 * float(np.linalg.slogdet(np.eye(len(s)) + G)[1]) + 0.5 * float(s @ mean)
-    return Evidence(value, mean, inner, float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0)
+    return Evidence(value, mean, inner, visible(G, length))
+
+
+def visible(G: Array, length: float) -> float:
+    """Return the share of a cause that is left when all that is no fault may adapt, as `evidence` has it."""
+    return float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0
 
 
 def smallest(G: Array, direction: Array, threshold: float) -> float:

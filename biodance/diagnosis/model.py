@@ -4,11 +4,14 @@ so far.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.human.skeleton import kind_of
-from biodance.diagnosis.candidates import SCALE, Candidate, removed
+from biodance.diagnosis.by_trial import ByTrial
+from biodance.diagnosis.candidates import SCALE, Candidate, removed, slopes
 from biodance.diagnosis.evidence import Belief, believe
 from biodance.diagnosis.problem import Problem
 from biodance.effects import Effect
@@ -62,9 +65,32 @@ class Model:
         """(10N,) posterior mean of the parameters."""
         return self.problem.prior.phi + self.problem.factor @ self.belief.mean[: self.problem.factor.shape[1]]
 
+    @cached_property
+    def taken(self) -> Array:
+        """(r, k) whitened columns of the named causes, per standard deviation of a fault."""
+        parts = [
+            slopes(self.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
+            for one in self.named
+        ]
+        return self.white(np.concatenate(parts, axis=1)) if parts else np.empty((self.belief.y.size, 0))
+
+    @cached_property
+    def pull(self) -> tuple[Array, Array]:
+        """Score (k,) and information (k, k) of the sizes of the named causes, where they are."""
+        return self.belief.score(self.taken)
+
     def white(self, rows: Array, *, out: Array | None = None) -> Array:
         """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
         return white(self.problem, self.tolerances, rows, out=out)
+
+    def white_by_trial(self, columns: ByTrial) -> ByTrial:
+        """Return the whitened ``columns`` of the plates' rows, of which every trial has its own."""
+        band, mass = self.problem.spectrum.band, _body_mass(self.problem)
+        parts = (
+            replace(p, values=whitened(p.values, band[p.rows.start // 6 : p.rows.stop // 6], (), mass, self.tolerances))
+            for p in columns.parts
+        )
+        return replace(columns, parts=tuple(parts))
 
     def less(self, named: tuple[NamedCause, ...]) -> "Model":
         """Return the model with the causes ``named`` taken off the target."""
@@ -77,8 +103,11 @@ class Model:
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
     """Return ``rows`` (r, n) of the problem in units of their standard deviation, in ``out`` or a new array."""
-    mass = float(problem.cases[0].body.sip.mass.sum())
-    return whitened(rows, problem.spectrum.band, marker_keys(problem), mass, tolerances, out=out)
+    return whitened(rows, problem.spectrum.band, marker_keys(problem), _body_mass(problem), tolerances, out=out)
+
+
+def _body_mass(problem: Problem) -> float:
+    return float(problem.cases[0].body.sip.mass.sum())
 
 
 def marker_keys(problem: Problem) -> tuple[str, ...]:
@@ -96,7 +125,7 @@ class Nuisances:
     tilts are mirrored between sides and persons).
     """
 
-    parts: tuple[Array, ...]
+    parts: tuple[NDArray[np.floating], ...]
     scale: Array
     keys: tuple[str, ...]
     means: tuple[str, ...]
@@ -106,7 +135,8 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
     """Return the kinematic errors of a problem and the ``causes`` that are tolerances."""
     body = problem.cases[0].body
     joints = {joint_of(body, chain) for chain in chains(body)}
-    parts, keys, scale = [problem.kinematics], list(problem.groups), [1.0] * problem.kinematics.shape[1]
+    parts: list[NDArray[np.floating]] = [problem.kinematics]
+    keys, scale = list(problem.groups), [1.0] * problem.kinematics.shape[1]
     means = [group if group.startswith("sag ") else "" for group in problem.groups]
     for one in causes:
         parts.append(one.basis)

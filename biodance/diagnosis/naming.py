@@ -12,7 +12,7 @@ from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.model import Model, NamedCause, heavier, model, stale
 from biodance.diagnosis.problem import Problem
-from biodance.diagnosis.screening import ScoredCandidate, screen, taken
+from biodance.diagnosis.screening import ScoredCandidate, screen
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
 from biodance.records import Array
@@ -245,12 +245,11 @@ def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:
     """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton
     steps.
     """
-    current = found.less(named)
+    current = found if named is found.named else found.less(named)
     for _ in range(_STEPS):
         if not named:
             return current
-        Z = taken(current)
-        s, G = current.belief.score(Z)
+        s, G = current.pull
         u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
         inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
         step = inner @ (s - u)
@@ -278,6 +277,6 @@ def _penalty(found: Model) -> float:
     """
     if not found.named:
         return 0.0
-    _, G = found.belief.score(taken(found))
+    _, G = found.pull
     u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in found.named])
     return 0.5 * float(u @ u) + 0.5 * float(np.linalg.slogdet(np.eye(len(u)) + G)[1])

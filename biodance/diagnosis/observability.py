@@ -96,11 +96,12 @@ def _really_seen(found: Model, one: Candidate, size: float, threshold: float) ->
     the ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
     """
     Z, first = found.white(one.basis), np.eye(len(one.silent))[0]
+    _, G = found.belief.score(Z)
+    inner = np.linalg.inv(np.eye(len(G)) + G)
+    chance = 0.5 * float(np.trace(inner @ G) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
     for grown in size * np.geomspace(1.0, _SEARCHED, _STEPS) if np.isfinite(size) else ():
         rows = changes(found.problem, one.effect, grown * first)
-        s, G = Belief.known(found.belief.X, found.belief.factor, found.white(rows[:, None])[:, 0]).score(Z)
-        inner = np.linalg.inv(np.eye(len(G)) + G)
-        chance = 0.5 * float(np.trace(inner @ G) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
+        s = Z.T @ Belief.known(found.belief.X, found.belief.factor, found.white(rows[:, None])[:, 0]).left
         if 0.5 * float(s @ inner @ s) + chance >= threshold:
             return float(grown)
     return float("inf")

@@ -6,13 +6,16 @@ free, which is why such a force does not explain just anything.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import cholesky, solve, solve_triangular
 
 from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
+from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.candidates import Candidate, local_basis
 from biodance.diagnosis.consequence import matters
-from biodance.diagnosis.evidence import Evidence, believe, evidence
+from biodance.diagnosis.evidence import Evidence, believe, evidence, visible
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, more_probable, needed, stands
 from biodance.diagnosis.screening import ScoredCandidate
@@ -32,12 +35,27 @@ _STEPS = 2
 
 @dataclass(frozen=True, eq=False)
 class _Passing:
-    """One cause that comes and goes: whitened unit columns ``white`` (r, k), the best ``size`` and its evidence."""
+    """One cause that comes and goes: whitened unit columns ``white``, their ``score`` (k,) and ``information`` (k, k),
+    and its ``log_bayes_factor`` at the best ``size``.
+    """
 
     effect: Effect
-    white: Array
+    white: ByTrial
+    score: Array
+    information: Array
     size: float
-    found: Evidence
+    log_bayes_factor: float
+
+    @cached_property
+    def found(self) -> Evidence:
+        """Its evidence at its size."""
+        squared = self.size**2
+        return evidence(self.size * self.score, squared * self.information, squared * self.white.length)
+
+    @property
+    def visible(self) -> float:
+        """Share of it that is left when all that is no fault may adapt."""
+        return visible(self.information, self.white.length)
 
 
 def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
@@ -69,22 +87,23 @@ def _with(
     found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
     if not found:
         return None
-    order = sorted(found, key=lambda one: -one.found.log_bayes_factor)
+    order = sorted(found, key=lambda one: -one.log_bayes_factor)
     score = float(np.log(len(found)))
-    if order[0].found.log_bayes_factor - score < base.tolerances.threshold:
+    if order[0].log_bayes_factor - score < base.tolerances.threshold:
         return None
-    seen, suspects = order[0].found, tuple(_suspect(one, score) for one in order)
-    if seen.log_bayes_factor - score < max(than, needed(base, seen.visible)):
+    if order[0].log_bayes_factor - score < max(than, needed(base, order[0].visible)):
         return None
-    if not one_sided(seen.mean.reshape(-1, len(order[0].effect.parameters))):
+    if not one_sided(order[0].found.mean.reshape(-1, len(order[0].effect.parameters))):
         return None
-    best = _placed(base, order[0])
-    belief = believe(np.concatenate([base.belief.X, best.size * best.white], axis=1), base.belief.y)
-    touch = _named(base, best, belief.mean[-best.white.shape[1] :], order[0])
+    effect, white = _placed(base, order[0])
+    course = white.scaled(SIZES[-1]).whole(base.belief.y.size)  # widest: the most probable one would shrink short peaks
+    belief = believe(np.concatenate([base.belief.X, course], axis=1), base.belief.y)
+    touch = _named(base, effect, SIZES[-1] * belief.mean[-white.width :], order[0])
     if not (stands(base, touch) and matters(touch.effect, touch.theta)):
         return None
     named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)
+    suspects = tuple(_suspect(one, score) for one in order)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
 
@@ -99,10 +118,8 @@ def one_sided(course: Array) -> bool:
 
 
 def _suspect(one: _Passing, penalty: float) -> ScoredCandidate:
-    value = one.found.log_bayes_factor
-    return ScoredCandidate(
-        Candidate(one.effect, one.white[:, :0], ()), value, value - penalty, np.zeros(0), one.found.visible
-    )
+    cause, value = Candidate(one.effect, np.empty((0, 0)), ()), one.log_bayes_factor
+    return ScoredCandidate(cause, value, value - penalty, np.zeros(0), one.visible)
 
 
 def _passing(base: Model, effect: Effect) -> _Passing | None:
@@ -110,54 +127,45 @@ def _passing(base: Model, effect: Effect) -> _Passing | None:
     columns = local_basis(base.problem, effect)
     if columns is None:
         return None
-    white = base.white(columns)
-    s, G = base.belief.score(white)
-    size = max(SIZES, key=_bayes_factors(s, G).__getitem__)
-    return _Passing(effect, white, size, evidence(size * s, size**2 * G, size**2 * float(np.sum(white**2))))
+    white = base.white_by_trial(columns)
+    s, G = white.against(base.belief.left), white.information(base.belief)
+    value, size = max((_log_bayes_factor(s, G, size), size) for size in SIZES)
+    return _Passing(effect, white, s, G, size, value)
 
 
-def _bayes_factors(s: Array, G: Array) -> dict[float, float]:
-    """Return the log Bayes factor (see `evidence`) of every size of the course, from one decomposition."""
-    value, vector = np.linalg.eigh(G)
-    along = (vector.T @ s) ** 2
-    spread = {size: 1 + size**2 * np.maximum(value, 0.0) for size in SIZES}
-    return {size: float(0.5 * np.sum(size**2 * along / d) - 0.5 * np.sum(np.log(d))) for size, d in spread.items()}
+def _log_bayes_factor(s: Array, G: Array, size: float) -> float:
+    """Return the log Bayes factor (see `evidence`) of a course of one size."""
+    factor = cholesky(np.eye(len(s)) + size**2 * G, lower=True, overwrite_a=True, check_finite=False)
+    along = solve_triangular(factor, size * s, lower=True, check_finite=False)
+    return float(0.5 * along @ along - np.sum(np.log(np.diag(factor))))
 
 
-def _loose(base: Model, one: _Passing) -> _Passing:
-    """Return the cause with the widest prior: the most probable one would shrink short peaks."""
-    s, G = base.belief.score(one.white)
-    size = SIZES[-1]
-    return replace(one, size=size, found=evidence(size * s, size**2 * G, size**2 * float(np.sum(one.white**2))))
-
-
-def _placed(base: Model, one: _Passing) -> _Passing:
-    """Return the cause at the place of its segment where it explains most: a hand's length off, the moment of a touch
-    is several newton metres off. Gauss-Newton steps of the place and the course of the force together.
+def _placed(base: Model, one: _Passing) -> tuple[Effect, ByTrial]:
+    """Return the cause at the place of its segment where it explains most, with its whitened unit columns: a hand's
+    length off, the moment of a touch is several newton metres off. Gauss-Newton steps of the place and the course of
+    the force together.
     """
-    place = np.zeros(3)
+    effect, white, place = one.effect, one.white, np.zeros(3)
     for _ in range(_STEPS):
-        wide = SIZES[-1] * one.white
-        slopes = _slopes(base, one.effect, place, SIZES[-1] * _believed(base, wide, np.zeros(wide.shape[1])))
+        wide = white.scaled(SIZES[-1])
+        slopes = _slopes(base, effect, place, SIZES[-1] * _believed(base, wide, np.zeros(wide.width)))
         if slopes is None:
             break
-        found = _believed(
-            base, np.concatenate([wide, _BESIDE * slopes], axis=1), np.append(0 * wide[0], place / _BESIDE)
-        )
-        place = _BESIDE * found[-3:]
-        there = one.effect.finer().beside(place)
+        here = np.append(np.zeros(wide.width), place / _BESIDE)
+        place = _BESIDE * _believed(base, wide.beside(_BESIDE * slopes), here)[-3:]
+        there = effect.finer().beside(place)
         columns = None if there is None else local_basis(base.problem, there)
         if there is not None and columns is not None:
-            one = replace(one, effect=there, white=base.white(columns))
-    return _loose(base, one)
+            effect, white = there, base.white_by_trial(columns)
+    return effect, white
 
 
-def _believed(base: Model, Z: Array, there: Array) -> Array:
-    """Return the coefficients (k,) of further columns ``Z`` (r, k) of unit standard deviation, whose part ``there``
-    (k,) the target lacks: as `believe` with all columns would, from the score alone.
+def _believed(base: Model, Z: ByTrial, there: Array) -> Array:
+    """Return the coefficients (k,) of further columns ``Z`` of unit standard deviation, whose part ``there`` (k,) the
+    target lacks: as `believe` with all columns would, from the score alone.
     """
-    s, G = base.belief.score(Z)
-    return np.asarray(np.linalg.solve(np.eye(len(s)) + G, s + G @ there))
+    s, G = Z.against(base.belief.left), Z.information(base.belief)
+    return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
 def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
@@ -180,20 +188,19 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 
-def _named(base: Model, one: _Passing, course: Array, sized: _Passing) -> NamedCause:
-    """Return the cause with its ``course`` (k,) of coefficients of ``one`` cut by trials; as its size, the force while
-    it acts: half of the squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would
-    be mostly noise).
+def _named(base: Model, effect: Effect, course: Array, sized: _Passing) -> NamedCause:
+    """Return the cause with its ``course`` (k,) cut by trials; as its size, the force while it acts: half of the
+    squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
     """
-    count, parts, start = len(one.effect.parameters), {}, 0
+    count, parts, start = len(effect.parameters), {}, 0
     for case in base.problem.cases:
-        columns = one.effect.local(case)
+        columns = effect.local(case)
         width = 0 if columns is None else columns.shape[2]
-        parts[case.trial.name] = one.size * course[start : start + width]
+        parts[case.trial.name] = course[start : start + width]
         start += width
     steps = sized.size * sized.found.mean.reshape(-1, count)
     spread = sized.size**2 * np.diag(sized.found.covariance).reshape(-1, count)
     square = np.sum(steps**2, axis=1)
     order = np.argsort(square)
     k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
-    return NamedCause(one.effect, steps[k], np.diag(spread[k]), parts)
+    return NamedCause(effect, steps[k], np.diag(spread[k]), parts)

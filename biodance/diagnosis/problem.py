@@ -48,9 +48,9 @@ class Problem:
 
     ``cases`` thinned trials with the parameters in use; ``spectrum`` where rows come from; ``target`` (r,) measured
     minus what the prior's mean predicts; ``prior`` of the parameters and ``factor`` S (p, k) of its covariance; ``sip``
-    (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K); ``markers`` number m of marker
-    rows, near the end; the last s rows: sizes that the markers alone show of the causes ``shown`` (s; effect, target);
-    ``notes`` what was left out.
+    (r, k) columns W S; ``kinematics`` (r, K) columns of unit errors of ``groups`` (K), many and in single precision;
+    ``markers`` number m of marker rows, near the end; the last s rows: sizes that the markers alone show of the causes
+    ``shown`` (s; effect, target); ``notes`` what was left out.
     """
 
     cases: tuple[Case, ...]
@@ -59,7 +59,7 @@ class Problem:
     prior: Sip
     factor: Array
     sip: Array
-    kinematics: Array
+    kinematics: NDArray[np.float32]
     groups: tuple[str, ...]
     markers: int
     notes: tuple[str, ...] = ()
@@ -122,8 +122,8 @@ class Problem:
         absurd = table[:, 0] < _LIGHTEST * own[:, 0]
         table[absurd] = own[absurd]
         heavier = replace(body, sip=Sip(body.sip.segments, table.ravel(), body.sip.covariance))
-        rows, markers, _ = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum))
-        return replace(self, kinematics=np.concatenate([rows, markers, np.zeros((len(self.shown), rows.shape[1]))]))
+        rows, _ = _kinematic_rows(self.spectrum, _errors(heavier, self.cases, self.spectrum), len(self.shown))
+        return replace(self, kinematics=rows)
 
 
 def problem(
@@ -157,14 +157,15 @@ def problem(
     where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)
     W = where.rows(case.regressor @ factor for case in cases)
-    rows, markers, unit = _kinematic_rows(where, _errors(body, cases, where))
     shown = sizes_shown(cases, {**effects(), **effects(chosen)})
-    sip = np.concatenate([W.reshape(-1, W.shape[2]), np.zeros((len(markers) + len(shown), W.shape[2]))])
+    rows, unit = _kinematic_rows(where, _errors(body, cases, where), len(shown))
+    W = W.reshape(-1, W.shape[2])
+    sip = np.concatenate([W, np.zeros((len(rows) - len(W), W.shape[1]))])
     groups = tuple(in_state(_of_whole(group, body), joint, body) for group, joint in unit)
     measured = where.rows(tuple(case.residual[:, :, None] for case in cases))
     target = np.concatenate([measured.ravel(), _mean_markers(cases, where).ravel(), list(shown.values())])
-    rows = np.concatenate([rows, markers, np.zeros((len(shown), rows.shape[1]))])
-    return Problem(cases, where, target, before, factor, sip, rows, groups, len(markers), notes, tuple(shown))
+    markers = len(rows) - len(W) - len(shown)
+    return Problem(cases, where, target, before, factor, sip, rows, groups, markers, notes, tuple(shown))
 
 
 def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[tuple[str, str], float]:
@@ -203,23 +204,24 @@ def _part(motion: Motion, pick: NDArray[np.intp]) -> Motion:
 
 
 def _kinematic_rows(
-    where: Spectrum, errors: Iterable[tuple[int, NDArray[np.intp], Errors]]
-) -> tuple[Array, Array, tuple[tuple[str, str], ...]]:
-    """Return the rows (6 m, K) of the errors' wrenches, (3M, K) of the mean marker residuals, signs as `forward` has
-    them, and the group and joint of each error (K).
+    where: Spectrum, errors: Iterable[tuple[int, NDArray[np.intp], Errors]], sizes: int
+) -> tuple[NDArray[np.float32], tuple[tuple[str, str], ...]]:
+    """Return the rows (r, K) of the errors: of their wrenches, of the mean marker residuals, signs as `forward` has
+    them, and of so many ``sizes`` shown, in which they are not; and the group and joint of each error (K).
     """
-    wrench: list[Array] = []
+    wrench: list[NDArray[np.float32]] = []
     names: tuple[tuple[str, str], ...] = ()
     markers, frames = np.zeros(()), 0
     for index, pick, one in errors:
         bands = where.layout.bands.at(where.rates[index])
         kept = bands.of(pick.size) >= 0
-        wrench.append(bands.coefficients(where.layout.shift @ one.wrench)[kept])
+        rows = bands.coefficients(where.layout.shift @ one.wrench)[kept]
+        wrench.append(rows.reshape(-1, rows.shape[2]).astype(np.float32))
         names = names or tuple(zip(one.groups, one.joints, strict=True))
         markers = markers + pick.size * one.markers
         frames += pick.size
-    rows = np.concatenate(wrench)
-    return rows.reshape(-1, rows.shape[2]), (markers / frames).reshape(-1, rows.shape[2]), names
+    mean = (markers / frames).reshape(-1, len(names)).astype(np.float32)
+    return np.concatenate([*wrench, mean, np.zeros((sizes, len(names)), dtype=np.float32)]), names
 
 
 def _shares(where: Spectrum, count: int) -> Array:

@@ -74,11 +74,13 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
 
 
 def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Finding:
-    """Return a joint that lies elsewhere: no surer than static trials place joints and than the movement shows it. A
-    bone of another length, its other joint and the one of the ``markers`` that places it look the same.
+    """Return a joint that lies elsewhere, as far as the movement shows it (`JointError.reach`): no surer than that, and
+    than static trials place joints. A bone of another length, its other joint and the one of the ``markers`` that
+    places it look the same.
     """
-    sd = float(np.hypot(centre_sd(error.joint), error.centre))
-    found = _named(replace(effect, target=error.joint), [("shift", error.moved)], sd)
+    far, shown = (error.reach, error.reach_sd) if error.reach else (error.moved, error.centre)
+    sd = float(np.hypot(centre_sd(error.joint), shown))
+    found = _named(replace(effect, target=error.joint), [("shift", far)], sd)
     side, _, joint = error.joint.partition("_")
     alike = [Alias(kind, f"{side}_{name}", float("inf")) for kind, name in _ALIKE.get(joint, ())]
     own = f"{side[:1].upper()}{_PLACED_BY.get(joint, '')}"

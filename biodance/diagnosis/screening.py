@@ -1,10 +1,11 @@
 """The screening: the evidence of every cause beside those that were named, all at once."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from biodance.diagnosis.candidates import SCALE, Candidate, removed, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, removed
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.evidence import evidence
 from biodance.diagnosis.model import Model
@@ -32,19 +33,17 @@ class ScoredCandidate:
 
 def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate, ...]:
     """Return all causes with their evidence, most probable first."""
-    widths = [one.basis.shape[1] for one in causes]
-    named = taken(found)
+    widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)]).tolist()
     Z = np.concatenate([one.basis for one in causes], axis=1)
     Z = found.white(Z, out=Z)
-    s, G = found.belief.score(Z)
-    if named.shape[1]:
-        G = G - shared(found, named, Z)
+    s = Z.T @ found.belief.left
+    half = found.belief.half(found.belief.X.T @ Z)
+    lost = absorbed(found, Z, half)
     targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
-    suspects, start = [], 0
-    for one, width in zip(causes, widths, strict=True):
-        cut = slice(start, start + width)
-        start += width
-        here = evidence(s[cut], G[cut, cut], float(np.sum(Z[:, cut] ** 2)))
+    suspects = []
+    for one, cut in zip(causes, (slice(*pair) for pair in pairwise(widths)), strict=True):
+        own, hides = Z[:, cut], np.concatenate([half[:, cut], lost[:, cut]])
+        here = evidence(s[cut], own.T @ own - hides.T @ hides, float(np.sum(own**2)))
         tried = [(here.log_bayes_factor, one.start(here.mean)), *_at_sizes(found, one.effect)]
         value, begin = max(tried, key=lambda pair: pair[0])
         score = value - float(np.log(targets[one.names[0]]))
@@ -64,18 +63,10 @@ def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:
     return out
 
 
-def taken(found: Model) -> Array:
-    """Return the whitened columns (r, k) of the named causes, per standard deviation of a fault."""
-    parts = [
-        slopes(found.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
-        for one in found.named
-    ]
-    return found.white(np.concatenate(parts, axis=1)) if parts else np.empty((found.belief.y.size, 0))
-
-
-def shared(found: Model, named: Array, Z: Array) -> Array:
-    """Return (k, k): what of the information of ``Z`` (r, k) the sizes of the named causes may still absorb."""
-    both = np.concatenate([named, Z], axis=1)
-    _, G = found.belief.score(both)
-    n = named.shape[1]
-    return np.asarray(G[n:, :n] @ np.linalg.solve(np.eye(n) + G[:n, :n], G[:n, n:]))
+def absorbed(found: Model, Z: Array, half: Array) -> Array:
+    """Return H (n, k): H' H is what of the information of whitened columns ``Z`` (r, k), whose `Belief.half` is
+    ``half``, the sizes of the n parameters of the named causes may still absorb.
+    """
+    own = found.belief.half(found.belief.X.T @ found.taken)
+    _, G = found.pull
+    return np.linalg.solve(np.linalg.cholesky(np.eye(len(G)) + G), found.taken.T @ Z - own.T @ half)

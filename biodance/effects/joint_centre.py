@@ -10,10 +10,13 @@ star-arc) while the rest stands still.
 
 from dataclasses import replace
 
+import numpy as np
+
 from biodance.body.changes import recentre_joint
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.geometry import joint_chains
+from biodance.motion.ik.joint_unknowns import MISSED
 from biodance.motion.track import track
 from biodance.records import Array
 
@@ -25,7 +28,7 @@ class JointCentre(Effect):
 
     name = "joint_centre"
     parameters = tuple(
-        Parameter(f"shift_{axis}", "m", 0.015, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
+        Parameter(f"shift_{axis}", "m", MISSED, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
         for axis in "xyz"
     )
     placed = True
@@ -46,7 +49,7 @@ class JointCentre(Effect):
 
     def columns(self, case: Case) -> Array:
         """Return the change of the wrench with the posture that the markers give the true body, per metre."""
-        return case.geometry.joint_changes.wrench[..., self._own(case)]
+        return np.asarray(case.geometry.joint_changes.wrench[..., self._own(case)], dtype=float)
 
     def marker_columns(self, case: Case) -> Array:
         """Return what the model with the wrong centre leaves of the markers, per metre."""

@@ -43,7 +43,9 @@ class MarkerMisplaced(Effect):
         without the marker.
         """
         own = self._own(case)
-        return np.zeros((case.motion.time.size, 6, 3)) if own is None else case.geometry.marker_changes.wrench[..., own]
+        if own is None:
+            return np.zeros((case.motion.time.size, 6, 3))
+        return np.asarray(case.geometry.marker_changes.wrench[..., own], dtype=float)
 
     def marker_columns(self, case: Case) -> Array:
         """Return what the model with the wrong place leaves of the markers, per metre; zero without the marker."""

@@ -45,7 +45,7 @@ class SegmentLength(Effect):
 
     def columns(self, case: Case) -> Array:
         """Return the change of the wrench with the posture that the markers give the true body, per metre."""
-        return case.geometry.joint_changes.wrench[..., self._own(case)].sum(axis=2, keepdims=True)
+        return case.geometry.joint_changes.wrench[..., self._own(case)].sum(axis=2, dtype=float, keepdims=True)
 
     def marker_columns(self, case: Case) -> Array:
         """Return what the model with the wrong length leaves of the markers, per metre."""

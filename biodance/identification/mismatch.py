@@ -14,10 +14,14 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
+from biodance.body.inertia import shift_matter
+from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
-from biodance.motion.regressor import regressor
+from biodance.motion.kinematics import segment_motion
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Sip
+from biodance.uncertainty.caution import shift_slope
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
 from biodance.uncertainty.response import ErrorSource, Response
@@ -36,7 +40,7 @@ the parameters absorb part of what is noise)."""
 @dataclass(frozen=True, eq=False)
 class Mismatch:
     """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of
-    errors e, each of one standard deviation.
+    errors e, each of one standard deviation. Behind the plates stand the shares of `Body.parts`.
     """
 
     kinematics: Array
@@ -56,7 +60,8 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
 
     Skin and flesh slide as much as the table says, or more where the markers' residuals are larger than that predicts.
     """
-    found, sources, plates = nothing(body), of_markers(parts_as_segments(body)), plate_sources()
+    whole, shares = parts_as_segments(body), share_errors(body)
+    found, sources, plates = nothing(body), of_markers(whole), plate_sources()
     sd, scores, plate_scores = deviations(sources[0].body, sources), np.array(found.kinematics), np.array(found.plates)
     predicted, observed = 0.0, 0.0
     for fit in fits:
@@ -65,11 +70,12 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
             if pick.size < SHORTEST:
                 continue
             motion = fit.motion.at(pick)
-            W, trial = regressor(body, motion), Response.of(sources[0].body, motion)
+            links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
+            W = links if body.sharing is None else links @ body.sharing
             weight = white.weighted(W)
             scores += transpose(sources, trial, weight).T
             wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
-            plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
+            plate_scores += np.tensordot(weight, np.concatenate([wrong, links @ shares], axis=2), axes=((0, 1), (0, 1)))
             if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
                 predicted += float(sd**2 @ _marker_squares(trial, sources)) * pick.size
                 observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
@@ -81,7 +87,36 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
 def nothing(body: Body) -> Mismatch:
     """Return the scores of no frames."""
     size, sources = 10 * len(body.segments), sum(len(source.groups) for source in of_markers(parts_as_segments(body)))
-    return Mismatch(np.zeros((size, sources)), np.zeros((size, PLATE_SOURCES)))
+    return Mismatch(np.zeros((size, sources)), np.zeros((size, PLATE_SOURCES + share_errors(body).shape[1])))
+
+
+def share_errors(body: Body) -> Array:
+    """Return what the table's share of its `parts` may be off, (10 M, K) parameters of the M links, each column of one
+    standard deviation: the part has more, the rest of its segment less, the whole is the same.
+
+    Without them a part that moves would weigh its whole: what a nodding head shows, over the table's share of it.
+    """
+    table, count, columns = body.sharing, len(body.segments), []
+    if table is None:
+        return np.zeros((10 * count, 0))
+    phi = table @ body.sip.phi
+    for k, part in enumerate(body.parts):
+        own = slice(10 * (count + k), 10 * (count + k + 1))
+        rest = slice(10 * part.segment, 10 * (part.segment + 1))
+        _, origin = body.place_on_segment(body.segment_joint[count + k])
+        for error in _part_errors(part.name, phi[own]).T:
+            column = np.zeros(len(phi))
+            column[own], column[rest] = error, -shift_matter(origin) @ error
+            columns.append(column)
+    return np.array(columns).T
+
+
+def _part_errors(name: str, phi: Array) -> Array:
+    """Return the errors (10, 4) of a part of parameters ``phi`` (10,): its mass, and where along three axes its matter
+    lies.
+    """
+    off = error_size("part_com", "head" if name == "head" else "other")
+    return np.column_stack([error_size("segment_mass", "floor") * phi, off * shift_slope(phi)])
 
 
 def _marker_squares(trial: Response, sources: tuple[ErrorSource, ...]) -> Array:

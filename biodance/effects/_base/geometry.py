@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.changes import carried_by, neutral_turn
@@ -96,7 +97,7 @@ class Geometry:
         """The frames over which mean marker residuals are taken."""
         return slice(None, None, max(1, len(self.time) // MEANS))
 
-    def _wrench(self, nine: Array) -> Array:
+    def _wrench(self, nine: Array) -> NDArray[np.float32]:
         return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
 
     def _residual(self, posture: Array, moved: Callable[[Index], Array]) -> Array:
@@ -130,7 +131,7 @@ class Changes:
     motion needs, and of the mean marker residual (K, 3, P), measured less model in segment axes.
     """
 
-    wrench: Array
+    wrench: NDArray[np.float32]
     residual: Array
 
 

@@ -19,8 +19,8 @@ from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass, motion_filter
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.kinematics import poses
-from biodance.motion.regressor import regressor
+from biodance.motion.kinematics import SegmentMotion, poses, segment_motion
+from biodance.motion.regressor import wrench_of_segments
 from biodance.motion.smoothing import smooth
 from biodance.motion.track import track
 from biodance.records import Array, Markers
@@ -100,21 +100,22 @@ class MissingJoint(Effect, ABC):
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """A trial tracked with the joint, at ``time`` (F,) s: ``loose`` (F, 6, 10N') regressor of the ``body`` with it,
-    ``stiff`` (F, 6, 10N) of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average,
+    """A trial tracked with the joint, at ``time`` (F,) s: the motion ``loose`` of the segments of the ``body`` with it,
+    ``stiff`` of those of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average,
     in segment axes; ``angle`` rad rms of the joint's axes.
     """
 
     time: Array
     body: Body
-    loose: Array
-    stiff: Array
+    loose: SegmentMotion
+    stiff: SegmentMotion
     markers: Array
     angle: float
 
     def wrench(self, case: Case) -> Array:
         """Return (F, 6) about the lab origin: what the joint's motion adds with the parameters in use."""
-        return np.asarray(self.loose @ _parameters(case, self.body) - self.stiff @ case.phi)
+        with_joint = wrench_of_segments(self.body, self.loose, _parameters(case, self.body))
+        return with_joint - wrench_of_segments(case.body, self.stiff, case.phi)
 
 
 def _movement(case: Case, effect: MissingJoint) -> Movement | None:
@@ -132,13 +133,13 @@ def _movement(case: Case, effect: MissingJoint) -> Movement | None:
 
 @dataclass(frozen=True, eq=False)
 class _Slow:
-    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the regressor (F, 6,
-    10N) of them.
+    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the motion of the
+    segments in them.
     """
 
     markers: Markers
     q: Array
-    regressor: Array
+    segments: SegmentMotion
     settings: LowPass
 
 
@@ -152,7 +153,7 @@ def _slow(case: Case) -> _Slow:
         calm = Markers(markers.names, time, low_pass(markers.xyz, case.motion.rate, usual)[every])
         settings = replace(usual, cutoff=min(usual.cutoff, 0.45 * case.motion.rate / (every.step or 1)))
         stiff = smooth(case.body, time, case.motion.q[every], settings=settings)
-        case.memory["slow"] = _Slow(calm, stiff.q, regressor(case.body, stiff), settings)
+        case.memory["slow"] = _Slow(calm, stiff.q, segment_motion(case.body, stiff), settings)
     found = case.memory["slow"]
     assert isinstance(found, _Slow)
     return found
@@ -166,7 +167,8 @@ def _tracked(case: Case, body: Body) -> Movement:
     time = slow.markers.time
     loose = smooth(body, time, solve_ik(body, slow.markers, guess=guess).q, settings=slow.settings)
     angle = float(np.sqrt(loose.q[:, new].var(axis=0).mean()))
-    return Movement(time, body, regressor(body, loose), slow.regressor, _markers(case, body, loose.q, slow.q), angle)
+    nearer = _markers(case, body, loose.q, slow.q)
+    return Movement(time, body, segment_motion(body, loose), slow.segments, nearer, angle)
 
 
 def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:

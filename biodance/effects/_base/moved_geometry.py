@@ -219,14 +219,16 @@ def centres_of(phi: Array) -> Array:
     return np.asarray(table[:, 1:4] / np.where(table[:, :1] != 0, table[:, :1], np.inf))
 
 
-def wrench_of(nine: Array, time: Array, wanted: Array, *, smoothed: LowPass, gravity: Array) -> Array:
+def wrench_of(nine: Array, time: Array, wanted: Array, *, smoothed: LowPass, gravity: Array) -> NDArray[np.float32]:
     """Return the change (T, 6, P) of the ground wrench about the lab origin at the even times ``wanted`` (T,) s from P,
     Q, S ``nine`` (F, 9, P) at some ``time`` (F,) s, low-passed and differentiated as the motion was (``smoothed``, see
-    `biodance.motion.smoothing`).
+    `biodance.motion.smoothing`); in single precision, because they are many and large.
     """
     parts = range(0, nine.shape[2], _TOGETHER)
-    some = [_wrench_of(nine[..., k : k + _TOGETHER], time, wanted, smoothed, gravity) for k in parts]
-    return np.concatenate(some, axis=2) if some else np.empty((len(wanted), 6, 0))
+    out = np.empty((len(wanted), 6, nine.shape[2]), dtype=np.float32)
+    for k in parts:
+        out[..., k : k + _TOGETHER] = _wrench_of(nine[..., k : k + _TOGETHER], time, wanted, smoothed, gravity)
+    return out
 
 
 def _wrench_of(nine: Array, time: Array, wanted: Array, smoothed: LowPass, gravity: Array) -> Array:

@@ -25,9 +25,12 @@ from biodance.motion.ik.joint_fit import (
     spread_postures,
 )
 from biodance.motion.ik.joint_unknowns import (
+    FAULTY,
     HINGES,
+    MISSED,
     SIZE,
     JointUnknowns,
+    centre_sd,
     doubted,
     excited,
     own_centre,
@@ -137,7 +140,8 @@ def _told(
     """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
     far that would lie with them.
     """
-    deviation = np.sqrt(np.diag(np.linalg.inv(found.information)))
+    covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
+    deviation = np.sqrt(np.diag(covariance))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
     moved = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS if joint not in kept}
     axis = {hinge: float(deviation[own_turn(hinge)]) for hinge in HINGES}
@@ -146,7 +150,15 @@ def _told(
     for joint in (joint for joint in JOINTS if joint in moved or joint in spared):
         marker, far = spared.get(joint, ("", moved.get(joint, 0.0)))
         placed_errors.append(
-            JointError(joint, _centre_sd(joint, deviation), axis.get(joint, 0.0), joint in wrong, far, marker)
+            JointError(
+                joint,
+                _centre_sd(joint, deviation),
+                axis.get(joint, 0.0),
+                joint in wrong,
+                far,
+                marker,
+                *(_reach(joint, found.theta, covariance) if joint in wrong else (0.0, 0.0)),
+            )
         )
     errors = tuple(placed_errors)
     turned = {hinge: float(found.theta[own_turn(hinge)]) for hinge in HINGES if hinge not in kept}
@@ -182,6 +194,22 @@ def _moved_since(joint: str, marker: str, far: float) -> str:
         f"Warning: the marker {marker} does not count in placing the joints: with it the {joint.replace('_', ' ')} "
         f"would lie {1e3 * far:.0f} mm from the static trial's place. It seems to have moved since that trial."
     )
+
+
+def _reach(joint: str, theta: Array, covariance: Array) -> tuple[float, float]:
+    """Return how far (m) a joint that the movement contradicts lies from the static trial's place, and the standard
+    deviation of that: what the movement says of it (the posterior of the unknowns ``theta`` (37,) with ``covariance``
+    (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off. The placing is
+    more cautious: along a bone, where a movement shows little, it leaves half of a knee's error where it was.
+    """
+    own, before = own_centre(joint), centre_sd(joint, contradicted=True)
+    told = np.linalg.inv(covariance[own, own])
+    shown, axes = np.linalg.eigh(told - np.eye(3) / before**2)
+    spread = 1 / (np.maximum(shown, 0.0) + max(FAULTY * MISSED, before) ** -2)
+    wide = axes @ np.diag(spread) @ axes.T
+    shift = wide @ told @ theta[own]
+    far = float(np.linalg.norm(shift))
+    return far, float(np.hypot(np.sqrt(shift @ wide @ shift) / far, fixed_point(joint)))
 
 
 def _centre_sd(joint: str, deviation: Array) -> float:
