@@ -24,7 +24,8 @@ from biodance.body.human.skeleton import SEGMENTS
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.problem.plan import read_plan
-from biodance.identification.knowledge import SIGMAS
+from biodance.identification.knowledge import SIGMAS, segment_quantities
+from biodance.identification.posterior import Posterior
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import dancer
@@ -146,7 +147,18 @@ def identified(place: Path) -> dict[str, Any]:
         },
         "squats": [[float(np.linalg.norm(r[:3])), float(np.linalg.norm(r[3:]))] for r in rms],
         "sizes": vars(one.identification.sizes),
+        "pull": pulled(one.identification.belief, phi),
     }
+
+
+def pulled(belief: Posterior, true: Array) -> dict[str, Array]:
+    """Return the errors of mass (N,) kg and CoM (N, 3) m that the table leaves in a ``belief``, linearised about the
+    ``true`` parameters (N, 10); the rest of its error is what the data add.
+    """
+    before = belief.prior.phi - true.ravel()
+    left = belief.covariance @ np.linalg.pinv(belief.prior.covariance, rcond=1e-10) @ before
+    rows = [segment_quantities(own)[1][:4] @ part for own, part in zip(true, left.reshape(-1, 10), strict=True)]
+    return {"mass": np.array(rows)[:, 0], "com": np.array(rows)[:, 1:]}
 
 
 def errors(found: dict[str, Any], which: str) -> tuple[Array, Array]:

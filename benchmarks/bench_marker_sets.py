@@ -181,7 +181,7 @@ def respelled(
     for place, name in names.items():
         sides = ("",) if place in ("mid_psis", "c7", "t10", "jugular_notch", "xiphoid") else ("right", "left")
         for side in sides:
-            found = _where(trial.markers, worn, place, side)
+            found = landmark_path(trial.markers, worn, place, side)
             if found is not None and np.isfinite(found).any():
                 truth[spell(side, name) if side else name] = f"{side}_{place}" if side else place
                 columns.append(found)
@@ -189,7 +189,7 @@ def respelled(
     return markers, truth
 
 
-def _where(markers: Markers, worn: MarkerSet, place: str, side: str) -> np.ndarray | None:
+def landmark_path(markers: Markers, worn: MarkerSet, place: str, side: str) -> np.ndarray | None:
     """Return the path of a landmark; iliac spines and medial markers that this recording lacks are put beside what it
     has: 45 mm from the sacral marker, 100 mm (knee), 70 mm (ankle, elbow) inside the lateral one.
     """

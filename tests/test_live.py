@@ -16,6 +16,7 @@ from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.identification.streaming import belief_before
 from biodance.pipeline.live import LiveSession, LiveState
+from biodance.pipeline.live_watch import StreamWatch
 from biodance.pipeline.replay import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench
 from biodance.report.live import LivePage
@@ -84,6 +85,21 @@ def test_a_fault_half_way_is_named_in_time_and_its_frames_do_not_count(streamed,
     state = session.state()
     assert state.suspect == (said[0].text,)
     assert "Mend what is suspect" in state.advice
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(0.25, []), (0.35, ["plate_offset"])])
+def test_a_load_on_a_plate_is_told_as_soon_as_nobody_is_on_it(streamed, seconds, told):
+    body, trial = streamed
+    (plate,), time = trial.plates, np.arange(100) / 100
+    value = np.tile([2.0, 0.0, 30.0, 0.0, 0.0, 0.0], (100, 1)) + np.random.default_rng(1).normal(size=(100, 6))
+    left, on = 80 - round(100 * seconds), np.zeros((100, 2, 1), dtype=bool)
+    value[:left, 2], on[:left, 0] = 600.0, True
+    value[80:, 2] = 600.0  # the filter has not settled there
+    plates = (replace(plate, wrench=Wrench(time, value)),)
+    watch = StreamWatch(trial, LiveSession(body, trial)._follower, weight=620.0)
+    watch.look_at_plates(1.0, replace(trial, plates=plates), plates, on, 0.0, until=80)
+    assert [one.effect for one in watch.warnings] == told
+    assert all(one.target == "plate1:Fz" and "+30 N" in one.text for one in watch.warnings)
 
 
 def test_the_end_is_the_batch_of_the_same_frames_and_frames_are_quick(streamed):

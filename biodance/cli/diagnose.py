@@ -39,9 +39,10 @@ def foresee_command(
         tell("foreseeing what the dance will see")
         if out is not None:
             refuse_page(out, force=force)
-        document = foresight_document(foresee_dance(dance))
+        found, protocol, seated = foresee_dance(dance)
+        document = foresight_document(found, seated=seated)
         if out is not None:
-            page = foresight_page(document, f"the dance {dance.resolve().parent.name}")
+            page = foresight_page(document, f"the dance “{protocol}”" if protocol else "the dance")
             out.write_text(page, encoding="utf-8", newline="\n")
     if json:
         print_json(document)

@@ -7,6 +7,7 @@ performs dances by other code.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,13 +69,23 @@ def _noise(
     cutoff)²); ``slow`` s²: divided by 1 + slow (2 pi f)², as the mass of a pendulum moves when its support sways;
     ``part`` of them.
     """
-    duration = 1.3 * (time[-1] - time[0]) + 1.0
-    frequency = np.arange(1, int(np.ceil(2.5 * cutoff * duration)) + 1) / duration
+    frequency, ahead, aside = _waves(time.tobytes(), cutoff)
     weight = np.exp(-((frequency / cutoff) ** 2))
     weight /= np.sqrt(np.sum(weight**2)) * (1 + slow * (2 * np.pi * frequency) ** 2)
     cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
-    phase = 2 * np.pi * np.outer(time[part], frequency)
-    return np.asarray(np.cos(phase) @ cosine + np.sin(phase) @ sine)
+    return np.asarray(ahead[part] @ cosine + aside[part] @ sine)
+
+
+@lru_cache(maxsize=16)
+def _waves(instants: bytes, cutoff: float) -> tuple[Array, Array, Array]:
+    """Return frequencies (F,) Hz up to 2.5 times the ``cutoff``, and their cosines and sines (T, F) at ``instants``
+    (T,) s, which all performers of a dance share.
+    """
+    time = np.frombuffer(instants)
+    duration = 1.3 * (time[-1] - time[0]) + 1.0
+    frequency = np.arange(1, int(np.ceil(2.5 * cutoff * duration)) + 1) / duration
+    phase = 2 * np.pi * np.outer(time, frequency)
+    return frequency, np.cos(phase), np.sin(phase)
 
 
 class PlannedDance:

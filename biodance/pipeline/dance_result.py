@@ -176,8 +176,9 @@ TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
 
-def foresee_dance(path: Path) -> "Foresight":
-    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`.
+def foresee_dance(path: Path) -> tuple["Foresight", str, bool]:
+    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`; its
+    protocol, and whether it is danced sitting.
 
     Raises
     ------
@@ -187,4 +188,5 @@ def foresee_dance(path: Path) -> "Foresight":
     from biodance.diagnosis.foresight import foresee, session_of
 
     dance = Dance.load(path)
-    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
+    found = foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
+    return found, dance.protocol, any(stance.seat for stance in dance.stances)

@@ -21,7 +21,7 @@ from biodance.identification.statistics import Fit, believable
 from biodance.identification.streaming import RunningBelief, belief_before, summed_pressure
 from biodance.lab.filters import force_filter, motion_filter
 from biodance.lab.prepare import at_marker_times
-from biodance.motion.contact.contact import Contact, ground_contact
+from biodance.motion.contact.contact import Contact, contact_with_plates, feet_on_ground
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.ik.follow import Follower
 from biodance.motion.regressor import regressor
@@ -113,6 +113,15 @@ class LiveSession:
         self.belief: RunningBelief = belief_before(widened(body.sip))
         self._weight = -float(body.gravity[2] * body.sip.mass.sum())
         self._watch = StreamWatch(trial, self._follower, weight=self._weight)
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Load what the first window would wait for, by believing a body that stands in its neutral posture."""
+        time = np.arange(self._hop) / self.markers.rate
+        q, still = np.tile(self.body.neutral, (time.size, 1)), np.zeros((2, time.size, self.body.nv))
+        part = Motion(time, q, *still)
+        W = regressor(self.body, part)
+        self._believed(part, Wrench(time, np.asarray(W @ self.body.sip.phi)), np.ones(time.size, dtype=bool))
 
     @property
     def warnings(self) -> tuple[LiveWarning, ...]:
@@ -184,7 +193,9 @@ class LiveSession:
         yield
         soles = soles_from_body(self.body, motion)
         yield
-        contact = ground_contact(filtered, soles, mass=self._weight / -self.body.gravity[2])
+        feet = feet_on_ground(filtered, soles, mass=self._weight / -self.body.gravity[2])
+        yield
+        contact = contact_with_plates(filtered, soles, feet)
         yield
         new = slice(self._done - start, until - start)
         self._done = until
@@ -220,8 +231,7 @@ class LiveSession:
         W = regressor(self.body, part)
         measured = contact.measured[new] & np.array(self._determined[cut]) & np.isfinite(wrench.value).all(axis=1)
         missing = float((W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2])
-        whole = len(contact.time) >= self._window
-        self._watch.look_at_plates(self._now, raw, filtered.plates, contact.on_plate, missing, whole=whole)
+        self._watch.look_at_plates(self._now, raw, filtered.plates, contact.on_plate, missing, until=new.stop)
         yield
         use = self._believed(part, wrench, measured)
         if use.any():

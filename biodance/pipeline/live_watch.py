@@ -22,6 +22,8 @@ from biodance.spatial import wrench_about_point
 
 _SILENT = 0.2
 """s without any change of a raw channel: no amplifier is so quiet."""
+_EMPTY = 0.3
+"""s that nobody is on a plate which is called empty: the filter forgets a foot that left in a tenth of that."""
 
 
 class StreamWatch:
@@ -64,22 +66,26 @@ class StreamWatch:
         on_plate: NDArray[np.bool_],
         missing: float,
         *,
-        whole: bool,
+        until: int,
     ) -> None:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it: channels ``raw`` and as
         filtered in ``plates``, feet ``on_plate`` (T, 2, P), ``missing`` N that the body needs beyond what was measured;
-        ``whole`` whether the window is long enough to call a plate empty.
+        frames from ``until`` on are not settled yet.
         """
         silent = {
             f"silent {said.target}": said
             for said in silent_plates(now, _last(raw), on_plate[-1].any(axis=0), missing, self._weight)
         }
+        count = max(3, round(_EMPTY * plates[0].wrench.rate))
+        late = slice(max(0, until - count), until)
+        gone = {said.target for said in self.warnings if said.effect == "plate_gone"}
         empty = {
             f"empty {plate.name}": said
             for index, plate in enumerate(plates)
-            if whole
-            and not on_plate[:, :, index].any()
-            and (said := loaded_while_empty(now, plate, plate.wrench.value))
+            if until >= count
+            and plate.name not in gone
+            and not on_plate[late, :, index].any()
+            and (said := loaded_while_empty(now, plate, plate.wrench.value[late]))
         }
         for key in [key for key in self._suspect if key.startswith(("silent", "empty"))]:
             if key not in silent | empty:

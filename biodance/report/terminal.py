@@ -181,6 +181,8 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
     hidden = ", ".join(f"{row['effect']} {row['target']}".strip() for row in found["unobservable"])
     console.print(f"cannot see: {escape(hidden or 'nothing of what it looks for')}", soft_wrap=True)
     console.print(escape(found["summary"]), soft_wrap=True)
+    if found["care"]:
+        console.print(escape(found["care"]), soft_wrap=True)
     for one in found["changes"]:
         console.print(
             f"to change: {escape(one['do'])} ({len({*one['unseen'], *one['confused']})} causes)", soft_wrap=True

@@ -118,15 +118,18 @@ def _exchanged(walk: Walk, course: Walked, q: int) -> Iterator[Walked]:
     for number, step in enumerate(before):
         belief = walk.belief_after(belief, before[:number], step)
     taken = {step.key for step in steps}
-    for step, move in walk.possible(before, stances, belief, {}):
-        if step.key in taken:
-            continue
-        to = () if move is None else (move,)
-        if after is None:
+
+    def on_from(step: DanceStep) -> DanceStep | None:
+        return None if after is None else walk.reach.link(step, after.catalogue, after.s)
+
+    def fits(step: DanceStep) -> bool:
+        return step.key not in taken and (after is None or on_from(step) is not None)
+
+    for step, move in walk.possible(before, stances, belief, {}, wanted=fits):
+        to, on = () if move is None else (move,), on_from(step)
+        if on is None:
             yield replace(course, steps=(*before, step), moves=(*moves[: q - 1], *to))
-            continue
-        on = walk.reach.link(step, after.catalogue, after.s)
-        if on is not None and not (way := walk.move(step, on)).limit:
+        elif not (way := walk.move(step, on)).limit:
             way_on = (*to, way, *moves[q + 1 :])
             yield replace(course, steps=(*before, step, on, *steps[q + 2 :]), moves=(*moves[: max(0, q - 1)], *way_on))
 

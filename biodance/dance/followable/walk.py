@@ -40,6 +40,8 @@ _AT_ONCE = 12
 """Postures of which one that imprecise people surely can is taken before others that tell more."""
 _BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 """Shares of a move at which imprecise people must have room, too."""
+_SHORTLY = 0.2
+"""s of standing still before and after a move that is looked at alone."""
 _LIFTING = 1.4
 """Times as long as others that a move takes in which a foot is lifted or put down."""
 _LOOKED_AT = 24
@@ -140,12 +142,18 @@ class Walk:
         return np.asarray(belief - Z.T @ Z)
 
     def possible(
-        self, steps: list[DanceStep], stances: tuple[Stance, ...], belief: Array, why: dict[str, int]
+        self,
+        steps: list[DanceStep],
+        stances: tuple[Stance, ...],
+        belief: Array,
+        why: dict[str, int],
+        *,
+        wanted: Callable[[DanceStep], bool] = lambda _: True,
     ) -> Iterator[tuple[DanceStep, Move | None]]:
-        """Yield the postures that follow with the move to them, the best first, of a handful those first that imprecise
-        people surely can; ``why`` counts the limits that others break.
+        """Yield the postures that follow and are ``wanted`` with the move to them, the best first, of a handful those
+        first that imprecise people surely can; ``why`` counts the limits that others break.
         """
-        last, ranked = steps[-1] if steps else None, self._ranked(steps, stances, belief)
+        last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, belief))
         while some := list(islice(ranked, _AT_ONCE)):
             doubtful = list[tuple[float, DanceStep, Move | None]]()
             for step in some:
@@ -267,7 +275,7 @@ class Walk:
 
 def _room(task: Task, stances: tuple[Stance, Stance], move: Move) -> tuple[float, str]:
     """Return what imprecise people leave on the way, as `deviations_of_copies` does."""
-    still, time = np.ones(2), np.array([move.duration])
+    still, time = np.full(2, _SHORTLY), np.array([move.duration])
     way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
     return deviations_of_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
 

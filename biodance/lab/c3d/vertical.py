@@ -7,23 +7,14 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.markers.sets import landmark, recognise
+from biodance.lab.markers.upright import axis_to_head, clear_axis
 from biodance.lab.plates.corners import is_rectangle
 from biodance.records import Array, Markers
 
-UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
-LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
-_HIGH = re.compile(
-    r"head|[fb]hd|^hd|nasion|sellion|c7|clav|acr|sho(u|$)|asis?$|psis?$|[_.]?i[ap]s$|sacr", re.IGNORECASE
-)
-_DEEP = re.compile(r"hee|calc|cal[0-9]?$|toe|hallux|ank|mal|mt[p0-9]|foot|^[lr][lm]m$|f[cm][ac]|fm[125]", re.IGNORECASE)
-"""What labels of the upper and of the lowest part of the body are called in sets that nobody described."""
 _CLOUD = 6
 """Markers that show how a body lies."""
 _LONGER = 1.5
 _AXES = "XYZ"
-_CLEAR = 2.0
-"""A direction counts if its largest component is so many times the others."""
 
 
 def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
@@ -35,7 +26,7 @@ def turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str
     stays where it is not the vertical itself.
     """
     declared = _declared(raw, markers)
-    floor, body = _floor(raw, markers), _body(markers)
+    floor, body = _floor(raw, markers), (axis_to_head(markers) if markers else None)
     witnesses = {"the plates": floor, "the markers from feet to head": body, "POINT:Y_SCREEN": declared}
     if floor is not None:
         chosen, by = floor, "the plates"
@@ -118,40 +109,9 @@ def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
     if not len(plates):
         return None
     normals = np.abs(np.cross(plates[:, 1] - plates[:, 0], plates[:, 3] - plates[:, 0])).sum(axis=0)
-    axis = _axis(normals)
+    axis = clear_axis(normals)
     if axis is None or markers is None or not markers.seen.any():
         return axis
     i = int(np.argmax(axis))
     above = float(np.nanmedian(markers.xyz[..., i])) - float(plates[..., i].mean())
     return axis * (1.0 if above >= 0 else -1.0)
-
-
-def _body(markers: Markers | None) -> Array | None:
-    """Return the axis from the feet to the head or pelvis in most frames; None if the labels or the posture do not
-    tell it.
-    """
-    if markers is None:
-        return None
-    found = recognise(markers.names)
-    ends = [
-        [p for name in names if found and (p := landmark(markers, found, name)) is not None] for names in (UPPER, LOWER)
-    ]
-    if not all(ends):
-        ends = [[markers[name] for name in markers.names if words.search(name)] for words in (_HIGH, _DEEP)]
-    if not all(ends):
-        return None
-    top, bottom = (np.concatenate(points) for points in ends)
-    if not (np.isfinite(top).any() and np.isfinite(bottom).any()):
-        return None
-    return _axis(np.nanmedian(top, axis=0) - np.nanmedian(bottom, axis=0))
-
-
-def _axis(direction: Array) -> Array | None:
-    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or the direction is not
-    finite.
-    """
-    size = np.sort(np.abs(direction))
-    if not np.isfinite(size).all() or size[2] <= _CLEAR * size[1]:
-        return None
-    i = int(np.argmax(np.abs(direction)))
-    return np.eye(3)[i] * np.sign(direction[i])

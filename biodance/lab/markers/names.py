@@ -5,17 +5,24 @@ The spellings are data: ``anthropometry/marker_names.toml``.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import permutations
+from itertools import permutations, product
 
 from biodance.lab.markers.set_file import LANDMARKS
+from biodance.lab.markers.spelling import Spelled, readings, readings_of
 from biodance.library import locate, read_toml
 
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
 _WHOLE = {"head_front", "head_back"}
 """Landmarks of the midline that are the mean of a right and a left marker."""
+
+
+_PARTS = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
+"""A number, as an ordinal or not, or a word, within a token."""
+_WAYS = 24
+"""Ways to cut the tokens of a label into words, beyond which the label says nothing."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +37,12 @@ class Meaning:
 
 @dataclass(frozen=True)
 class _Vocabulary:
-    sides: Mapping[str, str]
+    pairs: tuple[tuple[str, str], ...]
     noise: frozenset[str]
     landmarks: Mapping[str, tuple[tuple[str, int], ...]]
     segments: Mapping[str, str]
-    words: Mapping[str, str]
-    composed: Mapping[frozenset[str], str]
+    words: Mapping[str, tuple[str, ...]]
+    composed: Mapping[frozenset[str], tuple[str, ...]]
 
 
 @cache
@@ -46,27 +53,62 @@ def _vocabulary() -> _Vocabulary:
         for rank, spelling in enumerate(spellings):
             spelled.setdefault(spelling, []).append((landmark, rank))
     segments = {word: segment for segment, words in table["segments"].items() for word in words}
-    sides = {word: side for side, words in table["sides"].items() for word in words}
+    pairs = tuple((right, left) for right, left in table["sides"]["pairs"])
     landmarks = {word: tuple(found) for word, found in spelled.items()}
-    single = {
-        word: kind for group in ("regions", "qualities") for kind, words in table[group].items() for word in words
-    }
-    composed = {frozenset(way.split()): landmark for landmark, ways in table["composed"].items() for way in ways}
-    return _Vocabulary(sides, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
+    single: dict[str, tuple[str, ...]] = {}
+    for kind, spellings in (table["regions"] | table["qualities"]).items():
+        for word in spellings:
+            single[word] = (*single.get(word, ()), kind)
+    composed: dict[frozenset[str], tuple[str, ...]] = {}
+    for landmark, several in table["composed"].items():
+        for way in several:
+            composed[frozenset(way.split())] = (*composed.get(frozenset(way.split()), ()), landmark)
+    return _Vocabulary(pairs, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
 
 
 def meanings(label: str) -> tuple[Meaning, ...]:
     """Return what a label may mean, the most usual first; nothing where no spelling is known."""
     words = _vocabulary()
+    return _of(words, readings(label, words.pairs, words.noise))
+
+
+def meanings_of(labels: Iterable[str]) -> dict[str, tuple[Meaning, ...]]:
+    """Return label -> what it may mean, the most usual first, read as the whole set of labels is written; labels that
+    mean nothing are left out.
+    """
+    words = _vocabulary()
+    every = readings_of(labels, words.pairs, words.noise)
+    return {label: found for label, ways in every.items() if (found := _of(words, ways))}
+
+
+def sides_of(labels: Iterable[str]) -> dict[str, str]:
+    """Return label -> "right" or "left", for the labels that say one as the whole set of labels is written."""
+    words = _vocabulary()
+    every = readings_of(labels, words.pairs, words.noise)
+    sides = {label: {one.side for one in ways if one.side} for label, ways in every.items()}
+    return {label: next(iter(found)) for label, found in sides.items() if len(found) == 1}
+
+
+def _of(words: _Vocabulary, ways: Iterable[Spelled]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
-    for side, rest, cost in _readings(label):
-        for place, rank in _places(words, rest, side):
-            found[place] = min(found.get(place, 10**6), rank + cost)
+    for way in ways:
+        for place, rank in _places(words, way.rest, way.side):
+            found[place] = min(found.get(place, 10**6), rank + way.cost)
     return tuple(sorted((Meaning(place, rank) for place, rank in found.items()), key=lambda one: one.rank))
 
 
 def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
-    """Return the places of one reading: a landmark whose spelling the tokens make in some order, else a segment."""
+    """Return the places of one reading: a landmark whose spelling the tokens make in some order, else a segment; a
+    number behind a name may count its markers.
+    """
+    found = _spelled(words, rest, side)
+    stem = (*rest[:-1], rest[-1].rstrip("0123456789"))
+    if not found and stem != rest and any(stem):
+        found = [(place, rank + 70) for place, rank in _spelled(words, tuple(filter(None, stem)), side)]
+    return found
+
+
+def _spelled(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
     joined = ["".join(order) for order in permutations(rest)] if len(rest) <= 3 else ["".join(rest)]
     found = []
     for spelling in joined:
@@ -75,41 +117,42 @@ def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[
                 found.append((landmark, rank))
             elif landmark not in _MIDLINE and side:
                 found.append((f"{side}_{landmark}", rank))
-    if found:
-        return found
-    split = [part for token in rest for part in re.split(r"(?<=[a-z])(?=\d)|(?<=\d)(?=[a-z])", token)]
-    kinds = frozenset(words.words[part] for part in split if part in words.words)
-    if side and kinds in words.composed:
-        return [(f"{side}_{words.composed[kinds]}", 100)]
+    named = bool(found)
     for spelling in joined:
-        segment = words.segments.get(re.sub(r"\d+$", "", spelling)) or words.segments.get(spelling)
-        middle = segment in ("pelvis", "trunk_head")
-        if segment and (side or middle):
-            return [(segment if middle else f"{side}_{segment}", 500)]
-    return []
+        stem = spelling.rstrip("0123456789")
+        sided = words.segments.get(stem if side else spelling) or words.segments.get(spelling if side else stem)
+        middle = sided in ("pelvis", "trunk_head")
+        if sided and (side or (middle and len(spelling) > 1)):
+            found.append((sided if middle else f"{side}_{sided}", 500))
+    part = next((words.segments[token] for token in rest if len(token) > 2 and token in words.segments), "")
+    if part and side and not found:
+        found.append((part if part in ("pelvis", "trunk_head") else f"{side}_{part}", 600))
+    if side and not named:
+        found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(words, rest)]
+    return found
 
 
-def _readings(label: str) -> list[tuple[str, tuple[str, ...], int]]:
-    """Return the ways to take a side from a label: side or "", the tokens that are left, and what this way costs."""
-    words = _vocabulary()
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", label)
-    tokens = [token for token in re.split(r"[^a-z0-9]+", spaced.lower()) if token]
-    kept = tuple(token for token in tokens if token not in words.noise) or tuple(tokens)
-    out: list[tuple[str, tuple[str, ...], int]] = []
-    for given in dict.fromkeys((kept, tuple(tokens))):
-        out.append(("", given, 0))
-        for i, token in enumerate(given):
-            if token in words.sides and len(given) > 1:
-                out.append(
-                    (words.sides[token], given[:i] + given[i + 1 :], 0 if len(token) > 1 or token in "lr" else 3)
-                )
-        whole = "".join(given)
-        for word, side in words.sides.items():
-            cost = 0 if word in ("l", "r", "left", "right") else 3
-            if whole.startswith(word) and len(whole) > len(word):
-                out.append((side, (whole[len(word) :],), cost))
-                if given[0] != word and given[0].startswith(word):
-                    out.append((side, (given[0][len(word) :], *given[1:]), cost))
-            if whole.endswith(word) and len(whole) > len(word):
-                out.append((side, (whole[: -len(word)],), cost + 1))
-    return [(side, tuple(token for token in rest if token), cost) for side, rest, cost in out if any(rest)]
+def _composed(words: _Vocabulary, rest: tuple[str, ...]) -> list[tuple[str, int]]:
+    """Return landmark and rank for tokens that name a region and a quality of it, whole or in short: KneeLat, lat_kn,
+    EpiFemInt. Words that say nothing may stand among them, but no remainder within a token.
+    """
+    parted = [part for token in rest for part in ([token] if token in words.words else _PARTS.findall(token))]
+    cuts = [cut for token in parted if (cut := _cuts(words.words, token))]
+    found = []
+    for way in product(*cuts) if cuts and sum(map(len, cuts)) <= _WAYS else ():
+        parts = [part for cut in way for part in cut]
+        if sum(map(len, parts)) < 2:
+            continue
+        for kinds in product(*(words.words[part] for part in parts)):
+            short = sum(len(part) < 3 for part in parts)
+            for landmark in words.composed.get(frozenset(kinds), ()):
+                found.append((landmark, 100 + 30 * short + 10 * (len(parted) - len(cuts))))
+    return found
+
+
+def _cuts(known: Mapping[str, tuple[str, ...]], token: str) -> list[tuple[str, ...]]:
+    """Return the ways to cut a token into known words."""
+    if not token:
+        return [()]
+    ends = [end for end in range(1, len(token) + 1) if token[:end] in known]
+    return [(token[:end], *rest) for end in ends for rest in _cuts(known, token[end:])]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused, TrialRefused
 from biodance.lab.markers.sets import recognise
+from biodance.lab.markers.upright import axis_to_head
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256, write_new
 from biodance.records import Array, Markers, Role, Source, Trial
@@ -54,7 +55,7 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     warnings += timing
     history = [f"Coordinates were read in {unit} and turned into m."]
     xyz[(xyz == 0).all(axis=2)] = np.nan
-    if body_is_tall_along_z(xyz):
+    if _is_z_up(Markers(tuple(names), time, xyz)):
         warnings.append(
             "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."
         )
@@ -238,6 +239,12 @@ def _equal_steps(
     if len(full) > raw.size:
         warnings.append(f"{len(full) - raw.size} frames are left out in the file; they count as not seen.")
     return raw[0] + np.arange(len(full)) / rate, full, warnings
+
+
+def _is_z_up(markers: Markers) -> bool:
+    """Return whether z is up in the file: by the labels of high and low markers, else by where the cloud is tall."""
+    axis = axis_to_head(markers)
+    return body_is_tall_along_z(markers.xyz) if axis is None or axis[0] else bool(axis[2])
 
 
 def body_is_tall_along_z(xyz: Array) -> bool:

@@ -34,7 +34,10 @@ Measured on recordings of four people of 1.48 to 1.74 m (C7, sd 0.003) and three
 eight people of 1.30 to 1.74 m (acromia sd 0.006, notch 0.007, iliac spines 0.016, which is 3 cm of stature).
 """
 FLOOR = (-0.05, 0.2)  # m, where the lowest marker of somebody who stands on the floor lies
+_OVER_SOLE = 0.04  # m, markers of heel and toes over the ground
 TALLER_IS_MALE = 1.70  # m
+_MIDDLE_INDEX = 22.5
+"""kg/m2, body mass over the square of the stature: between the women (20.6) and the men (24.1) of de Leva 1996."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,7 @@ def identify_subject(
     on_plates = [Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
+    mass = _middle_mass(mass, stature, trials, notes)
     age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, AGE_NAMES, (0.0, 120.0))], [])
     if math.isnan(age):
         notes.append(
@@ -141,11 +145,6 @@ def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> flo
     used.
     """
     if not on_plates:
-        if math.isnan(mass):
-            notes.append(
-                "The body mass is not known: not declared, and nobody stands still on the plates. Set mass_kg in "
-                "session.toml."
-            )
         return mass
     first = on_plates[0]
     if math.isnan(mass):
@@ -164,18 +163,40 @@ def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> flo
     return mass
 
 
+def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: list[str]) -> float:
+    """Return the mass (kg); where nobody knows it and no plate was recorded, that of a middling person of this stature:
+    markers are followed whatever the mass is. NaN beside plates, which a wrong mass would contradict.
+    """
+    if math.isfinite(mass):
+        return mass
+    if math.isnan(stature) or any(trial.plates for trial in trials):
+        notes.append(
+            "The body mass is not known: not declared, and nobody stands still on the plates. Set mass_kg in "
+            "session.toml."
+        )
+        return mass
+    mass = round(_MIDDLE_INDEX * stature**2, 1)
+    notes.append(
+        f"The body mass is not known: not declared, and no plate was recorded. {mass:g} kg were taken, as people of "
+        f"{stature:.2f} m weigh; the movement does not depend on it, forces and loads do. Set mass_kg in session.toml."
+    )
+    return mass
+
+
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) from the height of markers in the static trial; NaN if none stands over feet on the
-    floor.
+    """Return the stature (m) from the height of markers in the static trial, over its feet where these are not on the
+    floor; NaN if nobody stands there.
     """
     for trial in (t for t in trials if t.role == "static"):
         feet = _height(trial, "right_heel", "left_heel", "right_toe", "left_toe")
+        step = 0.0 if FLOOR[0] <= feet <= FLOOR[1] else feet - _OVER_SOLE
         for what, names, share in STATURE_OF:
-            stature = _height(trial, *names) / share
-            if FLOOR[0] <= feet <= FLOOR[1] and LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
+            stature = (_height(trial, *names) - step) / share
+            if LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
+                on = f", whose feet stand at {step:.2f} m" if step else ""
                 notes.append(
                     f"The stature was not declared: {stature:.2f} m were guessed from the height of {what} in "
-                    f"{trial.name}."
+                    f"{trial.name}{on}."
                 )
                 return stature
     notes.append(

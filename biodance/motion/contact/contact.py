@@ -93,10 +93,42 @@ class Contact:
     told: Mask
 
 
+@dataclass(frozen=True, eq=False)
+class FeetOnGround:
+    """The first half of a trial's contact: which plates (T, P) are in ``load`` and ``pressed``, which feet (T, 2)
+    ``rests`` and are ``touching``, on what ``surfaces``; the sentences ``belted`` about belts; ``rules`` and ``weight``
+    N of the body.
+    """
+
+    load: Mask
+    pressed: Mask
+    rests: Mask
+    touching: Mask
+    surfaces: Surfaces
+    belted: tuple[str, ...]
+    rules: ContactRules
+    weight: float
+
+
 def ground_contact(
     trial: Trial, soles: Soles, *, mass: float = float("nan"), rules: ContactRules | None = None
 ) -> Contact:
-    """Return the ground contact of a prepared trial.
+    """Return the ground contact of a prepared trial: `feet_on_ground`, then `contact_with_plates`.
+
+    Raises
+    ------
+    TrialRefused
+        The trial has no force plate.
+    BiodanceError
+        Plates and soles have different times: the trial was not prepared.
+    """
+    return contact_with_plates(trial, soles, feet_on_ground(trial, soles, mass=mass, rules=rules))
+
+
+def feet_on_ground(
+    trial: Trial, soles: Soles, *, mass: float = float("nan"), rules: ContactRules | None = None
+) -> FeetOnGround:
+    """Return what touches the ground in a prepared trial.
 
     ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at
     least nine tenths of the weight is held in the air; without the mass it counts as standing on something. ``rules``
@@ -127,24 +159,31 @@ def ground_contact(
     moving, belted = belts(trial, soles, load)
     speed = speeds(soles, trial.plates, moving)
     rests = resting(speed, soles.time, still=rules.still, lasting=rules.lasting)
-    surfaces = find_surfaces(trial, soles, rests, load, weight=trial.settings.gravity * mass)
+    weight = float(trial.settings.gravity * mass)
+    surfaces = find_surfaces(trial, soles, rests, load, weight=weight)
     touching = _touching(soles, speed, surfaces, rules)
+    return FeetOnGround(load, pressed, rests, touching, surfaces, belted, rules, weight)
+
+
+def contact_with_plates(trial: Trial, soles: Soles, feet: FeetOnGround) -> Contact:
+    """Return the ground contact of a prepared trial whose ``feet`` are known."""
+    touching, surfaces = feet.touching, feet.surfaces
     place = footing(trial.plates, soles, surfaces, touching)
-    faults = _faults(trial, place, touching, rests, load)
-    elsewhere = carried_elsewhere(trial, weight=trial.settings.gravity * mass)
+    faults = _faults(trial, place, touching, feet.rests, feet.load)
+    elsewhere = carried_elsewhere(trial, weight=feet.weight)
     faults.append(
         ("the person is still and the plates carry too little: a chair or a hand carries the rest", elsewhere)
     )
     measured = ~np.any([mask for _, mask in faults], axis=0)
-    outside = cop_outside(trial.plates, soles, place, pressed)
+    outside = cop_outside(trial.plates, soles, place, feet.pressed)
     notes = (
         _notes(measured, faults)
         + _unplaced(trial)
-        + belted
+        + feet.belted
         + surfaces.notes
-        + _cop_notes(trial, outside, measured, rules)
+        + _cop_notes(trial, outside, measured, feet.rules)
     )
-    told = measured[:, None] | _told(trial, place, touching, rests, load)
+    told = measured[:, None] | _told(trial, place, touching, feet.rests, feet.load)
     return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told)
 
 

@@ -71,9 +71,15 @@ def _limit(row: Unobservable) -> dict[str, Any]:
     }
 
 
-def foresight_document(found: Foresight) -> dict[str, Any]:
+_SEATED = (
+    "This dance is for somebody who sits: squats, hops, lunges and standing are not asked of that person. What "
+    "concerns the plate and the cameras alone somebody else can do in their place."
+)
+
+
+def foresight_document(found: Foresight, *, seated: bool = False) -> dict[str, Any]:
     """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two
-    causes it sees.
+    causes it sees; ``care`` what must not be asked of whoever dances ``seated``.
     """
     pairs = [
         {"cause": " ".join(p.cause).strip(), "other": " ".join(p.other).strip(), "log_bayes_factor": p.difference}
@@ -85,6 +91,7 @@ def foresight_document(found: Foresight) -> dict[str, Any]:
         "confusions": pairs,
         "separation": found.separation,
         "summary": foresight_summary(found),
+        "care": _SEATED if seated else "",
         "changes": [
             {"do": one.do, **{key: [" ".join(c).strip() for c in getattr(one, key)] for key in ("unseen", "confused")}}
             for one in found.changes

@@ -48,4 +48,4 @@ def _some(causes: list[str]) -> str:
 
 
 def _words(cause: str) -> str:
-    return cause.replace("_", " ")
+    return cause.replace("_", " ").replace("->", "→")

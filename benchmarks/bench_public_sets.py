@@ -1,0 +1,242 @@
+"""Marker sets of other laboratories (public_marker_sets.toml) on real persons: what the guess makes of their labels,
+and a real walk through the front door under each. No file is written by hand.
+
+    python benchmarks/bench_public_sets.py [SETS...]    # needs BIODANCE_DATA
+
+The points are the landmarks of real recordings. What these lack (second heels, clusters, computed points) is put beside
+them; a subject's name before the labels and unlabelled points are added as real files have them.
+"""
+
+import os
+import sys
+import tempfile
+import zlib
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from bench_marker_sets import landmark_path
+
+from biodance.errors import BiodanceError
+from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.set_file import LANDMARKS, segment_of
+from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.opensim.trc import write_trc
+from biodance.lab.read import read_trial
+from biodance.library import read_toml
+from biodance.pipeline.results import SessionResult
+from biodance.records import Array, Markers, Trial
+
+SETS = read_toml(Path(__file__).with_name("public_marker_sets.toml"))
+SIDES = {"R": "right", "L": "left"}
+PREFIXES = ("Subject01:", "", "P07_", "")
+SPREAD = 0.01
+"""m: a second marker at one landmark is glued so far from the first (normal)."""
+_LIMBS = {
+    "thigh": ("hip", "knee", 0.075),
+    "shank": ("knee", "ankle", 0.055),
+    "foot": ("ankle", "toe", 0.03),
+    "upper_arm": ("shoulder", "elbow", 0.045),
+    "forearm_hand": ("elbow", "wrist", 0.035),
+}
+"""Segment -> its ends and how far its surface lies outside, m."""
+_MIDDLES = {
+    "knee": ("knee_lateral", "knee_medial"),
+    "ankle": ("ankle_lateral", "ankle_medial"),
+    "elbow": ("elbow_lateral", "elbow_medial"),
+    "wrist": ("wrist_radial", "wrist_ulnar"),
+}
+
+
+class Person:
+    """A recorded person: the paths of places by their names in public_marker_sets.toml."""
+
+    def __init__(self, trial: Trial) -> None:
+        assert trial.markers is not None
+        self.markers, self.worn = trial.markers, read_marker_set(trial.marker_set)
+        across = self.landmark("right", "asis") - self.landmark("left", "asis")
+        self.width = np.linalg.norm(across, axis=1, keepdims=True)
+        self.right = across / self.width
+        self.ahead = np.cross([0.0, 0.0, 1.0], self.right)
+
+    def landmark(self, side: str, place: str) -> Array:
+        """Return the path of a landmark, (T, 3) m; what this person lacks is put beside what there is."""
+        found = landmark_path(self.markers, self.worn, place, side)
+        if found is not None:
+            return found
+        out = self.right * (1.0 if side == "right" else -1.0)
+        if place in ("toe_lateral", "toe_medial"):
+            return self.landmark(side, "toe") + (0.03 if place == "toe_lateral" else -0.03) * out - 0.02 * self.ahead
+        if place in ("head_front", "head_back"):
+            middle = (self.landmark("right", "acromion") + self.landmark("left", "acromion")) / 2
+            return middle + [0.0, 0.0, 0.25] + (0.09 if place == "head_front" else -0.08) * self.ahead
+        if place == "thigh_wand":
+            return 0.45 * self.joint(side, "hip") + 0.55 * self.landmark(side, "knee_lateral") + 0.07 * out
+        if place == "shank_wand":
+            middle = self.landmark(side, "knee_lateral") + self.landmark(side, "ankle_lateral")
+            return middle / 2 + 0.03 * out
+        raise KeyError(place)
+
+    def joint(self, side: str, name: str) -> Array:
+        """Return the path of about the middle of a joint, (T, 3) m."""
+        if name in _MIDDLES:
+            return sum(self.landmark(side, one) for one in _MIDDLES[name]) / 2
+        if name == "hip":
+            spines = (self.landmark("right", "asis") + self.landmark("left", "asis")) / 2
+            out = self.right * (1.0 if side == "right" else -1.0)
+            return spines + self.width * (0.34 * out - 0.2 * self.ahead - [0.0, 0.0, 0.32])
+        return self.landmark(side, "toe") if name == "toe" else self.landmark(side, "acromion") - [0.0, 0.0, 0.04]
+
+    def surface(self, code: str, rng: np.random.Generator) -> Array:
+        """Return the path of some point on a segment, (T, 3) m."""
+        if code == "pelvis":
+            spine = self.landmark(str(rng.choice(["right", "left"])), "asis")
+            return 0.6 * spine + 0.4 * self.landmark("", "mid_psis") + [0.0, 0.0, 0.07]
+        if code == "trunk_head":
+            over, ahead, high = rng.normal(0, 0.05, 3)
+            middle = (self.landmark("", "c7") + self.landmark("", "xiphoid")) / 2
+            return middle + over * self.right + ahead * self.ahead + [0.0, 0.0, high]
+        side = SIDES[code[0]]
+        upper, lower, thick = _LIMBS[code[2:]]
+        share, turn = rng.uniform(0.25, 0.75), rng.uniform(-0.8, 0.8)
+        out = self.right * (1.0 if side == "right" else -1.0)
+        middle = (1 - share) * self.joint(side, upper) + share * self.joint(side, lower)
+        return middle + thick * (np.sin(turn) * self.ahead + np.cos(turn) * out)
+
+    def path(self, code: str, rng: np.random.Generator) -> Array:
+        """Return the path of a marker, (T, 3) m: ``code`` the first of what its label may be."""
+        code = code.rpartition("@")[2]
+        if code == "object":
+            return np.tile([0.4, 0.9, 0.7], (len(self.markers.time), 1))
+        if code == "virtual":
+            return self.joint("right", "hip")
+        if code.endswith("_centre"):
+            return self.joint(SIDES[code[0]], code[2:].removesuffix("_centre"))
+        if code[1:2] == ":" or code in ("pelvis", "trunk_head"):
+            return self.surface(code, rng)
+        return self.landmark(SIDES[code[0]], code[2:]) if code[1:2] == "." else self.landmark("", code)
+
+
+def labelled(person: Person, name: str) -> tuple[Markers, dict[str, str]]:
+    """Return the recording under the labels of a set, and label -> what it may be."""
+    truth = dict(line.split(" = ") for line in SETS[name]["labels"])
+    prefix = PREFIXES[zlib.crc32(name.encode()) % len(PREFIXES)]
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    columns = []
+    taken: set[str] = set()
+    for code in truth.values():
+        place = code.split("|")[0]
+        aside = rng.normal(0, SPREAD, 2) if place in taken else np.zeros(2)
+        columns.append(person.path(place, rng) + aside[0] * person.ahead + [0.0, 0.0, aside[1]])
+        taken.add(place)
+    junk = np.full((len(person.markers.time), 2, 3), np.nan)
+    junk[: max(len(junk) // 10, 1)] = [[0.3, 0.8, 1.9], [-0.7, 0.1, 0.4]]
+    xyz = np.concatenate([np.stack(columns, axis=1), junk], axis=1)
+    names = tuple(prefix + label for label in truth)
+    return Markers((*names, "*13", "Unlabeled 7"), person.markers.time, xyz), dict(
+        zip(names, truth.values(), strict=True)
+    )
+
+
+def judged(code: str, got: str | None) -> str:
+    """Return right, wrong or unknown for a label that marks a landmark; "" or wrong for another one."""
+    may = {_place(one) for one in code.split("|")}
+    is_landmark = "virtual" not in code and _place(code.split("|")[0]) in LANDMARKS
+    if got is None:
+        return "unknown" if is_landmark else ""
+    if got in may:
+        return "right" if is_landmark else ""
+    on = {segment_of(one) if one in LANDMARKS else one for one in may}
+    if got in on or (got.endswith("_wand") and got.removesuffix("_wand") in on):
+        return "unknown" if is_landmark else ""
+    return "wrong"
+
+
+def _place(code: str) -> str:
+    """Return the place of a code: R.asis is right_asis, R:thigh right_thigh, virtual@pelvis pelvis."""
+    code = code.rpartition("@")[2]
+    return f"{SIDES[code[0]]}_{code[2:]}" if code[1:2] in (".", ":") else code
+
+
+def tracked(name: str, still: Person, moving: Person) -> str:
+    """Return the RMS distance of the markers of a real walk under a set's labels, or why it was not followed."""
+    from biodance.lab.session.read import read_session
+    from biodance.pipeline.session import examine
+
+    with tempfile.TemporaryDirectory() as folder:
+        for stem, person in (("static", still), ("walk", moving)):
+            markers, _ = labelled(person, name)
+            if len(markers.time) == 1:  # a recording of one frame stands for half a second
+                markers = Markers(markers.names, np.arange(50) / 100, np.repeat(markers.xyz, 50, axis=0))
+            write_trc(Path(folder) / f"{stem}.trc", markers)
+        try:
+            session = read_session(folder, subject_name=None)
+            return _followed(examine(session), session.notes)
+        except BiodanceError as error:
+            return f"refused: {error}"
+
+
+def _followed(result: SessionResult, notes: tuple[str, ...]) -> str:
+    """Return static and walk: RMS of all (legs), mm; else what the session says."""
+    near = [
+        f"{1e3 * one.fit.total_rms:.1f} ({1e3 * one.fit.by_group.get('legs', np.nan):.1f})"
+        for one in result.trials
+        if one.fit is not None
+    ]
+    said = next((note.rpartition("could be guessed: ")[2] for note in notes if "could be guessed: " in note), "")
+    return " / ".join(near) if len(near) == len(result.trials) else f"refused: {said.partition('. ')[0]}."
+
+
+def guessed(name: str, people: Mapping[str, Person]) -> tuple[Counter[str], list[str]]:
+    """Return how many landmarks of all people are right, wrong, unknown, how many people refused; and every error."""
+    count: Counter[str] = Counter()
+    errors = []
+    for who, person in people.items():
+        markers, truth = labelled(person, name)
+        guess = guess_set(markers)
+        if not guess.name:
+            count["refused"] += 1
+            errors.append(f"{name}, {who}: refused: {guess.doubts[0]}")
+        for label, code in truth.items():
+            verdict = judged(code, guess.map.get(label) if guess.name else None)
+            count[verdict] += 1
+            if verdict == "wrong":
+                errors.append(f"{name}, {who}: {label} ({code}) taken for {guess.map[label]}")
+    return count, errors
+
+
+def main(data: Path, only: list[str]) -> None:
+    """Print a line for every set, totals by group, and every wrong landmark."""
+    files = [
+        *sorted(data.glob("biomechzoo/*/*01.c3d")),
+        data / "pycgm/Static_trial.c3d",
+        data / "adl_gait/2014001_ST.c3d",
+    ]
+    people = {file.stem: Person(read_trial(file)) for file in files}
+    moving = Person(read_trial(data / "adl_gait/2014001_C1_01.c3d"))
+    total: dict[str, Counter[str]] = {}
+    errors = []
+    print("| set | labels | right | wrong | left out | people refused | real walk |\n|---|---|---|---|---|---|---|")
+    for name, one in SETS.items():
+        if only and name not in only:
+            continue
+        count, wrong = guessed(name, people)
+        errors += wrong
+        walk = tracked(name, people["2014001_ST"], moving)
+        count["tracked"] += not walk.startswith("refused")
+        count["sets"] += 1
+        total.setdefault(one["group"], Counter()).update(count)
+        counts = " | ".join(str(count[word]) for word in ("right", "wrong", "unknown", "refused"))
+        print(f"| {one['laboratory']} | {len(one['labels'])} | {counts} | {walk} |", flush=True)
+    for group, count in total.items():
+        shares = {
+            word: round(100 * count[word] / max(count["right"] + count["wrong"] + count["unknown"], 1), 2)
+            for word in ("right", "wrong", "unknown")
+        }
+        print(f"{group}: {count['tracked']} of {count['sets']} sets tracked; {shares} %; {count['refused']} refused")
+    print(*errors, sep="\n")
+
+
+if __name__ == "__main__":
+    main(Path(os.environ["BIODANCE_DATA"]), sys.argv[1:])
