@@ -26,8 +26,8 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from bench_honesty import PEOPLE, ROOM
 from hidden_sessions import CACHE, store
+from honesty_sessions import PEOPLE, ROOM
 from test_hidden_causes import CAUSES
 from test_hidden_effects import hidden
 
