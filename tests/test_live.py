@@ -11,7 +11,7 @@ import pytest
 
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
-from biodance.diagnosis.watch import LiveWarning
+from biodance.diagnosis.watch import LiveWarning, silent_plates
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.identification.streaming import belief_before
@@ -97,9 +97,22 @@ def test_a_load_on_a_plate_is_told_as_soon_as_nobody_is_on_it(streamed, seconds,
     value[80:, 2] = 600.0  # the filter has not settled there
     plates = (replace(plate, wrench=Wrench(time, value)),)
     watch = StreamWatch(trial, LiveSession(body, trial)._follower, weight=620.0)
-    watch.look_at_plates(1.0, replace(trial, plates=plates), plates, on, 0.0, until=80)
+    watch.look_at_plates(1.0, replace(trial, plates=plates), plates, on, until=80)
     assert [one.effect for one in watch.warnings] == told
     assert all(one.target == "plate1:Fz" and "+30 N" in one.text for one in watch.warnings)
+
+
+@pytest.mark.parametrize(("before", "told"), [(600.0, ["plate_gone"]), (15.0, [])])
+def test_a_load_that_faded_is_no_plate_that_fell_silent(streamed, before, told):
+    _, trial = streamed
+    (plate,), time = trial.plates, np.arange(100) / 100
+    value = np.random.default_rng(1).normal(size=(100, 6))
+    value[:, 2] += np.linspace(2 * before, before, 100)
+    value[60:] = 0.0
+    one = replace(plate, wrench=Wrench(time, value))
+    said = silent_plates(1.0, (one,), np.array([True]), 620.0)
+    assert [warning.effect for warning in said] == told
+    assert silent_plates(1.0, (one,), np.array([False]), 620.0) == ()
 
 
 def test_the_end_is_the_batch_of_the_same_frames_and_frames_are_quick(streamed):

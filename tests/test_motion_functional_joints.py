@@ -16,7 +16,7 @@ from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.body.human.skeleton import JOINTS
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare

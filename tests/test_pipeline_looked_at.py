@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, looks, motion
 
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.problem import Look
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.looked_at import UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest

@@ -30,8 +30,10 @@ _TIMES, _SWAPPED = 2.5, 0.3
 """A marker is off at so many times its usual distance; an exchange explains it that leaves at most this share."""
 EMPTY_LOAD = 15.0
 """N that an empty plate may read."""
-_GONE = 0.2
-"""Share of body weight that must be missing for a constant plate to count as gone."""
+_SILENT, _GONE = 0.2, 0.2
+"""s without any change of a raw channel: no amplifier is so quiet; share of body weight that a plate carried just
+before, to count as gone.
+"""
 
 
 @dataclass(frozen=True)
@@ -151,19 +153,20 @@ def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array
     return LiveWarning(time, "plate_offset", f"{plate.name}:{CHANNELS[channel]}", text)
 
 
-def silent_plates(
-    time: float, plates: Sequence[Plate], under: Array, missing: float, weight: float
-) -> tuple[LiveWarning, ...]:
-    """Return a warning for every plate with a foot over it (``under`` (P,) bool) whose raw channels do not change at
-    all, or are unknown, while it reads a load or ``missing`` N of the ``weight`` are not carried.
+def silent_plates(time: float, plates: Sequence[Plate], under: Array, weight: float) -> tuple[LiveWarning, ...]:
+    """Return a warning for every plate of a window with a foot over it (``under`` (P,) bool) whose raw channels are
+    unknown, or stopped changing all at once while it carried a share of the ``weight`` N.
+
+    A load that faded to nothing is a foot that left; some systems write exact zeros then.
     """
     found = []
     for plate, foot in zip(plates, under, strict=True):
         value = plate.wrench.value
-        unknown = bool(np.isnan(value).any())
-        still = unknown or bool((value.max(axis=0) == value.min(axis=0)).all())
-        loaded = unknown or abs(value[-1, 2]) > _SMALLEST_JUMP * weight
-        if still and foot and (loaded or missing > _GONE * weight):
+        count = max(3, round(_SILENT * plate.wrench.rate))
+        changed = np.flatnonzero((np.diff(value, axis=0) != 0).any(axis=1))
+        stopped = changed.size and changed[-1] < len(value) - count
+        torn = stopped and abs(value[changed[-1], 2]) > _GONE * weight
+        if foot and (torn or bool(np.isnan(value[-count:]).any())):
             text = f"{plate.name} says nothing any more while a foot is on it: check its cable and amplifier."
             found.append(LiveWarning(time, "plate_gone", plate.name, text))
     return tuple(found)

@@ -230,8 +230,7 @@ class LiveSession:
         wrench = Wrench(part.time, filtered.wrench.value[new])
         W = regressor(self.body, part)
         measured = contact.measured[new] & np.array(self._determined[cut]) & np.isfinite(wrench.value).all(axis=1)
-        missing = float((W[-1] @ self.belief.mean)[2] - np.nan_to_num(wrench.value[-1])[2])
-        self._watch.look_at_plates(self._now, raw, filtered.plates, contact.on_plate, missing, until=new.stop)
+        self._watch.look_at_plates(self._now, raw, filtered.plates, contact.on_plate, until=new.stop)
         yield
         use = self._believed(part, wrench, measured)
         if use.any():

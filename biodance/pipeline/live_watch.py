@@ -1,7 +1,6 @@
 """What an operator must hear of while a session is recorded: which checks look at a stream, and what is suspect now."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,9 @@ from biodance.diagnosis.watch import (
 )
 from biodance.identification.streaming import RunningBelief
 from biodance.motion.ik.follow import Follower
-from biodance.records import Array, Plate, Trial, Wrench
+from biodance.records import Array, Plate, Trial
 from biodance.spatial import wrench_about_point
 
-_SILENT = 0.2
-"""s without any change of a raw channel: no amplifier is so quiet."""
 _EMPTY = 0.3
 """s that nobody is on a plate which is called empty: the filter forgets a foot that left in a tenth of that."""
 
@@ -64,17 +61,15 @@ class StreamWatch:
         raw: Trial,
         plates: Sequence[Plate],
         on_plate: NDArray[np.bool_],
-        missing: float,
         *,
         until: int,
     ) -> None:
         """Look for a plate that fell silent, and for one that reads a load with nobody on it: channels ``raw`` and as
-        filtered in ``plates``, feet ``on_plate`` (T, 2, P), ``missing`` N that the body needs beyond what was measured;
-        frames from ``until`` on are not settled yet.
+        filtered in ``plates``, feet ``on_plate`` (T, 2, P); frames from ``until`` on are not settled yet.
         """
         silent = {
             f"silent {said.target}": said
-            for said in silent_plates(now, _last(raw), on_plate[-1].any(axis=0), missing, self._weight)
+            for said in silent_plates(now, raw.plates, on_plate[-1].any(axis=0), self._weight)
         }
         count = max(3, round(_EMPTY * plates[0].wrench.rate))
         late = slice(max(0, until - count), until)
@@ -87,8 +82,9 @@ class StreamWatch:
             and not on_plate[late, :, index].any()
             and (said := loaded_while_empty(now, plate, plate.wrench.value[late]))
         }
+        still = {f"silent {plate.name}" for plate in raw.plates if not np.diff(plate.wrench.value, axis=0).any()}
         for key in [key for key in self._suspect if key.startswith(("silent", "empty"))]:
-            if key not in silent | empty:
+            if key not in silent | empty and key not in still:
                 del self._suspect[key]
         for key, said in (silent | empty).items():
             self._warn(key, said)
@@ -121,12 +117,3 @@ class StreamWatch:
         self._suspect[key] = said
         if (said.effect, said.target) not in known:
             self.warnings.append(said)
-
-
-def _last(raw: Trial) -> list[Plate]:
-    """Return the plates over the last `_SILENT` s of a window, as they came."""
-    cut = []
-    for plate in raw.plates:
-        count = max(3, round(_SILENT * plate.wrench.rate))
-        cut.append(replace(plate, wrench=Wrench(plate.wrench.time[-count:], plate.wrench.value[-count:])))
-    return cut

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.problem import Look
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import TrialRefused

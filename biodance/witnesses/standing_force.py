@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array
 from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET

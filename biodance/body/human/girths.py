@@ -13,10 +13,11 @@ import numpy as np
 
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
 from biodance.body.inertia import RigidInertia
-from biodance.body.tables.anthropometry import Reference, Sex, error_size, read_table, row_numbers
+from biodance.body.tables.anthropometry import Reference, Sex, read_table, row_numbers
 from biodance.body.tables.choice import reference, studies
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import parts as table_parts
+from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.published import study_masses
 from biodance.errors import SessionRefused
 from biodance.lab.shape import legal_girths, usual_girths

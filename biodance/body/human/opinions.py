@@ -12,7 +12,8 @@ from biodance.body.human.scan import read_scan
 from biodance.body.human.scan_parts import ScannedBody, cut_scan
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
 from biodance.body.inertia import TENSOR, RigidInertia
-from biodance.body.tables.anthropometry import Reference, Sex, error_size, proportion, read_table
+from biodance.body.tables.anthropometry import Reference, Sex, proportion, read_table
+from biodance.body.tables.error_sizes import error_size
 from biodance.errors import SessionRefused
 from biodance.records import SIDES, Array, FootSizes, Subject
 

@@ -22,11 +22,12 @@ from biodance.body.inertia import (
     parameter_jacobian,
     turn_inertia,
 )
-from biodance.body.tables.anthropometry import Reference, error_size, proportion
+from biodance.body.tables.anthropometry import Reference, proportion
 from biodance.body.tables.choice import measured_whole
 from biodance.body.tables.choice import reference as reference_of
 from biodance.body.tables.de_leva import PARTS
 from biodance.body.tables.de_leva import lengths as reference_lengths
+from biodance.body.tables.error_sizes import error_size
 from biodance.body.tables.published import regression, study_masses
 from biodance.records import Array, Sip, Subject
 

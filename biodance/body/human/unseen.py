@@ -14,7 +14,7 @@ from biodance.body.body import Body
 from biodance.body.human.measures import harrington_hip, pelvis_frame, unit
 from biodance.body.human.standing import StaticPosture
 from biodance.body.human.static_centres import SIGN, UP
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array
 
