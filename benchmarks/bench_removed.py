@@ -13,7 +13,6 @@ from all of them.
 import argparse
 import json
 import os
-import pickle
 import re
 import shutil
 import subprocess
@@ -26,8 +25,9 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from hidden_sessions import CACHE, store
+from hidden_sessions import CACHE
 from honesty_sessions import PEOPLE, ROOM
+from kept_files import kept
 from test_hidden_causes import CAUSES
 from test_hidden_effects import hidden
 
@@ -153,14 +153,12 @@ def _person(index: int, first: int) -> int:
 
 def _kept(key: str, session: Callable[[Path], SessionResult]) -> SessionResult:
     """Return an examined session, made once."""
-    path = CACHE / "removed" / f"{re.sub('[^A-Za-z0-9.=-]', '_', key)}.pickle"
-    if path.is_file():
-        with open(path, "rb") as stream:
-            return pickle.load(stream)
-    with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
-        result = session(Path(folder))
-    store(path, result)
-    return result
+
+    def made() -> SessionResult:
+        with tempfile.TemporaryDirectory() as folder, patch("biodance.pipeline.session.can_identify", lambda _: False):
+            return session(Path(folder))
+
+    return kept(CACHE / "removed" / f"{re.sub('[^A-Za-z0-9.=-]', '_', key)}.pickle", made)
 
 
 def size_of(one: Finding) -> tuple[float, float]:

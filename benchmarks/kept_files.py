@@ -5,6 +5,7 @@ and in a folder at most `MOST` gigabytes of them; what was used longest ago goes
 import os
 import pickle
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,10 @@ MOST = float(os.environ.get("BIODANCE_CACHE_GB", "2"))
 
 
 def kept(path: Path, make: Callable[[], Any]) -> Any:
-    """Return what lies at ``path``, made and kept now if it is not there."""
+    """Return what lies at ``path``, made and kept now if it is not there or of records that have moved since."""
     if path.is_file():
         os.utime(path)
-        with open(path, "rb") as stream:
+        with suppress(ModuleNotFoundError, AttributeError), open(path, "rb") as stream:
             return pickle.load(stream)
     made = make()
     store(path, made)

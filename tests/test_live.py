@@ -102,13 +102,15 @@ def test_a_load_on_a_plate_is_told_as_soon_as_nobody_is_on_it(streamed, seconds,
     assert all(one.target == "plate1:Fz" and "+30 N" in one.text for one in watch.warnings)
 
 
-@pytest.mark.parametrize(("before", "told"), [(600.0, ["plate_gone"]), (15.0, [])])
-def test_a_load_that_faded_is_no_plate_that_fell_silent(streamed, before, told):
+@pytest.mark.parametrize(
+    ("before", "rest", "told"), [(600.0, 0.0, ["plate_gone"]), (15.0, 0.0, []), (15.0, 15.0, ["plate_gone"])]
+)
+def test_a_load_that_faded_is_no_plate_that_fell_silent(streamed, before, rest, told):
     _, trial = streamed
     (plate,), time = trial.plates, np.arange(100) / 100
     value = np.random.default_rng(1).normal(size=(100, 6))
     value[:, 2] += np.linspace(2 * before, before, 100)
-    value[60:] = 0.0
+    value[60:] = rest
     one = replace(plate, wrench=Wrench(time, value))
     said = silent_plates(1.0, (one,), np.array([True]), 620.0)
     assert [warning.effect for warning in said] == told

@@ -155,18 +155,18 @@ def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array
 
 def silent_plates(time: float, plates: Sequence[Plate], under: Array, weight: float) -> tuple[LiveWarning, ...]:
     """Return a warning for every plate of a window with a foot over it (``under`` (P,) bool) whose raw channels are
-    unknown, or stopped changing all at once while it carried a share of the ``weight`` N.
+    unknown, stand still beside zero, or became zero all at once while it carried a share of the ``weight`` N.
 
-    A load that faded to nothing is a foot that left; some systems write exact zeros then.
+    A load that faded to nothing is a foot that left: some systems write exact zeros then.
     """
     found = []
     for plate, foot in zip(plates, under, strict=True):
         value = plate.wrench.value
-        count = max(3, round(_SILENT * plate.wrench.rate))
+        late = value[-max(3, round(_SILENT * plate.wrench.rate)) :]
         changed = np.flatnonzero((np.diff(value, axis=0) != 0).any(axis=1))
-        stopped = changed.size and changed[-1] < len(value) - count
-        torn = stopped and abs(value[changed[-1], 2]) > _GONE * weight
-        if foot and (torn or bool(np.isnan(value[-count:]).any())):
+        torn = changed.size and abs(value[changed[-1], 2]) > _GONE * weight
+        still = bool((late == late[0]).all()) and (torn or late[0].any())
+        if foot and (still or bool(np.isnan(late).any())):
             text = f"{plate.name} says nothing any more while a foot is on it: check its cable and amplifier."
             found.append(LiveWarning(time, "plate_gone", plate.name, text))
     return tuple(found)
