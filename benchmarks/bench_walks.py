@@ -66,7 +66,7 @@ class Fault:
 @dataclass(frozen=True)
 class Score:
     """One session with one fault: whether it was named first, named or in a set, covered (None: no interval), and all
-    that was named.
+    that was named; ``verdict`` of the whole diagnosis.
     """
 
     session: str
@@ -75,6 +75,7 @@ class Score:
     listed: bool
     covered: bool | None
     told: str
+    verdict: str = ""
 
 
 def faults_for(session: Session) -> Iterator[Fault]:
@@ -220,7 +221,7 @@ def scored(data: Path, name: str, place: Path, *, norms: Norms | None) -> Iterat
             if norms is None:
                 found = diagnose_session(examine(session)).diagnosis
                 judged_one = judged(name, fault, found.findings)
-                yield replace(judged_one, told=f"{found.verdict}: {judged_one.told}"), None
+                yield replace(judged_one, verdict=f"{found.verdict}: "), None
                 continue
             heard = hear(session)
             others = judged(name, fault, named(session, _shifted(heard, norms)))
@@ -269,7 +270,10 @@ def main() -> None:
                 scores.append(pair)
                 one, other = pair
                 beside = f" | others: {_mark(other)} {other.covered} {other.told}" if other else ""
-                print(f"{name} | {one.fault.kind} | {_mark(one)} | {one.covered} | {one.told}{beside}", flush=True)
+                print(
+                    f"{name} | {one.fault.kind} | {_mark(one)} | {one.covered} | {one.verdict}{one.told}{beside}",
+                    flush=True,
+                )
     lines = []
     for title, names in (("Sessions of the issue", ISSUE), ("All sessions", SESSIONS)):
         own = [one for one, _ in scores if one.session in names]
