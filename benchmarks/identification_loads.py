@@ -9,7 +9,7 @@ from virtual_visits import TrackedVisit
 
 from biodance.body.parts import GRAVITY
 from biodance.identification.added_mass import added_mass
-from biodance.identification.identification import Identification, conclude
+from biodance.identification.identification import Identification
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
 from biodance.identification.mismatch import mismatch
@@ -40,9 +40,8 @@ def loaded_arm(reference: Identification, later: Gathered) -> Load:
 
 
 def _load(reference: Identification, later: Gathered, total: Statistics, segment: str, mass: float) -> Load:
-    one = later.visit
-    session = conclude(one.body, total, later.names, noise=later.noise, found=later.found)
-    place = _place_in_model(one, one.body.segment_index(segment))
+    session = replace(later, total=total).identified()
+    place = _place_in_model(later.visit, later.visit.body.segment_index(segment))
     return segment, mass, added_mass(session, reference=reference), added_mass(session), place
 
 

@@ -5,6 +5,7 @@ Used by bench_identification.py. A visit is what identification sees, in the fra
 parameters beside it.
 """
 
+import functools
 import hashlib
 import os
 import tempfile
@@ -14,9 +15,11 @@ from pathlib import Path
 import numpy as np
 from kept_files import kept
 
+import biodance
 from biodance.body.body import Body
 from biodance.identification.statistics import Fit
 from biodance.lab.session.read import read_session
+from biodance.library import locate
 from biodance.motion.kinematics import poses
 from biodance.pipeline.body import body_of
 from biodance.pipeline.trial import examine_trial, prepare_trial
@@ -74,10 +77,19 @@ def subjects(count: int = 20, catalogue: tuple[int, int] = FRESH) -> tuple[Subje
 def visit(
     subject: Subject, protocol: str, *, seed: int, session: int = 0, load: tuple[str, float] | None = None
 ) -> TrackedVisit:
-    """Return one visit, from the cache if it was made before; ``load`` (one of the 12 segments, kg)."""
-    key = f"{subject.mass}-{subject.stature}-{subject.sex}-{protocol}-{seed}-{session}-{load}"
+    """Return one visit, from the cache if the same code made it before; ``load`` (one of the 12 segments, kg)."""
+    key = f"{subject.mass}-{subject.stature}-{subject.sex}-{protocol}-{seed}-{session}-{load}-{_code()}"
     path = CACHE / f"{hashlib.sha256(key.encode()).hexdigest()[:20]}.pickle"
     return kept(path, lambda: _make(subject, protocol, seed, session, load))
+
+
+@functools.cache
+def _code() -> str:
+    """Return a digest of what makes and tracks a visit: the rooms of the package, and all tables."""
+    house = Path(biodance.__file__).parent
+    files = [path for room in ("virtual_lab", "lab", "body", "motion") for path in sorted((house / room).rglob("*.py"))]
+    tables = sorted(Path(locate("anthropometry/uncertainty", "sizes", ".csv")).parents[1].rglob("*.csv"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in (*files, *tables))).hexdigest()
 
 
 def _make(subject: Subject, protocol: str, seed: int, session: int, load: tuple[str, float] | None) -> TrackedVisit:
