@@ -20,6 +20,16 @@ def test_what_is_kept_is_made_once(tmp_path: Path) -> None:
     assert made == [1]
 
 
+def test_what_is_of_records_that_have_moved_is_made_anew(tmp_path: Path) -> None:
+    for name, gone in {
+        "module": b"cbiodance.no_such_room\nRecord\n.",
+        "record": b"cbiodance.records\nNoSuch\n.",
+    }.items():
+        (tmp_path / f"{name}.pickle").write_bytes(gone)
+        for made in ("anew", "never"):
+            assert kept_files.kept(tmp_path / f"{name}.pickle", lambda made=made: made) == "anew"
+
+
 def test_what_was_used_longest_ago_goes_first_and_the_newest_stays(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(kept_files, "MOST", 2.5e-5)  # 25 kB
     paths = [tmp_path / f"{name}.pickle" for name in "abc"]

@@ -23,6 +23,7 @@ _NEEDS = (
 _MIRRORED = 0.035
 """m: a marker so near to the mirror image of the other side's is the same landmark, if no other is nearly as near."""
 _ALONE = 1.6
+"""The next free marker is so many times farther from the mirror image, or beyond `_MIRRORED`."""
 _LENGTH = 0.13
 """Share of the stature within which the markers of a foot are from its ankle."""
 _BEHIND, _BEFORE = -0.012, 0.045

@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.lab.markers.names import meanings_of
 from biodance.lab.markers.sets import landmark, recognise
+from biodance.lab.markers.standing import part_of
 from biodance.records import Array, Markers
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
@@ -41,8 +42,7 @@ def axis_to_head(markers: Markers) -> Array | None:
         [p for name in names if known and (p := landmark(markers, known, name)) is not None] for names in (UPPER, LOWER)
     ]
     if not all(ends):
-        said = {label: found[0].place for label, found in meanings_of(markers.names).items()}
-        parts = {label: place.removeprefix("right_").removeprefix("left_") for label, place in said.items()}
+        parts = {label: part_of(found[0].place) for label, found in meanings_of(markers.names).items()}
         ends = [[markers[label] for label in parts if parts[label] in group] for group in (_HIGH_PARTS, _DEEP_PARTS)]
     if not all(ends):
         ends = [[markers[name] for name in markers.names if words.search(name)] for words in (_HIGH, _DEEP)]
