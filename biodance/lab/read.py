@@ -8,8 +8,8 @@ from pathlib import Path
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.markers.sets import MarkerSet, wearing
-from biodance.lab.plain_text import refuse_special
 from biodance.lab.readers import Reader, extensions, head_text, readers
+from biodance.library import refuse_special
 from biodance.records import Role, Trial
 
 SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -96,7 +97,7 @@ def read_kept(folder: Path) -> KeptResults:
             loads = dict(zip(motions, held["loads"], strict=True))
             session = Path(os.path.normpath(folder / str(held["session"])))
             settings = json.loads(str(held["settings"]))
-    except (OSError, ValueError, KeyError) as error:
+    except (BadZipFile, EOFError, OSError, ValueError, KeyError) as error:
         raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
     return KeptResults(body, source, motions, hashes, loads, session, settings)
 

@@ -25,8 +25,8 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
         Another run is writing there; the folder is the session folder or one above it, is a file, holds recordings,
         holds anything at all without ``force``, or holds only files that biodance did not write.
     """
-    session = Path(session).resolve()
-    folder = (Path(out) if out is not None else session / DEFAULT).resolve()
+    session = Path(os.path.realpath(session))  # unlike Path.resolve, it takes a circle of links
+    folder = Path(os.path.realpath(out if out is not None else session / DEFAULT))
     if folder == session or folder in session.parents:
         raise SessionRefused(
             f"{folder}: results must not lie among the recordings. Give another folder, for example "
