@@ -17,11 +17,6 @@ _HEAD = 8192
 """Bytes of a file that are looked at to find its reader."""
 
 
-def format_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> str:
-    """Return the format of a file as the extension it should have (``.c3d``, ``.trc`` ...); raises as `reader_of`."""
-    return reader_of(path, chosen=chosen).EXTENSIONS[0]
-
-
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
     """Return the reader of a file: the one that knows its head (`sniffed`); where none does, the one that has its
     extension.

@@ -62,9 +62,12 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
         held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in _ARRAYS}
         held |= {f"{k}.{name}": np.array(getattr(one.motion, name), dtype=str) for name in _TEXTS}
     part = folder / f".{MOTIONS}.part"
-    with open(part, "wb") as stream:
-        np.savez(stream, **held)  # type: ignore[arg-type]
-    part.replace(folder / MOTIONS)
+    try:
+        with open(part, "wb") as stream:
+            np.savez(stream, **held)  # type: ignore[arg-type]
+        part.replace(folder / MOTIONS)
+    finally:
+        part.unlink(missing_ok=True)
     return folder / MOTIONS
 
 
