@@ -184,13 +184,13 @@ def test_real_session_finds_static_and_subject(place, static, subject):
 
 
 def test_results_get_a_folder_of_their_own(folder):
-    made = results_folder(None, folder)
+    made = results_folder(folder / "biodance", folder)
     assert made == (folder / "biodance").resolve()
     assert made.is_dir()
     (made / "results.json").write_text("{}")
     with pytest.raises(SessionRefused, match="nothing is overwritten"):
-        results_folder(None, folder)
-    assert results_folder(None, folder, force=True) == made
+        results_folder(folder / "biodance", folder)
+    assert results_folder(folder / "biodance", folder, force=True) == made
     assert read_session(folder).refused == {}
 
 
