@@ -73,7 +73,8 @@ def test_what_comes_and_goes_bears_a_trial_of_which_too_little_is_measured() -> 
     short = problem(body(), (whole, replace(other, use=other.motion.time < 0.5)))
     columns = local_basis(short, replace(effect("external_contact"), target="left_forearm_hand"))
     first, last = model(short, (), known()).white_by_trial(columns).parts
-    assert first.values.any() and last.values.shape == (0, last.columns.size)
+    assert first.values.any()
+    assert last.values.shape == (0, last.columns.size)
 
 
 def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
