@@ -56,6 +56,8 @@ class LoadPosterior:
 class LoadView:
     """What data say of a load on one segment, in the directions in which its place is unknown.
 
+    Where the body's mass holds the load's, b is less by what a body shows per kilogram.
+
     ``squares`` b'b; ``shown`` b'y; ``strength`` (k,) eigenvalues of D'D; ``unit`` and ``surprise`` (k,) D'b and D'y in
     their basis; ``ways`` (10, k) parameters per kg that each direction changes; ``mean`` (10,) u.
     """
@@ -69,12 +71,13 @@ class LoadView:
     mean: Array
 
     @classmethod
-    def of(cls, columns: Array, surprise: Array, unit: tuple[Array, Array]) -> "LoadView":
+    def of(cls, columns: Array, surprise: Array, unit: tuple[Array, Array], less: Array) -> "LoadView":
         """Return the view through ``columns`` (r, 10) of a segment at what the data show, ``surprise`` (r,); ``unit``
-        mean (10,) and factor (10, k) of a load of 1 kg.
+        mean (10,) and factor (10, k) of a load of 1 kg, ``less`` (r,) what the body shows less for every kilogram of
+        it.
         """
         mean, factor = unit
-        b, D = columns @ mean, columns @ factor
+        b, D = columns @ mean - less, columns @ factor
         strength, basis = np.linalg.eigh(D.T @ D)
         D = D @ basis
         return cls(
