@@ -20,7 +20,7 @@ from biodance.identification.information import Information
 from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
 from biodance.identification.loads import unit_load
 from biodance.identification.rival_bodies import Rival, expect_unloaded, rivals, surprised, tables_by_sides
-from biodance.records import Array, Sip
+from biodance.records import Array
 from biodance.threads import one_thread
 
 _THRESHOLD = 0.01

@@ -20,6 +20,7 @@ from biodance.body.inertia import (
     lump_from,
     mirror_inertia,
     parameter_jacobian,
+    stretch_inertia,
     turn_inertia,
 )
 from biodance.body.tables.anthropometry import Reference, proportion
@@ -201,8 +202,9 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
     frame.
 
     The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table
-    cuts the trunk. The trunk above the cut keeps its place in the person, also where the joint lies elsewhere. The foot
-    lies between the person's heel and toe, wherever between them the ankle is.
+    cuts the trunk, and stays as wide and deep where that is lower (`Skeleton.squeezed`). The trunk above the cut keeps
+    its place in the person, also where the joint lies elsewhere. The foot lies between the person's heel and toe,
+    wherever between them the ankle is.
     """
     lumps = []
     for segment in SEGMENTS:
@@ -211,6 +213,7 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
         scale, mass = skeleton.lengths[segment] / reference.lengths[kind], unit.mass * subject.mass
         lump = RigidInertia(mass, scale * unit.com, mass * scale**2 * unit.inertia)
         if segment == "pelvis":
+            lump = stretch_inertia(lump, np.array([1.0, skeleton.squeezed, 1.0]) / skeleton.squeezed)
             lump = turn_inertia(lump, _upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
         if segment == "trunk_head":
             lump = replace(lump, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
