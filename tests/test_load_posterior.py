@@ -48,6 +48,22 @@ def test_the_likelihood_ratio_is_that_of_two_normal_densities(seed: int) -> None
         assert one.log_ratio(np.array([m]))[0] == pytest.approx(expected, rel=1e-9, abs=1e-8)
 
 
+def test_the_mass_of_a_load_near_the_middle_of_its_segment_is_right_in_the_mean() -> None:
+    """The data tell 2.4 kg to 0.3 kg and its first moments to 1 g·m."""
+    rng, factor, middle = np.random.default_rng(5), np.zeros((10, 3)), np.eye(10)[0]
+    factor[1:4] = 0.15 * np.eye(3)
+    columns, errors = np.diag([1 / 0.3, *np.full(3, 1e3), *np.zeros(6)]), []
+    for _ in range(200):
+        shown = columns @ (2.4 * (middle + 0.4 * factor @ rng.normal(size=3))) + rng.normal(size=10)
+        one = LoadView.of(columns, shown, (middle, factor), np.zeros(10))
+        evidence = one.log_ratio(MASSES) + log_mass_prior(MASSES)
+        weights = [np.exp(log - log.max()) for log in (evidence, evidence + one.log_told(MASSES))]
+        errors.append([weight @ MASSES / weight.sum() - 2.4 for weight in weights])
+    by_evidence, size = np.mean(errors, axis=0)
+    assert abs(size) < 0.05
+    assert by_evidence < -0.05
+
+
 def test_no_load_and_the_interval_never_contradict_each_other() -> None:
     rng, announced = np.random.default_rng(7), 0
     for _ in range(400):

@@ -164,7 +164,9 @@ class _Judged:
 def _suspect(segment: str, i: int, bodies: tuple[_Judged, ...], load: Array, none: float) -> LoadCandidate:
     """Return the hypothesis of a load on segment ``i`` from the log probabilities of it (rivals, n) and of ``none``."""
     chance = float(logsumexp(load))
-    here = np.exp(load - np.logaddexp(chance, none))
+    size = load + np.array([one.views[i].log_told(MASSES) for one in bodies])
+    size += (logsumexp(load, axis=1) - logsumexp(size, axis=1))[:, None]
+    here = np.exp(size - np.logaddexp(chance, none))
     posterior = LoadPosterior(float(np.exp(none - np.logaddexp(chance, none))), here.sum(axis=0))
     place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
     if posterior.interval[0] > 0:

@@ -39,8 +39,8 @@ class Skeleton:
     the parent segment's frame. ``turns`` by joint: (3, 3) constant rotation parent_R_child at zero angle (varus, tibial
     torsion, carrying angle), identity if absent. ``cut`` by segment, pelvis and trunk_head: (3,) m in its frame, where
     the table of masses cuts one from the other, if not at the joint. ``ankle_height`` m over the sole and
-    ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m. ``squeezed``: length of the pelvis over the one that it
-    is as wide and deep as.
+    ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m. ``squeezed``: length of the pelvis over the one
+    that it is as wide and deep as.
     """
 
     lengths: Mapping[str, float]
