@@ -47,11 +47,13 @@ def test_matter_along_with_the_joint_keeps_its_mass_and_its_place_over_the_joint
     limbs = [i for i in range(12) if i not in (0, TRUNK)]
     np.testing.assert_allclose(body.at_joint.com[limbs], body.sip.com[limbs], atol=1e-12)
     assert 0 < body.at_joint.com[0, 1] < body.sip.com[0, 1]  # the pelvis ends lower
-    high, low = (rigid_inertia(sip.phi[:10]).inertia for sip in (body.sip, body.at_joint))
-    width, depth = (0.5 * np.trace(high) - high[axis, axis] for axis in (2, 0))
-    assert 0.5 * np.trace(low) - low[2, 2] == pytest.approx(width, rel=1e-9)  # ... and is as wide as it was
-    assert 0.5 * np.trace(low) - low[0, 0] == pytest.approx(depth, rel=0.05)  # and deep, but for the slant of its axis
-    assert np.trace(low) < np.trace(high)
+    for at, times, slant in ((0, 0.5, 0.05), (10 * TRUNK, 1.1, 0.0)):  # ... and the trunk begins there
+        high, low = (rigid_inertia(sip.phi[at : at + 10]).inertia for sip in (body.sip, body.at_joint))
+        (depth, tall, width), now = (0.5 * np.trace(one) - np.diag(one) for one in (high, low))
+        assert now[2] == pytest.approx(width, rel=1e-9)  # as wide as it was
+        assert now[0] == pytest.approx(depth, rel=slant + 1e-9)  # and deep, but for the slant of the pelvis
+        assert now[1] / tall == pytest.approx(times, rel=0.3)
+        assert bool(now[1] > tall) is bool(at)
     assert (body.com_boxes[:, 0] <= np.minimum(body.sip.com, body.at_joint.com)).all()
 
 
