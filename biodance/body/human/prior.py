@@ -202,9 +202,8 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
     frame.
 
     The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table
-    cuts the trunk. Pelvis and trunk that are cut at a joint that lies elsewhere are as wide and deep as ever
-    (`Skeleton.stretched`). The trunk above the cut keeps its place in the person, also where the joint lies elsewhere.
-    The foot lies between the person's heel and toe, wherever between them the ankle is.
+    cuts the trunk, and the trunk keeps its place in the person, unless both are cut at the joint (`cut_at_joint`). The
+    foot lies between the person's heel and toe, wherever between them the ankle is.
     """
     lumps = []
     for segment in SEGMENTS:
