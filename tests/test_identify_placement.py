@@ -120,7 +120,7 @@ def test_sides_are_alike_until_the_data_show_them_apart() -> None:
 
 
 def test_what_is_known_about_true_centres() -> None:
-    placed = tuple(JointError(joint, 0.01, 0.0) for joint in ("trunk", "right_hip", "left_knee", "left_elbow"))
+    placed = tuple(JointError(joint, 0.001, 0.0) for joint in ("trunk", "right_hip", "left_knee", "left_elbow"))
     body = replace(low_joint(), joint_errors=placed)
     table = widened(body.sip, body.joint_errors)
     off = misplaced(table, body.joint_errors)
@@ -128,6 +128,11 @@ def test_what_is_known_about_true_centres() -> None:
     np.testing.assert_allclose(nothing, table.covariance - off, atol=1e-7)  # what the table is off
     all_told = from_true_centres(replace(table, covariance=np.zeros((120, 120))), table, body.joint_errors)
     np.testing.assert_allclose(all_told.covariance, off)  # what the joints are off
+    bending = (JointError("trunk", 0.03, 0.0), *placed[1:])  # a trunk that the placing leaves 3 cm off
+    np.testing.assert_allclose(from_true_centres(table, table, bending).covariance, nothing, atol=1e-7)
+    there = from_true_centres(replace(table, covariance=np.zeros((120, 120))), table, bending).covariance
+    first = there[10 * TRUNK + 1, 10 * TRUNK + 1]
+    assert first == pytest.approx((0.03 * body.sip.mass[TRUNK]) ** 2)
     draw = np.random.default_rng(5).normal(size=(120, 120))
     belief = np.linalg.inv(np.linalg.inv(table.covariance) + draw[:, :40] @ draw[:, :40].T)
     known = from_true_centres(replace(table, covariance=belief), table, body.joint_errors).covariance
