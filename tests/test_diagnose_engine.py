@@ -192,11 +192,12 @@ def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkey
 
     monkeypatch.setattr("diagnosed_sessions.motion", quick)
     put, causes = built(problem(body(), looks(1, hidden=filtered)), known(), ("filter_mismatch", "wobbling_mass"))
-    suspects = {one.cause.names[0]: one for one in reversed(screen(put, causes))}
+    suspects = {one.effect.name: one for one in reversed(screen(put, causes))}
     one = suspects["filter_mismatch"]
     assert one.score > suspects["wobbling_mass"].score
     assert one.start[0] in effect("filter_mismatch").typical * effect("filter_mismatch").screened_at
-    near_none = evidence(*put.belief.score(put.white(one.cause.basis)), 1.0).log_bayes_factor
+    columns = next(c.basis for c in causes if c.names == one.names)
+    near_none = evidence(*put.belief.score(put.white(columns)), 1.0).log_bayes_factor
     assert one.log_bayes_factor > 2 * near_none
 
 

@@ -105,7 +105,7 @@ def name_causes(
         again = stale(settled) and strain(settled) <= STRAINED
         found, causes = rebuilt(settled, tolerances, chosen) if again else (settled, causes)
         ranking = Round(
-            tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named})
+            tuple(one for one in screen(found, causes) if one.names not in {named_of(n) for n in found.named})
         )
     found, kept = held(found, tuple(accepted))
     return Naming(first, found, kept, screening, first_causes, bare)
@@ -224,7 +224,7 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     near = _near(ranking)
     refined = []
     for one in near:
-        start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
+        start = NamedCause(one.effect, one.start, np.empty((0, 0)))
         settled = settle(found, (*found.named, start))
         gain = more_probable(settled, found)
         last = settled.named[-1]
