@@ -108,7 +108,7 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     suspects = screen(found, causes)
     assert len(suspects) == 12
     rows = detection_limits(visibility(found, causes), put.cases[0].body, 10.0)
-    assert {(row.effect, row.target) for row in rows} == {one.cause.names for one in suspects}
+    assert {(row.effect, row.target) for row in rows} == {one.names for one in suspects}
     assert all(row.told_from >= row.limit > 0 for row in rows)
 
 
