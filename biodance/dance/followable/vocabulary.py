@@ -18,8 +18,10 @@ from biodance.records import SIDES
 
 _KEYS = ("name", "angles", "mirror", "rest", "gentle", "deep", "double")
 _GROUPS = ("arm", "trunk", "legs", "lifted", "hanging")
-PELVIS_TILT, PELVIS_LEAN = "pelvis_tilt", "pelvis_lean"
-"""Angles of a word that are no joint's: how far the pelvis leans forward, and towards the leg that stands."""
+PELVIS_TURN, PELVIS_LEAN, PELVIS_TILT = _PELVIS = ("pelvis_turn", "pelvis_lean", "pelvis_tilt")
+"""Angles of a word that are no joint's: how far the pelvis turns to the left, leans towards the leg that stands (of
+words of the trunk: to the right), and leans forward.
+"""
 _FREE = {
     "shoulder_flexion": (0, 30, 60, 90, 120),
     "shoulder_adduction": (-45, -60, -75, -90),
@@ -53,10 +55,10 @@ class Word:
     double: bool = False
 
     @property
-    def pelvis(self) -> tuple[float, float]:
-        """How far the pelvis leans forward, and towards the leg that stands, rad."""
+    def pelvis(self) -> tuple[float, float, float]:
+        """How far the pelvis turns to the left, leans towards the leg that stands, and leans forward, rad."""
         angles = dict(self.angles)
-        return angles.get(PELVIS_TILT, 0.0), angles.get(PELVIS_LEAN, 0.0)
+        return angles.get(PELVIS_TURN, 0.0), angles.get(PELVIS_LEAN, 0.0), angles.get(PELVIS_TILT, 0.0)
 
 
 Vocabulary = dict[str, tuple[Word, ...]]
@@ -207,7 +209,7 @@ def _short_of(body: Body, part: str, word: Word) -> str:
 
 def _near(body: Body, part: str, joint: str, angle: float) -> float:
     """Return the angle of a word within the range of this body's joint; the pelvis' own are free."""
-    if joint in (PELVIS_TILT, PELVIS_LEAN):
+    if joint in _PELVIS:
         return angle
     j = body.joint_index(own_joint(part, joint))
     low, high = body.limits.lower[j] + _STOP, body.limits.upper[j] - _STOP
