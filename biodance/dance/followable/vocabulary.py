@@ -3,7 +3,7 @@
 The words lie in ``protocols/vocabulary/people.toml``, which explains its keys.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -16,7 +16,8 @@ from biodance.errors import BiodanceError
 from biodance.library import locate, read_toml
 from biodance.records import SIDES
 
-_KEYS = ("name", "angles", "mirror", "rest", "gentle", "deep", "double")
+_FLAGS = ("rest", "gentle", "deep", "lively", "double")
+_KEYS = ("name", "angles", "mirror", *_FLAGS)
 _GROUPS = ("arm", "trunk", "legs", "lifted", "hanging")
 PELVIS_TURN, PELVIS_LEAN, PELVIS_TILT = _PELVIS = ("pelvis_turn", "pelvis_lean", "pelvis_tilt")
 """Angles of a word that are no joint's: how far the pelvis turns to the left, leans towards the leg that stands (of
@@ -52,6 +53,7 @@ class Word:
     rest: bool = False
     gentle: bool = False
     deep: bool = False
+    lively: bool = False
     double: bool = False
 
     @property
@@ -98,7 +100,7 @@ def _word(where: str, key: str, raw: dict[str, Any]) -> Word:
     if unknown := set(raw) - set(_KEYS):
         raise BiodanceError(f"{where}: unknown key {sorted(unknown)[0]!r}; legal are {', '.join(_KEYS)}.")
     angles = tuple((joint, float(np.radians(angle))) for joint, angle in raw.get("angles", {}).items())
-    flags = {name: bool(raw.get(name, False)) for name in ("rest", "gentle", "deep", "double")}
+    flags = {name: bool(raw.get(name, False)) for name in _FLAGS}
     return Word(key, str(raw["name"]), angles, str(raw.get("mirror", key)), **flags)
 
 
@@ -132,7 +134,10 @@ def _asked(plan: Plan, stance: Stance, words: tuple[Word, ...]) -> list[Word]:
     return [
         word
         for word in words
-        if (plan.deep or not word.deep) and (word.gentle or not plan.gentle) and not (alone and word.double)
+        if (plan.deep or not word.deep)
+        and (plan.lively or not word.lively)
+        and (word.gentle or not plan.gentle)
+        and not (alone and word.double)
     ]
 
 
@@ -195,7 +200,7 @@ def _fitted(body: Body, part: str, word: Word) -> Word | None:
     if not word.rest and _short_of(body, part, word):
         return None
     within = tuple((joint, _near(body, part, joint, angle)) for joint, angle in word.angles)
-    return Word(word.key, word.text, within, word.mirror, word.rest, word.gentle, word.deep, word.double)
+    return replace(word, angles=within)
 
 
 def _short_of(body: Body, part: str, word: Word) -> str:
