@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from biodance.lab.markers.names import Meaning, sides_of
+from biodance.lab.markers.posture import joint_by_posture, middle_by_posture, taken_by_posture, toes_by_posture
 from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.standing import Standing
@@ -20,6 +21,8 @@ _NEEDS = (
     ("toe", ("toe_lateral", "toe_medial")),
 )
 """Landmarks that a body needs on each side, and what stands in for them."""
+_USEFUL = ("knee_medial", "ankle_medial", "acromion")
+"""Landmarks that a body can do without, and that posture tells as well."""
 _MIRRORED = 0.035
 """m: a marker so near to the mirror image of the other side's is the same landmark, if no other is nearly as near."""
 _ALONE = 1.6
@@ -48,30 +51,89 @@ def fill_absent(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
     """Take markers without a landmark for those that a body needs and that no label names; return what was taken, in
     sentences. ``places`` landmark -> label is added to.
     """
-    taken, markers, sides = [], plain_labels(stand.at), sides_of(stand.at)
-    lacking = {f"{side}_{part}" for side in SIDES for part, others in _NEEDS} - places.keys()
+    taken = _by_mirror_image(places, stand, said) + _by_posture(places, stand, said)
+    sides = sides_of(stand.at)
+    for place in _lacking(places):
+        side, _, part = place.partition("_")
+        own = [label for label in _free(place, places, stand, said) if sides.get(label) == side]
+        found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), own, stand)
+        if found is not None:
+            places[place] = found
+            which = "hind" if part == "heel" else "fore"
+            taken.append(f"{found} is the {which}most of its foot: taken for the {_words(place)}.")
+    return taken
+
+
+def _lacking(places: Mapping[str, str]) -> list[str]:
+    """Return the needed landmarks of both sides that nothing is taken for."""
+    lacking = {
+        f"{side}_{part}"
+        for side in SIDES
+        for part, others in _NEEDS
+        if not {f"{side}_{one}" for one in (part, *others)} & places.keys()
+    }
     if "mid_psis" not in places:
         lacking |= {f"{side}_psis" for side in SIDES} - places.keys()
-    for place in sorted(lacking):
+    return sorted(lacking)
+
+
+def _by_mirror_image(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Take the markers at the mirror images of those that are known on the other side; return them in sentences."""
+    taken = []
+    for place in _lacking(places):
         side, _, part = place.partition("_")
-        if part == "toe" and places.keys() & {f"{side}_toe_lateral", f"{side}_toe_medial"}:
-            continue
         other = places.get(f"{'left' if side == 'right' else 'right'}_{part}")
-        free = [label for label in markers if label not in places.values() and _may_be(place, said.get(label, ()))]
-        found = _at_mirror_image(place, other, free, stand) if other else None
+        found = _at_mirror_image(place, other, _free(place, places, stand, said), stand) if other else None
         if found is not None:
             places[place] = found
             taken.append(f"{found} lies where the mirror image of {other} is: taken for the {_words(place)}.")
-        elif part in ("heel", "toe"):
-            own = [label for label in free if sides.get(label) == side]
-            found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), own, stand)
-            if found is not None:
-                places[place] = found
-                taken.append(
-                    f"{found} is the {'hind' if part == 'heel' else 'fore'}most of its foot: taken for the "
-                    f"{_words(place)}."
-                )
     return taken
+
+
+def _by_posture(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Take pairs of markers for what nobody named, where no other markers of a standing person can be it; return what
+    was taken, in sentences.
+    """
+    before = dict(places)
+    for joint in ("knee", "ankle"):
+        if not any(f"{side}_{joint}_lateral" in places for side in SIDES):
+            ends = [f"{joint}_{end}" for end in ("lateral", "medial")]
+            both = {
+                side: [
+                    label
+                    for label in _free(f"{side}_{ends[0]}", places, stand, said)
+                    if label in _free(f"{side}_{ends[1]}", places, stand, said)
+                ]
+                for side in SIDES
+            }
+            if not any(f"{side}_{ends[1]}" in places for side in SIDES):
+                places |= joint_by_posture(joint, both, places, stand)
+    for part in (*(part for part, _ in _NEEDS if part != "toe"), "psis", *_USEFUL):
+        if part == "psis" and "mid_psis" in places:
+            continue
+        free = {f"{side}_{part}": _free(f"{side}_{part}", places, stand, said) for side in SIDES}
+        places |= taken_by_posture(part, free, places, stand)
+    if "mid_psis" not in places and not {"left_psis", "right_psis"} & places.keys():
+        found = middle_by_posture("mid_psis", _free("mid_psis", places, stand, said), places, stand)
+        places |= {"mid_psis": found} if found else {}
+    if not any(f"{side}_{part}" in places for side in SIDES for part in ("toe", "toe_lateral", "toe_medial")):
+        front = {side: _free(f"{side}_toe", places, stand, said) for side in SIDES}
+        places |= toes_by_posture(front, places, stand)
+    return [
+        f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
+        for place, label in places.items()
+        if place not in before
+    ]
+
+
+def _free(place: str, places: Mapping[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Return the labels without a landmark that say nothing, or nothing else than this place."""
+    useful = place.partition("_")[2] in _USEFUL
+    return [
+        label
+        for label in plain_labels(stand.at)
+        if label not in places.values() and (not said.get(label) if useful else _may_be(place, said.get(label, ())))
+    ]
 
 
 def _words(place: str) -> str:
@@ -101,7 +163,7 @@ def _end_of_foot(place: str, ankle: str | None, own: Iterable[str], stand: Stand
     """Return the hindmost (heel) or foremost (toe) marker near the ground and this ankle, of those whose labels say its
     side; None if none lies far enough from the ankle.
     """
-    if ankle is None:
+    if ankle is None or not place.endswith(("heel", "toe")):
         return None
     way = {label: (stand.at[label] - stand.at[ankle]) / stand.stature for label in own}
     ahead = {
