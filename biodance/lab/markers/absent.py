@@ -3,6 +3,7 @@ other side's, or the hindmost and foremost of the foot. What is found so is said
 """
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -91,34 +92,23 @@ def _by_mirror_image(places: dict[str, str], stand: Standing, said: Mapping[str,
 
 
 def _by_posture(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
-    """Take pairs of markers for what nobody named, where no other markers of a standing person can be it; return what
-    was taken, in sentences.
+    """Take pairs of markers for what nobody named, where no other markers of a standing person can be it: of those
+    whose labels say nothing, then of those that say no more than a segment; return what was taken, in sentences.
     """
     before = dict(places)
-    for joint in ("knee", "ankle"):
-        if not any(f"{side}_{joint}_lateral" in places for side in SIDES):
-            ends = [f"{joint}_{end}" for end in ("lateral", "medial")]
-            both = {
-                side: [
-                    label
-                    for label in _free(f"{side}_{ends[0]}", places, stand, said)
-                    if label in _free(f"{side}_{ends[1]}", places, stand, said)
-                ]
-                for side in SIDES
-            }
-            if not any(f"{side}_{ends[1]}" in places for side in SIDES):
-                places |= joint_by_posture(joint, both, places, stand)
-    for part in (*(part for part, _ in _NEEDS if part != "toe"), "psis", *_USEFUL):
-        if part == "psis" and "mid_psis" in places:
-            continue
-        free = {f"{side}_{part}": _free(f"{side}_{part}", places, stand, said) for side in SIDES}
-        places |= taken_by_posture(part, free, places, stand)
-    if "mid_psis" not in places and not {"left_psis", "right_psis"} & places.keys():
-        found = middle_by_posture("mid_psis", _free("mid_psis", places, stand, said), places, stand)
-        places |= {"mid_psis": found} if found else {}
-    if not any(f"{side}_{part}" in places for side in SIDES for part in ("toe", "toe_lateral", "toe_medial")):
-        front = {side: _free(f"{side}_toe", places, stand, said) for side in SIDES}
-        places |= toes_by_posture(front, places, stand)
+    for mute in (True, False):
+        free = partial(_free_on_sides, places, stand, said, mute)
+        for joint in ("knee", "ankle"):
+            if not _have(places, f"{joint}_lateral", f"{joint}_medial"):
+                places.update(joint_by_posture(joint, free(f"{joint}_lateral"), places, stand))
+        for part in (*(part for part, _ in _NEEDS if part != "toe"), "psis", *(_USEFUL if mute else ())):
+            if part != "psis" or "mid_psis" not in places:
+                places.update(taken_by_posture(part, free(part), places, stand))
+        if not _have(places, "psis") and "mid_psis" not in places:
+            middle = middle_by_posture("mid_psis", _free("mid_psis", places, stand, said, mute=mute), places, stand)
+            places.update({"mid_psis": middle} if middle else {})
+        if not _have(places, "toe", "toe_lateral", "toe_medial"):
+            places.update(toes_by_posture(free("toe"), places, stand))
     return [
         f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
         for place, label in places.items()
@@ -126,13 +116,34 @@ def _by_posture(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
     ]
 
 
-def _free(place: str, places: Mapping[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
-    """Return the labels without a landmark that say nothing, or nothing else than this place."""
-    useful = place.partition("_")[2] in _USEFUL
+def _free_on_sides(
+    places: Mapping[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]], mute: bool, part: str
+) -> dict[str, list[str]]:
+    return {side: _free(f"{side}_{part}", places, stand, said, mute=mute) for side in SIDES}
+
+
+def _have(places: Mapping[str, str], *parts: str) -> bool:
+    return any(f"{side}_{part}" in places for side in SIDES for part in parts)
+
+
+def _free(
+    place: str,
+    places: Mapping[str, str],
+    stand: Standing,
+    said: Mapping[str, tuple[Meaning, ...]],
+    *,
+    mute: bool = False,
+) -> list[str]:
+    """Return the labels without a landmark that say nothing (``mute``), or nothing else than this place; none that says
+    the other side.
+    """
+    side, sides = place.partition("_")[0], sides_of(stand.at)
     return [
         label
         for label in plain_labels(stand.at)
-        if label not in places.values() and (not said.get(label) if useful else _may_be(place, said.get(label, ())))
+        if label not in places.values()
+        and (side not in SIDES or sides.get(label, side) == side)
+        and (not said.get(label) if mute else _may_be(place, said.get(label, ())))
     ]
 
 

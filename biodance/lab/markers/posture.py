@@ -84,10 +84,12 @@ def taken_by_posture(
     """Return landmark -> label of a ``part`` (without side) of both sides, as far as it is not among ``known``; nothing
     where none or several pairs of markers can be it.
 
-    ``free`` landmark -> labels that may be it; ``known`` landmark -> label of those that are certain.
+    ``free`` side -> labels that may be it; ``known`` landmark -> label of those that are certain.
     """
     places = [f"{side}_{part}" for side in SIDES]
-    first, second = ([known[place]] if place in known else list(free.get(place, ())) for place in places)
+    first, second = (
+        [known[place]] if place in known else list(free[side]) for side, place in zip(SIDES, places, strict=True)
+    )
     pair = _only_pair(part, first, second, stand, _ankles(known, stand)) if first and second else None
     found = dict(zip(places, pair, strict=True)) if pair else {}
     return {place: label for place, label in found.items() if place not in known}
@@ -161,10 +163,16 @@ def toes_by_posture(free: Mapping[str, Iterable[str]], known: Mapping[str, str],
         front.sort(key=lambda k: -sign * float(points[k, 0]))
         if len(front) == 1:
             out[f"{side}_toe"] = labels[front[0]]
-        elif front and sign * float(points[front[0], 0] - points[front[-1], 0]) > _BALL * stand.stature:
+        elif front and _ball(points[front[0]], points[front[-1]]) > _BALL * stand.stature:
             out |= {f"{side}_toe_lateral": labels[front[0]], f"{side}_toe_medial": labels[front[-1]]}
     parts = [{place for place in out if place.startswith(side)} for side in SIDES]
     return out if len(parts[0]) == len(parts[1]) else {}
+
+
+def _ball(outer: Array, inner: Array) -> float:
+    """Return how far apart two markers of a foot are, m; 0 where one is not beside but before the other."""
+    across, along = np.abs(outer - inner)[:2]
+    return float(np.hypot(across, along)) if along < across else 0.0
 
 
 def middle_by_posture(part: str, free: Iterable[str], known: Mapping[str, str], stand: Standing) -> str | None:
