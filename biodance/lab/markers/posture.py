@@ -50,7 +50,7 @@ _SAME = 0.012
 """Share of the stature within which two markers mark one landmark."""
 _MIRRORED = 0.03
 """m: so near to the mirror image of another marker a marker is its pair."""
-_STATURES = np.geomspace(0.85, 2.15, 48)
+_STATURES = np.geomspace(0.85, 2.15, 40)
 """m: statures that are tried."""
 _LEVEL, _WIDE = 0.025, 0.1
 """m: difference in height, and distance, of two markers that may be mirror images."""
@@ -294,8 +294,10 @@ def _fitted(at: Mapping[str, Array], xyz: Array, right: Array, offset: float) ->
         floor = low - _SOLE * stature
         lateral = person & (np.abs((up - floor) / stature - 0.044) < 0.02) & (np.abs(out) > 0.05 * stature)
         stand = Standing(at, {}, right, ahead, right * offset, floor, float(stature))
-        for origin in np.unique(along[lateral].round(2)):
-            best = min(best, (_misfit(points, stand, float(origin)), float(stature), float(origin)))
+        origins = np.unique(along[lateral].round(2))
+        if origins.size:
+            ill = _misfit(points, stand, origins[:, None])
+            best = min(best, (float(ill.min()), float(stature), float(origins[int(ill.argmin())])))
     ill, stature, origin = best
     if ill > _NEAR * len(_NEEDED):
         return None
@@ -303,16 +305,19 @@ def _fitted(at: Mapping[str, Array], xyz: Array, right: Array, offset: float) ->
     return ill, Standing(at, {}, right, ahead, right * offset + ahead * origin, floor, stature)
 
 
-def _misfit(points: Array, stand: Standing, origin: float) -> float:
-    """Return the sum over the needed landmarks of both sides of how far the nearest of ``points`` (N, 3) is, in squared
-    standard deviations, each at most twice what is believed; more for a person with markers above the head.
+def _misfit(points: Array, stand: Standing, origin: Array) -> Array:
+    """Return (O,) the sum over the needed landmarks of both sides of how far the nearest of ``points`` (N, 3) is, in
+    squared standard deviations, each at most twice what is believed; more for a person with markers above the head.
+    ``origin`` (O, 1) m where the ankles are.
     """
-    ways = [(part, sign) for part in _NEEDED for sign in (1.0, -1.0)]
-    ill = sum(min(float(_away(points, part, sign, stand, origin).min()), 2 * _NEAR) for part, sign in ways)
-    behind = min(float(_away(points, part, 1.0, stand, origin).min()) for part in ("psis", "mid_psis"))
+    sides = [(part, sign) for part in _NEEDED for sign in (1.0, -1.0)]
+    near = [_away(points, part, sign, stand, origin).min(axis=1) for part, sign in sides]
+    behind = [_away(points, part, 1.0, stand, origin).min(axis=1) for part in ("psis", "mid_psis")]
+    ill = np.minimum([*near, np.minimum(*behind)], 2 * _NEAR).sum(axis=0)
     trunk = points[np.abs(points[:, 0]) < 0.12 * stand.stature]
     over = max(float((trunk[:, 2] - stand.floor).max(initial=0.0)) / stand.stature - 1.03, 0.0) / 0.02
-    return ill + min(behind, 2 * _NEAR) + over**2
+    found: Array = ill + over**2
+    return found
 
 
 def _points(labels: Iterable[str], stand: Standing) -> Array:
@@ -321,11 +326,12 @@ def _points(labels: Iterable[str], stand: Standing) -> Array:
     return np.stack([(xyz - stand.middle) @ stand.right, xyz @ stand.ahead, xyz[:, 2]], axis=1)
 
 
-def _away(points: Array, part: str, sign: float, stand: Standing, origin: float) -> Array:
+def _away(points: Array, part: str, sign: float, stand: Standing, origin: float | Array) -> Array:
     """Return (N,) how far every point is from the usual place of a landmark, in squared standard deviations; ``sign``
-    -1 for the left one, ``origin`` m where the ankles are along the person's ahead.
+    -1 for the left one, ``origin`` m where the ankles are along the person's ahead ((O, 1): for each of them, (O, N)).
     """
     place, spread = _USUAL[part]
-    here = (points - [0.0, origin, stand.floor]) / stand.stature * [sign, 1.0, 1.0]
-    found: Array = (((here - place) / spread) ** 2).sum(axis=1)
+    here = (sign * points[:, 0], points[:, 1] - origin, points[:, 2] - stand.floor)
+    steps = [(one / stand.stature - usual) / by for one, usual, by in zip(here, place, spread, strict=True)]
+    found: Array = steps[0] ** 2 + steps[1] ** 2 + steps[2] ** 2
     return found
