@@ -231,12 +231,14 @@ def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_link_that_leads_nowhere_is_one_bad_file(session, tmp_path):
+def test_a_link_that_leads_nowhere_is_one_bad_file(session, tmp_path, monkeypatch):
     for name in ("static.c3d", "walk.c3d", "session.toml"):
         shutil.copy(session / name, tmp_path)
     (tmp_path / "broken.c3d").symlink_to("nowhere")
     (tmp_path / "again").symlink_to(".")
-    found = read_session(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    found = read_session(".")
+    assert found.folder.name == tmp_path.name
     assert "broken.c3d: cannot be opened" in found.refused["broken.c3d"]
     assert archive_folders(tmp_path) == ((tmp_path,), ())
 

@@ -163,7 +163,7 @@ def read_session(
 
 
 def session_folder(folder: str | Path) -> Path:
-    """Return the path of a session; SessionRefused if it is missing or no folder."""
+    """Return the path of a session, with a name also where it is "."; SessionRefused if it is missing or no folder."""
     folder = Path(folder)
     if not folder.exists():
         raise SessionRefused(f"{folder}: there is no such folder. Check the path.")
@@ -171,7 +171,7 @@ def session_folder(folder: str | Path) -> Path:
         raise SessionRefused(
             f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder."
         )
-    return folder
+    return folder.resolve() if folder.name in ("", "..") else folder
 
 
 def _refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:
