@@ -8,7 +8,7 @@ from diagnosed_sessions import body, known, looks
 from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import Candidate, candidates, changes, removed, slopes
+from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
 from biodance.diagnosis.evidence import believe, evidence, smallest
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
@@ -66,6 +66,15 @@ def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
     causes = candidates(put, ("plate_offset",))
     left = model(put, causes, known()).belief.left[: put.wrench_rows]
     assert np.mean(left**2) == pytest.approx(0.9, abs=0.15)
+
+
+def test_what_comes_and_goes_bears_a_trial_of_which_too_little_is_measured() -> None:
+    whole, other = looks(3, trials=2)
+    short = problem(body(), (whole, replace(other, use=other.motion.time < 0.5)))
+    columns = local_basis(short, replace(effect("external_contact"), target="left_forearm_hand"))
+    first, last = model(short, (), known()).white_by_trial(columns).parts
+    assert first.values.any()
+    assert last.values.shape == (0, last.columns.size)
 
 
 def test_differences_of_a_cause_agree_with_its_columns(put) -> None:

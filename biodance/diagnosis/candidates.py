@@ -133,7 +133,7 @@ def local_basis(problem: Problem, effect: Effect) -> ByTrial | None:
         if samples is None:
             return None
         block = problem.spectrum.of_trial(index, samples)
-        blocks.append(block.reshape(6 * len(block), -1))
+        blocks.append(block.reshape(6 * len(block), block.shape[2]))
     return ByTrial.of(blocks)
 
 
