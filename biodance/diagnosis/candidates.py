@@ -104,7 +104,7 @@ def candidate(problem: Problem, effect: Effect, unit: Array) -> Candidate:
     return Candidate(effect, basis.astype(np.float32), tuple(bool(s) for s in silent))
 
 
-def columns_of(causes: Sequence[Candidate]) -> tuple[Array, tuple[slice, ...]]:
+def bases_of(causes: Sequence[Candidate]) -> tuple[Array, tuple[slice, ...]]:
     """Return the columns (r, k) of all ``causes`` side by side, and where each of them lies."""
     ends = np.cumsum([0, *(one.basis.shape[1] for one in causes)]).tolist()
     return np.concatenate([one.basis for one in causes], axis=1, dtype=float), tuple(

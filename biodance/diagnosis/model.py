@@ -169,7 +169,7 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
     return Nuisances(tuple(parts), np.array(scale), tuple(keys), tuple(means), tolerated)
 
 
-def _where_not_shown(problem: Problem, columns: Array) -> Array:
+def _where_not_shown(problem: Problem, columns: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return ``columns`` (r, k) with zero in the rows of sizes shown: what everybody does by habit is taken off there
     already (`Effect.shown`).
     """

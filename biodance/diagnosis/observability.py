@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import SCALE, Candidate, changes, columns_of
+from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, changes
 from biodance.diagnosis.consequence import least, unit_at
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import smallest
@@ -130,7 +130,7 @@ def unit_directions(one: Candidate) -> list[Array]:
 
 def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
     """Return what ``found``, a model without named causes, lets every cause show."""
-    Z, cuts = columns_of(causes)
+    Z, cuts = bases_of(causes)
     _, G = found.belief.score(found.white(Z, out=Z))
     return Visibility(causes, G, cuts, found)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.diagnosis.candidates import AT_ONCE, SCALE, Candidate, columns_of, removed
+from biodance.diagnosis.candidates import AT_ONCE, SCALE, Candidate, bases_of, removed
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.evidence import Evidence, evidence
 from biodance.diagnosis.model import Model
@@ -53,7 +53,7 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
 
 def _scored(found: Model, causes: tuple[Candidate, ...]) -> Iterator[Evidence]:
     """Yield the evidence of some causes near none, beside those that were named."""
-    Z, cuts = columns_of(causes)
+    Z, cuts = bases_of(causes)
     Z = found.white(Z, out=Z)
     s = Z.T @ found.belief.left
     half = found.belief.half(found.belief.X.T @ Z)
