@@ -19,8 +19,9 @@ def frozen_frames(xyz: Array) -> Mask:
     frames; nowhere in a recording that never moves, as a posture kept as many equal frames is.
     """
     seen = np.isfinite(xyz).all(axis=2)
-    same = np.all((xyz[1:] == xyz[:-1]).all(axis=2) | ~(seen[1:] | seen[:-1]), axis=1)
-    repeats = np.append(False, same & (seen[1:].sum(axis=1) >= _FEWEST))
+    equal = np.all(xyz[1:] == xyz[:-1], axis=2) | ~(seen[1:] | seen[:-1])
+    repeats = np.zeros(len(xyz), dtype=bool)
+    repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
     if repeats.sum() >= len(repeats) - 1:
         return np.zeros(len(xyz), dtype=bool)
     for start, stop in _runs(repeats):
