@@ -18,7 +18,7 @@ def frozen_frames(xyz: Array) -> Mask:
     """Return (T,) True where all markers ``xyz`` (T, N, 3) m, NaN = unseen, repeat the frame before for at least five
     frames; nowhere in a recording that never moves, as a posture kept as many equal frames is.
     """
-    seen = np.isfinite(xyz).all(axis=2)
+    seen: Mask = np.asarray(np.isfinite(xyz).all(axis=2))
     equal = np.all(xyz[1:] == xyz[:-1], axis=2) | ~(seen[1:] | seen[:-1])
     repeats = np.zeros(len(xyz), dtype=bool)
     repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
