@@ -28,7 +28,10 @@ class AddedMass(Effect):
         *(Parameter(f"place_{axis}", "m", 0.05, "half the width of a limb (segment boxes)") for axis in "xyz"),
     )
     separated_by = "Move the loaded segment alone, the rest standing still; repeat the session without the load."
-    advice = "Weigh the load; or record a reference session without it and compare."
+    advice = (
+        "Weigh the load; its size is surest beside a reference session without it. Its place counts from where the "
+        "table has the segment's centre of mass (x forward, y up, z right)."
+    )
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.frozen import without_frozen
 from biodance.lab.markers.sets import MarkerSet, wearing
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
@@ -121,7 +122,7 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = reader.read(path, role=role, subject=subject)
+        trial = without_frozen(reader.read(path, role=role, subject=subject))
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise
