@@ -24,6 +24,8 @@ _NEEDS = (
 """Landmarks that a body needs on each side, and what stands in for them."""
 _USEFUL = ("knee_medial", "ankle_medial", "acromion")
 """Landmarks that a body can do without, and that posture tells as well."""
+_TRUE = 0.85
+"""Share of the labels with a side whose markers must lie on it."""
 _MIRRORED = 0.035
 """m: a marker so near to the mirror image of the other side's is the same landmark, if no other is nearly as near."""
 _ALONE = 1.6
@@ -53,7 +55,7 @@ def fill_absent(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
     sentences. ``places`` landmark -> label is added to.
     """
     taken = _by_mirror_image(places, stand, said) + _by_posture(places, stand, said)
-    sides = sides_of(stand.at)
+    sides = _said_sides(stand)
     for place in _lacking(places):
         side, _, part = place.partition("_")
         own = [label for label in _free(place, places, stand, said) if sides.get(label) == side]
@@ -102,7 +104,8 @@ def _by_posture(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
             if not _have(places, f"{joint}_lateral", f"{joint}_medial"):
                 places.update(joint_by_posture(joint, free(f"{joint}_lateral"), places, stand))
         for part in (*(part for part, _ in _NEEDS if part != "toe"), "psis", *(_USEFUL if mute else ())):
-            if part != "psis" or "mid_psis" not in places:
+            outer = part.replace("_medial", "_lateral")
+            if (part != "psis" or "mid_psis" not in places) and (outer == part or _have(places, outer)):
                 places.update(taken_by_posture(part, free(part), places, stand))
         if not _have(places, "psis") and "mid_psis" not in places:
             middle = middle_by_posture("mid_psis", _free("mid_psis", places, stand, said, mute=mute), places, stand)
@@ -122,6 +125,17 @@ def _free_on_sides(
     return {side: _free(f"{side}_{part}", places, stand, said, mute=mute) for side in SIDES}
 
 
+def _said_sides(stand: Standing) -> dict[str, str]:
+    """Return label -> the side that it says; nothing where the words mean something else, for too many of these markers
+    lie on the other side.
+    """
+    sides = sides_of(stand.at)
+    right = [
+        bool((stand.at[label] - stand.middle) @ stand.right > 0) == (side == SIDES[0]) for label, side in sides.items()
+    ]
+    return sides if right and np.mean(right) > _TRUE else {}
+
+
 def _have(places: Mapping[str, str], *parts: str) -> bool:
     return any(f"{side}_{part}" in places for side in SIDES for part in parts)
 
@@ -137,7 +151,7 @@ def _free(
     """Return the labels without a landmark that say nothing (``mute``), or nothing else than this place; none that says
     the other side.
     """
-    side, sides = place.partition("_")[0], sides_of(stand.at)
+    side, sides = place.partition("_")[0], _said_sides(stand)
     return [
         label
         for label in plain_labels(stand.at)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.lab.markers.absent import absent_landmarks, fill_absent
-from biodance.lab.markers.names import Meaning, meanings_of
-from biodance.lab.markers.posture import mirror_images, person_of
+from biodance.lab.markers.names import Meaning, meanings_of, sides_exchanged
+from biodance.lab.markers.person import mirror_images, person_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.spelling import plain_labels, side_words
@@ -58,6 +58,8 @@ def guess_set(markers: Markers) -> GuessedSet:
     if person is None:
         return named
     words = side_words((plain[right], plain[left]) for right, left in mirror_images(person))
+    if sides_exchanged(words):
+        return named
     stood = _on(replace(person, at=at), meanings_of(at, sides=words))
     return stood if stood.name or len(stood.map) > len(named.map) else named
 

@@ -81,6 +81,11 @@ def meanings_of(labels: Iterable[str], *, sides: Iterable[tuple[str, str]] = ())
     return {label: found for label, ways in every.items() if (found := _of(words, ways))}
 
 
+def sides_exchanged(sides: Iterable[tuple[str, str]]) -> bool:
+    """Return whether words (right, left) are known ones the other way round: the sides are, too."""
+    return any((left, right) in _vocabulary().pairs for right, left in sides)
+
+
 def sides_of(labels: Iterable[str]) -> dict[str, str]:
     """Return label -> "right" or "left", for the labels that say one as the whole set of labels is written."""
     words = _vocabulary()

@@ -5,7 +5,7 @@ they say nothing, the only way up in which somebody stands.
 import numpy as np
 
 from biodance.lab.markers.names import meanings_of
-from biodance.lab.markers.posture import person_of
+from biodance.lab.markers.person import person_of
 from biodance.lab.markers.set_file import LANDMARKS, segment_of
 from biodance.lab.markers.sets import landmark, recognise
 from biodance.lab.markers.spelling import plain_labels
