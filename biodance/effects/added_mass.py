@@ -44,7 +44,7 @@ class AddedMass(Effect):
         index = case.body.segment_index(self.target)
         table = case.phi[10 * index : 10 * index + 10]
         load = point_mass(theta[0], table[1:4] / table[0] + np.asarray(theta[1:4]))
-        return np.asarray(case.regressor[:, :, 10 * index : 10 * index + 10] @ load)
+        return case.needed_by(load, index)
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: a load weighs something."""
