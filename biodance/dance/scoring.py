@@ -15,13 +15,10 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import belief_after, gram_of, shares, typical_noise
-from biodance.dance.imprecision import USUAL_IMPRECISION, PlannedDance, draw_clock
-from biodance.dance.problem.stance import Phase
 from biodance.errors import BiodanceError
 from biodance.identification.mismatch import Mismatch, mismatch
 from biodance.identification.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
-from biodance.motion.smoothing import smooth
 from biodance.records import Array, Motion
 from biodance.uncertainty.noise import Noise
 
@@ -29,10 +26,6 @@ _RATE = 12.5
 """Hz at which movements are judged, as in `dance.expectation`."""
 _STILL = 1.0
 """s: a hold says nothing more after this time."""
-_PERFORMED_RATE = 2 * _RATE
-"""Hz at which imprecise repetitions are laid out."""
-_COPIES, _SEED = 4, 11
-"""Imprecise repetitions of a transition that are looked at, and the seed of their errors."""
 PROPOSED = 3
 """Transitions that are proposed for repetition."""
 
@@ -51,8 +44,8 @@ class SegmentExcitation:
 @dataclass(frozen=True)
 class Repetition:
     """One ``transition`` of a dance, counted from 1: it leads from cue ``transition`` to the next one. Planned from
-    ``start`` to ``end`` s of the dance; ``gain``: by how much dancing it once more, as imprecisely as people do, raises
-    the share of the table's variance removed, mean over the segments; ``most`` the segment that gains most.
+    ``start`` to ``end`` s of the dance; ``gain``: by how much dancing it once more, as planned, raises the share of
+    the table's variance removed, mean over the segments; ``most`` the segment that gains most.
     """
 
     transition: int
@@ -170,13 +163,11 @@ def _shares(body: Body, known: Worth) -> Array:
 
 
 def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise, count: int) -> tuple[Repetition, ...]:
-    """Return the transitions that gain most beside what is ``known``, best first, danced once more as people dance:
-    later than planned and off in every joint; steps to another place, which the feet cannot simply repeat, are left
-    out.
+    """Return the transitions that gain most beside what is ``known``, best first; steps to another place, which the
+    feet cannot simply repeat, are left out.
     """
-    plan = PlannedDance(dance)
     some = {
-        phase: [_danced_again(plan, body, phase, noise, k) for k in range(_COPIES)]
+        phase: _once(dance, body, phase.start, phase.end, noise)
         for phase in dance.phases
         if phase.kind == "move"
         and np.array_equal(dance.stances[phase.posture - 1].ankle, dance.stances[phase.posture].ankle)
@@ -184,25 +175,21 @@ def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise, count: in
     out: list[Repetition] = []
     while some and len(out) < count:
         before = _shares(body, known)
-        gains = {
-            phase: np.mean([_shares(body, known + worth) for worth in copies], axis=0) - before
-            for phase, copies in some.items()
-        }
+        gains = {phase: _shares(body, known + worth) - before for phase, worth in some.items()}
         best = max(gains, key=lambda phase: float(gains[phase].mean()))
         segment = body.segments[int(np.argmax(gains[best]))]
         out.append(Repetition(best.posture, best.start, best.end, float(gains[best].mean()), segment))
-        known = known + some.pop(best)[0]
+        known = known + some.pop(best)
     return tuple(out)
 
 
-def _danced_again(plan: PlannedDance, body: Body, phase: Phase, noise: Noise, number: int) -> Worth:
-    """Return what the transition ``phase`` tells when imprecise performer ``number`` dances it."""
-    clock, errors = (np.random.default_rng([_SEED, number, phase.posture, which]) for which in (0, 1))
-    coarse, when = draw_clock(clock, phase.end - phase.start, USUAL_IMPRECISION)
-    time = np.arange(round(coarse[-1] * _PERFORMED_RATE) + 1) / _PERFORMED_RATE
-    copy = plan.performed(errors, time, phase.start + np.interp(time, coarse, when), USUAL_IMPRECISION)
-    motion = smooth(plan.dance.body, time, copy.q)
-    return worth_of(body, _in_joints_of(body, plan.dance, motion), noise=noise)
+def _once(dance: Dance, body: Body, start: float, end: float, noise: Noise) -> Worth:
+    """Return what the planned movement between two instants tells, at the rate of the judgement."""
+    time = np.arange(max(2, round((end - start) * _RATE)) + 1) / _RATE
+    phase = next(phase for phase in dance.phases if phase.start == start)
+    state = dance.state(phase, np.minimum(start + time, end))
+    motion = dance.chain.motion(time, state.x, state.v, state.a)
+    return worth_of(body, _in_joints_of(body, dance, motion), noise=noise)
 
 
 def _in_joints_of(body: Body, dance: Dance, motion: Motion) -> Motion:
