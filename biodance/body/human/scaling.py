@@ -286,7 +286,7 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
         tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
         if tilt > TILT[joint.split("_")[1]]:
             notes.append(
-                f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside it and the wand "
-                f"above it."
+                f"Warning: {joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes: check the markers "
+                f"beside it and the wand above it."
             )
     return notes
