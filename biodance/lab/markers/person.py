@@ -11,7 +11,7 @@ import numpy as np
 from biodance.lab.markers.standing import Standing
 from biodance.records import Array
 
-USUAL = {
+USUAL_PLACES = {
     "asis": ((0.073, 0.078, 0.553), (0.015, 0.028, 0.024)),
     "psis": ((0.030, -0.020, 0.585), (0.012, 0.028, 0.028)),
     "mid_psis": ((0.0, -0.020, 0.585), (0.010, 0.028, 0.028)),
@@ -34,7 +34,7 @@ _SOLE = 0.014
 """Share of the stature at which the lowest marker of a foot is."""
 _REACH = 0.6
 """m, horizontal, from the middle within which the markers of a person are."""
-MIRRORED = 0.03
+PAIRED = 0.03
 """m: so near to the mirror image of another marker a marker is its pair."""
 _STATURES = np.geomspace(0.85, 2.15, 40)
 """m: statures that are tried."""
@@ -73,7 +73,7 @@ def mirror_images(stand: Standing) -> list[tuple[str, str]]:
     return [
         (labels[i], labels[j])
         for i, j in enumerate(nearest)
-        if nearest[j] == i and i != j and away[i, j] < MIRRORED and (xyz[i] - xyz[j]) @ stand.right > 0
+        if nearest[j] == i and i != j and away[i, j] < PAIRED and (xyz[i] - xyz[j]) @ stand.right > 0
     ]
 
 
@@ -93,7 +93,7 @@ def from_usual(points: Array, part: str, sign: float, stand: Standing, origin: f
     """Return (N,) how far every point is from the usual place of a landmark, in squared standard deviations; ``sign``
     -1 for the left one, ``origin`` m where the ankles are along the person's ahead ((O, 1): for each of them, (O, N)).
     """
-    place, spread = USUAL[part]
+    place, spread = USUAL_PLACES[part]
     here = (sign * points[:, 0], points[:, 1] - origin, points[:, 2] - stand.floor)
     steps = [(one / stand.stature - usual) / by for one, usual, by in zip(here, place, spread, strict=True)]
     found: Array = steps[0] ** 2 + steps[1] ** 2 + steps[2] ** 2
@@ -124,7 +124,7 @@ def _mean_plane(xyz: Array, axis: Array, offset: float) -> tuple[Array, float]:
     """Return the plane (axis (3,), offset m) through the middle of all markers that one near it mirrors onto others."""
     image = xyz - 2 * (xyz @ axis - offset)[:, None] * axis
     away = np.linalg.norm(image[:, None] - xyz[None], axis=2)
-    one = np.flatnonzero((away.min(axis=1) < MIRRORED) & (xyz @ axis > offset + _WIDE / 4))
+    one = np.flatnonzero((away.min(axis=1) < PAIRED) & (xyz @ axis > offset + _WIDE / 4))
     other = away.argmin(axis=1)[one]
     if not one.size:
         return axis, offset
@@ -137,7 +137,7 @@ def _symmetry(xyz: Array, axis: Array, offset: float) -> float:
     """Return how many markers lie at the mirror image of another, each weighted by how near it is."""
     image = xyz - 2 * (xyz @ axis - offset)[:, None] * axis
     near = np.linalg.norm(image[:, None] - xyz[None], axis=2).min(axis=1)
-    return float(np.clip(1.5 - near / MIRRORED, 0.0, 1.0).sum())
+    return float(np.clip(1.5 - near / PAIRED, 0.0, 1.0).sum())
 
 
 def _fitted(at: Mapping[str, Array], xyz: Array, right: Array, offset: float) -> tuple[float, Standing] | None:

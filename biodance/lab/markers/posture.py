@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from biodance.lab.markers.person import MIRRORED, NEAR, USUAL, from_the_middle, from_usual, mirror_image
+from biodance.lab.markers.person import NEAR, PAIRED, USUAL_PLACES, from_the_middle, from_usual, mirror_image
 from biodance.lab.markers.standing import Standing
 from biodance.records import SIDES, Array
 
@@ -114,10 +114,10 @@ def _pairs(
         away = from_usual(from_the_middle(labels, stand), part, 1.0 if side == "right" else -1.0, stand, origin)
         near.append([(float(ill), label) for ill, label in zip(away, labels, strict=True) if ill < NEAR])
     return [
-        (one + two + (apart / MIRRORED) ** 2, (first, second))
+        (one + two + (apart / PAIRED) ** 2, (first, second))
         for one, first in near[0]
         for two, second in near[1]
-        if (apart := float(np.linalg.norm(mirror_image(stand.at[first], stand) - stand.at[second]))) < 2 * MIRRORED
+        if (apart := float(np.linalg.norm(mirror_image(stand.at[first], stand) - stand.at[second]))) < 2 * PAIRED
     ]
 
 
@@ -143,7 +143,7 @@ def _ankles(known: Mapping[str, str], stand: Standing) -> float:
         return float(np.mean(ankles))
     if not stand.named or len(spines) < 2:
         return float(stand.middle @ stand.ahead)
-    return float(np.mean(spines)) - USUAL["asis"][0][1] * stand.stature
+    return float(np.mean(spines)) - USUAL_PLACES["asis"][0][1] * stand.stature
 
 
 def _only_pair(
@@ -158,10 +158,10 @@ def _only_pair(
     )
     image = np.array([mirror_image(stand.at[label], stand) for label in first])
     apart = np.linalg.norm(image[:, None] - np.array([stand.at[label] for label in second])[None], axis=2)
-    ill = one[:, None] + two[None] + (apart / MIRRORED) ** 2
+    ill = one[:, None] + two[None] + (apart / PAIRED) ** 2
     ill[np.array([[label == other for other in second] for label in first])] = np.inf
     i, j = (int(k) for k in np.unravel_index(int(np.argmin(ill)), ill.shape))
-    if not np.isfinite(ill[i, j]) or max(one[i], two[j]) > NEAR or apart[i, j] > 3 * MIRRORED:
+    if not np.isfinite(ill[i, j]) or max(one[i], two[j]) > NEAR or apart[i, j] > 3 * PAIRED:
         return None
     same = [np.array([_beside(stand, own[k], label) for label in own]) for own, k in ((first, i), (second, j))]
     rest = ill[~(same[0][:, None] & same[1][None])]
