@@ -9,6 +9,7 @@ from test_motion_functional_joints import displaced, hidden, scaling
 
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
+from biodance.body.inertia import rigid_inertia
 from biodance.body.parts import JointError
 from biodance.identification.information import Information
 from biodance.identification.knowledge import known_together
@@ -46,6 +47,13 @@ def test_matter_along_with_the_joint_keeps_its_mass_and_its_place_over_the_joint
     limbs = [i for i in range(12) if i not in (0, TRUNK)]
     np.testing.assert_allclose(body.at_joint.com[limbs], body.sip.com[limbs], atol=1e-12)
     assert 0 < body.at_joint.com[0, 1] < body.sip.com[0, 1]  # the pelvis ends lower
+    for at, times, slant in ((0, 0.5, 0.05), (10 * TRUNK, 1.1, 0.0)):  # ... and the trunk begins there
+        high, low = (rigid_inertia(sip.phi[at : at + 10]).inertia for sip in (body.sip, body.at_joint))
+        (depth, tall, width), now = (0.5 * np.trace(one) - np.diag(one) for one in (high, low))
+        assert now[2] == pytest.approx(width, rel=1e-9)  # as wide as it was
+        assert now[0] == pytest.approx(depth, rel=slant + 1e-9)  # and deep, but for the slant of the pelvis
+        assert now[1] / tall == pytest.approx(times, rel=0.3)
+        assert bool(now[1] > tall) is bool(at)
     assert (body.com_boxes[:, 0] <= np.minimum(body.sip.com, body.at_joint.com)).all()
 
 
@@ -112,7 +120,7 @@ def test_sides_are_alike_until_the_data_show_them_apart() -> None:
 
 
 def test_what_is_known_about_true_centres() -> None:
-    placed = tuple(JointError(joint, 0.01, 0.0) for joint in ("trunk", "right_hip", "left_knee", "left_elbow"))
+    placed = tuple(JointError(joint, 0.001, 0.0) for joint in ("trunk", "right_hip", "left_knee", "left_elbow"))
     body = replace(low_joint(), joint_errors=placed)
     table = widened(body.sip, body.joint_errors)
     off = misplaced(table, body.joint_errors)
@@ -120,6 +128,11 @@ def test_what_is_known_about_true_centres() -> None:
     np.testing.assert_allclose(nothing, table.covariance - off, atol=1e-7)  # what the table is off
     all_told = from_true_centres(replace(table, covariance=np.zeros((120, 120))), table, body.joint_errors)
     np.testing.assert_allclose(all_told.covariance, off)  # what the joints are off
+    bending = (JointError("trunk", 0.03, 0.0), *placed[1:])  # a trunk that the placing leaves 3 cm off
+    np.testing.assert_allclose(from_true_centres(table, table, bending).covariance, nothing, atol=1e-7)
+    there = from_true_centres(replace(table, covariance=np.zeros((120, 120))), table, bending).covariance
+    first = there[10 * TRUNK + 1, 10 * TRUNK + 1]
+    assert first == pytest.approx((0.03 * body.sip.mass[TRUNK]) ** 2)
     draw = np.random.default_rng(5).normal(size=(120, 120))
     belief = np.linalg.inv(np.linalg.inv(table.covariance) + draw[:, :40] @ draw[:, :40].T)
     known = from_true_centres(replace(table, covariance=belief), table, body.joint_errors).covariance

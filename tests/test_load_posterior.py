@@ -34,7 +34,7 @@ def view(seed: int, load: float, *, rows: int = 30) -> tuple[LoadView, np.ndarra
     rng = np.random.default_rng(seed)
     columns, mean, factor = rng.normal(size=(rows, 10)), rng.normal(size=10), 0.3 * rng.normal(size=(10, 4))
     y = load * columns @ (mean + factor @ rng.normal(size=4)) + rng.normal(size=rows)
-    return LoadView.of(columns, y, (mean, factor)), columns, mean, factor, y
+    return LoadView.of(columns, y, (mean, factor), np.zeros(rows)), columns, mean, factor, y
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -46,6 +46,22 @@ def test_the_likelihood_ratio_is_that_of_two_normal_densities(seed: int) -> None
             np.zeros(len(y)), np.eye(len(y))
         ).logpdf(y)
         assert one.log_ratio(np.array([m]))[0] == pytest.approx(expected, rel=1e-9, abs=1e-8)
+
+
+def test_the_mass_of_a_load_near_the_middle_of_its_segment_is_right_in_the_mean() -> None:
+    """The data tell 2.4 kg to 0.3 kg and its first moments to 1 g·m."""
+    rng, factor, middle = np.random.default_rng(5), np.zeros((10, 3)), np.eye(10)[0]
+    factor[1:4] = 0.15 * np.eye(3)
+    columns, errors = np.diag([1 / 0.3, *np.full(3, 1e3), *np.zeros(6)]), []
+    for _ in range(200):
+        shown = columns @ (2.4 * (middle + 0.4 * factor @ rng.normal(size=3))) + rng.normal(size=10)
+        one = LoadView.of(columns, shown, (middle, factor), np.zeros(10))
+        evidence = one.log_ratio(MASSES) + log_mass_prior(MASSES)
+        weights = [np.exp(log - log.max()) for log in (evidence, evidence + one.log_told(MASSES))]
+        errors.append([weight @ MASSES / weight.sum() - 2.4 for weight in weights])
+    by_evidence, size = np.mean(errors, axis=0)
+    assert abs(size) < 0.05
+    assert by_evidence < -0.05
 
 
 def test_no_load_and_the_interval_never_contradict_each_other() -> None:
@@ -122,11 +138,28 @@ def test_an_odder_body_is_less_known_in_its_parts_and_as_well_in_all() -> None:
 
 
 def test_rivals_are_probabilities_and_a_weighed_person_has_no_wrong_scale() -> None:
-    before = table((10.0, 20.0), 0.5)
+    tables = ((table((10.0, 20.0), 0.5), float(np.log(0.75))), (table((10.0, 20.0), 0.6), float(np.log(0.25))))
     for weighed in (True, False):
-        some = rivals(before, weighed=weighed)
-        assert sum(np.exp(log) for _, log in some) == pytest.approx(1.0)
-        assert (max(total_sd(sip) for sip, _ in some) > 2.0) is not weighed
+        some = rivals(tables, weighed=weighed)
+        assert sum(np.exp(one.log_prior) for one in some) == pytest.approx(1.0)
+        assert (max(total_sd(one.before) for one in some) > 2.0) is not weighed
+        assert any(one.holds for one in some) is not weighed
+
+
+def test_a_body_whose_scale_weighed_the_load_is_lighter_by_it() -> None:
+    """A load of m kg then changes the session by m (load - a kilogram of the body), and no mass in all."""
+    rng = np.random.default_rng(3)
+    body, unit = table((10.0, 20.0), 0.5), np.append(1.0, 0.2 * rng.normal(size=9))
+    rows = np.vstack([np.tile(np.eye(10)[0], 2), rng.normal(size=(25, 20))])
+    shown = 2.0 * (rows[:, :10] @ unit - rows @ body.phi / 30.0)
+    less = rows @ body.phi / 30.0
+    assert shown[0] == pytest.approx(0.0)
+    ratio = {
+        holds: LoadView.of(rows[:, :10], shown, (unit, np.zeros((10, 1))), holds * less).log_ratio(MASSES)
+        for holds in (True, False)
+    }
+    assert MASSES[np.argmax(ratio[True])] == pytest.approx(2.0, rel=0.01)
+    assert ratio[True].max() > ratio[False].max() + 1.0
 
 
 def test_a_table_of_another_mass_keeps_its_shape() -> None:

@@ -38,6 +38,12 @@ def _steiner(arm: Array) -> Array:
     return float(arm @ arm) * np.eye(3) - np.outer(arm, arm)
 
 
+def stretch_inertia(lump: RigidInertia, times: Array) -> RigidInertia:
+    """Return the lump with its matter stretched by ``times`` (3,) along the axes of its frame, from the origin."""
+    moments = times[:, None] * (0.5 * np.trace(lump.inertia) * np.eye(3) - lump.inertia) * times
+    return RigidInertia(lump.mass, times * lump.com, np.trace(moments) * np.eye(3) - moments)
+
+
 def inertial_parameters(lump: RigidInertia) -> Array:
     """Return [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] (10,), inertia about the origin of the lump's frame."""
     about_origin = lump.inertia + lump.mass * _steiner(lump.com)

@@ -44,7 +44,8 @@ def run(tokens: Sequence[str] | None = None) -> int:
     except BiodanceError as error:
         say(str(error))
     except OSError as error:
-        say(f"{error.filename or _out(tokens)}: {error.strerror or error}.")
+        why = error.strerror or f"cannot be written ({error}). Is the disk full?"
+        say(f"{error.filename or _out(tokens)}: {why.rstrip('.')}.")
     except Exception as error:
         if "BIODANCE_TRACEBACK" in os.environ:
             raise

@@ -19,8 +19,8 @@ from biodance.identification.identification import Identification
 from biodance.identification.information import Information
 from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
 from biodance.identification.loads import unit_load
-from biodance.identification.rival_bodies import alike_table, expect_unloaded, rivals, surprised
-from biodance.records import Array, Sip
+from biodance.identification.rival_bodies import Rival, expect_unloaded, rivals, surprised, tables_by_sides
+from biodance.records import Array
 from biodance.threads import one_thread
 
 _THRESHOLD = 0.01
@@ -124,22 +124,21 @@ def added_mass(
     NotSolved
         Nothing was identified from the reference.
     """
-    before = alike_table(session) if reference is None else expect_unloaded(reference, session)
-    units = tuple(unit_load(session.body, i) for i in range(len(before.segments)))
-    bodies = tuple(
-        _Rival.of(session.data, units, sip, log) for sip, log in rivals(before, weighed=reference is not None)
-    )
+    tables = tables_by_sides(session) if reference is None else ((expect_unloaded(reference, session), 0.0),)
+    segments = tables[0][0].segments
+    units = tuple(unit_load(session.body, i) for i in range(len(segments)))
+    bodies = tuple(_Judged.of(session.data, units, one) for one in rivals(tables, weighed=reference is not None))
     none = np.array([one.log_none for one in bodies])
     load = np.array([one.log_none + one.log_ratio for one in bodies]) + log_mass_prior(MASSES) - np.log(len(units))
     total = logsumexp(np.append(load.ravel(), none))
     log_none = float(logsumexp(none) - total)
-    found = [_suspect(name, i, bodies, load[:, i] - total, log_none) for i, name in enumerate(before.segments)]
+    found = [_suspect(name, i, bodies, load[:, i] - total, log_none) for i, name in enumerate(segments)]
     words = "the table" if reference is None else f"the session with {', '.join(reference.trials)}"
     return LoadSearch(tuple(sorted(found, key=lambda one: -one.probability)), float(np.exp(log_none)), words, doubts)
 
 
 @dataclass(frozen=True, eq=False)
-class _Rival:
+class _Judged:
     """One explanation of the body: ``log_prior``, ``log_none`` (with the evidence of the data without load) and what it
     lets see of a load on each segment.
     """
@@ -151,18 +150,23 @@ class _Rival:
     log_ratio: Array
 
     @classmethod
-    def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], before: Sip, log_prior: float) -> "_Rival":
+    def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], rival: Rival) -> "_Judged":
+        before = rival.before
         rows, surprise, evidence = surprised(data, before)
-        views = tuple(LoadView.of(rows[:, 10 * i : 10 * i + 10], surprise, unit) for i, unit in enumerate(units))
+        less = float(rival.holds) * rows @ before.phi / before.mass.sum()
+        columns = (rows[:, 10 * i : 10 * i + 10] for i in range(len(units)))
+        views = tuple(LoadView.of(part, surprise, unit, less) for part, unit in zip(columns, units, strict=True))
         ratio = np.array([view.log_ratio(MASSES) for view in views])
         log_det = evidence + 0.5 * float(surprise @ surprise)
-        return cls(log_prior, log_prior + evidence, log_det, views, ratio)
+        return cls(rival.log_prior, rival.log_prior + evidence, log_det, views, ratio)
 
 
-def _suspect(segment: str, i: int, bodies: tuple[_Rival, ...], load: Array, none: float) -> LoadCandidate:
+def _suspect(segment: str, i: int, bodies: tuple[_Judged, ...], load: Array, none: float) -> LoadCandidate:
     """Return the hypothesis of a load on segment ``i`` from the log probabilities of it (rivals, n) and of ``none``."""
     chance = float(logsumexp(load))
-    here = np.exp(load - np.logaddexp(chance, none))
+    size = load + np.array([one.views[i].log_told(MASSES) for one in bodies])
+    size += (logsumexp(load, axis=1) - logsumexp(size, axis=1))[:, None]
+    here = np.exp(size - np.logaddexp(chance, none))
     posterior = LoadPosterior(float(np.exp(none - np.logaddexp(chance, none))), here.sum(axis=0))
     place, place_sd = np.full(3, np.nan), np.full(3, np.nan)
     if posterior.interval[0] > 0:
@@ -172,7 +176,7 @@ def _suspect(segment: str, i: int, bodies: tuple[_Rival, ...], load: Array, none
     return LoadCandidate(segment, posterior, place, place_sd, bayes, float(np.exp(chance)), _smallest(bodies, i))
 
 
-def _smallest(bodies: tuple[_Rival, ...], i: int) -> float:
+def _smallest(bodies: tuple[_Judged, ...], i: int) -> float:
     """Return the load (kg) on segment ``i`` from which on "no load" is improbable enough; infinite if none is."""
     prior = log_mass_prior(_COARSE) - np.log(len(bodies[0].views))
 

@@ -18,7 +18,7 @@ from biodance.uncertainty.caution import shift_slope, widened
 
 _ALONG = 1
 """The axis along the spine in the frames of pelvis and trunk."""
-_ODDS = np.log(2.0)
+ODDS = np.log(2.0)
 """Log evidence by which sides each on their own must be more probable than sides alike, which most people have."""
 
 
@@ -89,7 +89,7 @@ def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip,
     placed = [_at(body, float(table.mass.sum()), along=x) if len(places) > 1 else table for x in places]
     choices = {(x, s): with_sides(placed[x], apart=True) if s else placed[x] for x, s in product(places, (False, True))}
     evidence = {choice: posterior(data, one).log_evidence for choice, one in choices.items()}
-    along, apart = best = max(evidence, key=lambda choice: evidence[choice] - _ODDS * choice[1])
+    along, apart = best = max(evidence, key=lambda choice: evidence[choice] - ODDS * choice[1])
     words = []
     if len(places) > 1:
         trunk, gain = body.segment_index("trunk_head"), evidence[best] - evidence[not along, apart]

@@ -1,19 +1,33 @@
 """What the body may be without a load: as known before, odder than that, or of another mass than was declared."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
-from biodance.identification.placement import goes_along, placed_as, with_sides
+from biodance.identification.placement import ODDS, goes_along, placed_as, with_sides
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 from biodance.uncertainty.caution import in_other_frames
 
 _ODD = (1.0, 1.5, 2.25, 3.4)
 """Times that the body may differ from what was known before by more than its standard deviations, equally probable."""
-_WRONG_SCALE, _WRONG_BY = 0.2, 2.5
-"""Probability that the declared mass is wrong or holds the load, and kg by which it then is (standard deviation)."""
+_DECLARED = ((0.0, False, 0.4), (0.0, True, 0.4), (2.5, False, 0.2))
+"""What the declared mass may be: kg by which it is wrong (standard deviation), whether it holds the load, probability.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """One explanation of the body: ``before`` what it is without a load, with its ``log_prior``; ``holds`` whether its
+    mass is that of body and load together, so that the body weighs less by the load.
+    """
+
+    before: Sip
+    log_prior: float
+    holds: bool
 
 
 def expect_unloaded(reference: Identification, session: Identification) -> Sip:
@@ -37,11 +51,17 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     return in_other_frames(moved, session.body.joint_errors)
 
 
-def alike_table(session: Identification) -> Sip:
-    """Return the table of ``session`` with sides alike, whatever the data make of them: a load on one side may not pass
-    for a person whose sides are not.
+def tables_by_sides(session: Identification) -> tuple[tuple[Sip, float], ...]:
+    """Return the table of ``session`` with sides alike and with each side on its own, each with its log probability: a
+    load on one side may not pass for sides that are not alike, nor what a side has of its own for a load.
     """
-    return with_sides(session.belief.prior, apart=False) if session.apart else session.belief.prior
+    alike, apart = (_with_sides_as(session, apart=apart) for apart in (False, True))
+    return (alike, float(-np.log1p(np.exp(-ODDS)))), (apart, float(-np.log1p(np.exp(ODDS))))
+
+
+def _with_sides_as(session: Identification, *, apart: bool) -> Sip:
+    prior = session.belief.prior
+    return prior if session.apart == apart else with_sides(prior, apart=apart)
 
 
 def table_like(one: Identification, other: Identification) -> Sip:
@@ -57,14 +77,16 @@ def weighing(prior: Sip, mass: float) -> Sip:
     return Sip(prior.segments, ratio * prior.phi, ratio**2 * np.asarray(prior.covariance))
 
 
-def rivals(before: Sip, *, weighed: bool) -> tuple[tuple[Sip, float], ...]:
-    """Return what the body may be without a load, each with its log probability: odder than ``before`` says, and
-    unless it was ``weighed`` without load another mass than declared.
+def rivals(tables: tuple[tuple[Sip, float], ...], *, weighed: bool) -> tuple[Rival, ...]:
+    """Return what the body may be without a load: odder than one of the ``tables`` (each with its log probability)
+    says, and unless it was ``weighed`` without load of another mass than declared: the declared one holds the load, or
+    is wrong.
     """
-    chance = {0.0: 1.0} if weighed else {0.0: 1 - _WRONG_SCALE, _WRONG_BY: _WRONG_SCALE}
+    cases = ((0.0, False, 1.0),) if weighed else _DECLARED
     return tuple(
-        (odder(before, times, wrong), float(np.log(share / len(_ODD))))
-        for wrong, share in chance.items()
+        Rival(odder(table, times, wrong), log + float(np.log(share / len(_ODD))), holds)
+        for table, log in tables
+        for wrong, holds, share in cases
         for times in _ODD
     )
 

@@ -82,15 +82,32 @@ def from_true_centres(sip: Sip, table: Sip, placed: tuple[JointError, ...]) -> S
 
     With the prior covariance P in the model's frames, D of it from misplaced centres and B of the belief, the error
     about the true centres has the covariance B + D - K B - B K', K = D P^-1: where the data told nothing P - D, what
-    the table is off; where they told all D, what the joints are off. Centres that no movement placed come on top.
+    the table is off; where they told all D, what the joints are off. Where the placing itself leaves a centre farther
+    off than D counts (a trunk that bends along its length), that enters as far as the data told: T E T', T = 1 - B
+    P^-1. Centres that no movement placed come on top.
     """
     if not placed:
         return about_true_centres(sip)
     off, scale = misplaced(table, placed), np.sqrt(np.diag(table.covariance))
     unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
     inverse = np.linalg.pinv(table.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
-    shared = (off * unit) @ inverse * unit @ sip.covariance
-    return Sip(sip.segments, sip.phi, sip.covariance + off - shared - shared.T)
+    kept = unit[:, None] * inverse * unit @ sip.covariance
+    shared, told = off @ kept, np.eye(len(off)) - kept
+    return Sip(sip.segments, sip.phi, sip.covariance + off - shared - shared.T + told.T @ _beyond(sip, placed) @ told)
+
+
+def _beyond(sip: Sip, placed: tuple[JointError, ...]) -> Array:
+    """Return the covariance (p, p) of the parameters from how much farther off the movement that ``placed`` the centres
+    leaves them than `misplaced` counts.
+    """
+    left = {error.joint: error.centre for error in placed}
+    out = np.zeros((len(sip.phi), len(sip.phi)))
+    for i, segment in enumerate(sip.segments):
+        more = left.get(_joint_of(segment), 0.0) ** 2 - _centre_size(segment, set(left)) ** 2
+        cut = slice(10 * i, 10 * i + 10)
+        slope = np.sqrt(max(more, 0.0)) * shift_slope(sip.phi[cut])
+        out[cut, cut] = slope @ slope.T
+    return out
 
 
 def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:

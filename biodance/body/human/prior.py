@@ -20,6 +20,7 @@ from biodance.body.inertia import (
     lump_from,
     mirror_inertia,
     parameter_jacobian,
+    stretch_inertia,
     turn_inertia,
 )
 from biodance.body.tables.anthropometry import Reference, proportion
@@ -201,19 +202,21 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
     frame.
 
     The pelvis of the table is upright; it is turned so that its long axis points from the mid hip to where the table
-    cuts the trunk. The trunk above the cut keeps its place in the person, also where the joint lies elsewhere. The foot
-    lies between the person's heel and toe, wherever between them the ankle is.
+    cuts the trunk, and the trunk keeps its place in the person, unless both are cut at the joint (`cut_at_joint`). The
+    foot lies between the person's heel and toe, wherever between them the ankle is.
     """
     lumps = []
     for segment in SEGMENTS:
         kind = kind_of(segment)
-        unit = reference.segments[kind]
+        unit, longer = reference.segments[kind], skeleton.stretched.get(segment, 1.0)
         scale, mass = skeleton.lengths[segment] / reference.lengths[kind], unit.mass * subject.mass
         lump = RigidInertia(mass, scale * unit.com, mass * scale**2 * unit.inertia)
         if segment == "pelvis":
+            lump = stretch_inertia(lump, np.array([1.0, longer, 1.0]) / longer)
             lump = turn_inertia(lump, _upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
         if segment == "trunk_head":
-            lump = replace(lump, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
+            tall = stretch_inertia(lump, np.array([1.0, longer, 1.0]))
+            lump = replace(tall, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
         if kind == "foot":
             usual = proportion("heel_behind_ankle", subject.sex) * skeleton.lengths[segment]
             ahead = usual - skeleton.heel_behind_ankle[segment.removesuffix("_foot")]

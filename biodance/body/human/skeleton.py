@@ -39,7 +39,8 @@ class Skeleton:
     the parent segment's frame. ``turns`` by joint: (3, 3) constant rotation parent_R_child at zero angle (varus, tibial
     torsion, carrying angle), identity if absent. ``cut`` by segment, pelvis and trunk_head: (3,) m in its frame, where
     the table of masses cuts one from the other, if not at the joint. ``ankle_height`` m over the sole and
-    ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m.
+    ``heel_behind_ankle`` m by side. ``asis_width``, ``stature`` m. ``stretched``: how many times as long as
+    in the table pelvis and trunk_head are along the spine, as wide and deep as there, because their joint is no cut.
     """
 
     lengths: Mapping[str, float]
@@ -50,6 +51,7 @@ class Skeleton:
     stature: float
     turns: Mapping[str, Array] = field(default_factory=dict)
     cut: Mapping[str, Array] = field(default_factory=dict)
+    stretched: Mapping[str, float] = field(default_factory=dict)
 
 
 def generic_skeleton(reference: Reference, subject: Subject) -> Skeleton:
@@ -104,7 +106,13 @@ def joint_tree(skeleton: Skeleton) -> tuple[Joint, ...]:
 
 def cut_at_joint(skeleton: Skeleton) -> Skeleton:
     """Return the skeleton of which the table cuts pelvis from trunk at the joint: the trunk's matter goes along with
-    the joint, the pelvis reaches up to it.
+    the joint. The pelvis reaches up to the joint, trunk and head from there to the vertex; both are as wide and deep as
+    before.
     """
+    lengths = skeleton.lengths
     pelvis = float(np.linalg.norm(skeleton.origins["trunk"]))
-    return replace(skeleton, cut={}, lengths={**skeleton.lengths, "pelvis": pelvis})
+    legs = skeleton.ankle_height["right"] + lengths["right_shank"] + lengths["right_thigh"]
+    above = skeleton.stature - legs - lengths["pelvis"]
+    longer = (above + float(skeleton.cut["trunk_head"][1])) / above
+    stretched = {"pelvis": pelvis / lengths["pelvis"], "trunk_head": longer}
+    return replace(skeleton, cut={}, lengths={**lengths, "pelvis": pelvis}, stretched=stretched)
