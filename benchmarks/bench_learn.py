@@ -50,8 +50,13 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for name, result in results.items():
         rest = [one for other, one in taught.items() if other != name]
-        own: Tolerances = learned_together(archive, rest, {}).tolerances
-        before, after = diagnose_session(result), diagnose_session(result, tolerances=own)
+        before = diagnose_session(result)
+        try:
+            own: Tolerances = learned_together(archive, rest, {}).tolerances
+        except BiodanceError:
+            print(f"| {name} | {len(rest)}: too few to learn from | {told(before)} | - | - | - |", flush=True)
+            continue
+        after = diagnose_session(result, tolerances=own)
         old, new = limits(before), limits(after)
         both = [new[key] / old[key] for key in old if key in new]
         ratio = f"{np.median(both):.2f} (of {len(both)})" if both else "-"

@@ -118,6 +118,16 @@ class Person:
         return self.landmark(SIDES[code[0]], code[2:]) if code[1:2] == "." else self.landmark("", code)
 
 
+def people_of(data: Path) -> dict[str, Person]:
+    """Return the nine persons of BIODANCE_DATA who stand, by the name of the trial."""
+    files = [
+        *sorted(data.glob("biomechzoo/*/*01.c3d")),
+        data / "pycgm/Static_trial.c3d",
+        data / "adl_gait/2014001_ST.c3d",
+    ]
+    return {file.stem: Person(read_trial(file)) for file in files}
+
+
 def labelled(person: Person, name: str) -> tuple[Markers, dict[str, str]]:
     """Return the recording under the labels of a set, and label -> what it may be."""
     truth = dict(line.split(" = ") for line in SETS[name]["labels"])
@@ -208,12 +218,7 @@ def guessed(name: str, people: Mapping[str, Person]) -> tuple[Counter[str], list
 
 def main(data: Path, only: list[str]) -> None:
     """Print a line for every set, totals by group, and every wrong landmark."""
-    files = [
-        *sorted(data.glob("biomechzoo/*/*01.c3d")),
-        data / "pycgm/Static_trial.c3d",
-        data / "adl_gait/2014001_ST.c3d",
-    ]
-    people = {file.stem: Person(read_trial(file)) for file in files}
+    people = people_of(data)
     moving = Person(read_trial(data / "adl_gait/2014001_C1_01.c3d"))
     total: dict[str, Counter[str]] = {}
     errors = []

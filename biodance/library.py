@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, FileRefused, UnknownName
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -56,13 +56,23 @@ def read_toml(path: Path) -> dict[str, Any]:
 
     Raises
     ------
-    BiodanceError
-        The file is missing or is not TOML.
+    FileRefused
+        The file is missing, no ordinary file, or not TOML.
     """
+    refuse_special(path)
     try:
-        with open(path, "rb") as stream:
-            return tomllib.load(stream)
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise BiodanceError(f"{path}: cannot be opened ({error.strerror}). Check the path.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BiodanceError(f"{path}: is not valid TOML: {error}. Correct that line.") from error
+        raise FileRefused(f"{path}: cannot be opened ({error.strerror}). Check the path.") from error
+    except UnicodeDecodeError as error:
+        raise FileRefused(f"{path}: is no text in UTF-8, so not valid TOML. Save it as UTF-8.") from error
+    except tomllib.TOMLDecodeError as error:
+        raise FileRefused(f"{path}: is not valid TOML: {error}. Correct that line.") from error
+
+
+def refuse_special(path: Path) -> None:
+    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise FileRefused(
+            f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy its content into a file."
+        )

@@ -38,6 +38,12 @@ def die_once(task: SessionTask) -> Outcome:
     return count(task)
 
 
+def die_beside(task: SessionTask) -> Outcome:
+    """Be killed in s1 at the first try, while s0 is worked on in the same process; in s2 each time."""
+    time.sleep({"s0": 0.6, "s1": 0.3}.get(task.name, 0.0))
+    return die_once(task) if task.name == "s1" else die_in_s2(task)
+
+
 def slow(task: SessionTask) -> Outcome:
     """Go through a session that is refused, then wait to be killed with the one that asked."""
     if (found := outcome_of(task)) is None:

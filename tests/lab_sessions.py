@@ -4,10 +4,11 @@ walks.
 
 import numpy as np
 
-from biodance.lab.opensim.ground_forces import table_of
-from biodance.lab.opensim.mot import write_mot
+from biodance.lab.opensim import Y_UP_TO_Z_UP
+from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.records import Markers, Plate, Wrench
+from biodance.spatial import wrench_about_point
 
 STATURE, MASS, GRAVITY = 1.70, 62.0, 9.80665
 PLUG_IN_GAIT = {
@@ -69,3 +70,24 @@ def roles(session):
 def said(session):
     """All notes of a session as one text."""
     return " ".join(session.notes)
+
+
+def table_of(plates: tuple[Plate, ...]) -> TimeTable:
+    """Return the plates as OpenSim's columns, y up; force and torque stand at the fixed centre of each plate, so that
+    nothing is NaN.
+
+    Columns are ``ground_force_1_vx`` ... in N, ``ground_force_1_px`` ... in m, ``ground_torque_1_x`` ... in N·m.
+    """
+    columns = []
+    values = []
+    for i, plate in enumerate(plates, start=1):
+        point = np.broadcast_to(plate.centre, (plate.wrench.time.size, 3))
+        torque = wrench_about_point(plate.wrench.value, point)[:, 3:]
+        columns += [
+            f"ground_{kind}_{i}_{part}{axis}"
+            for kind, part in (("force", "v"), ("force", "p"), ("torque", ""))
+            for axis in "xyz"
+        ]
+        values += [part @ Y_UP_TO_Z_UP for part in (plate.wrench.force, point, torque)]
+    time = plates[0].wrench.time if plates else np.empty(0)
+    return TimeTable("ground_reactions", tuple(columns), time, np.hstack(values) if values else np.empty((0, 0)))

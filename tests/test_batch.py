@@ -203,6 +203,18 @@ def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
     assert real.counts == {"refused": 3}, "the work itself runs in the threads of a cluster"
 
 
+def test_a_session_whose_worker_dies_on_a_cluster_is_tried_alone(tmp_path: Path) -> None:
+    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
+    archive = archive_of(tmp_path / "a", 3)
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),  # a death blames all that the worker held
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as cluster,
+    ):
+        found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.die_beside)
+    assert worked(archive) == {"s0": 1, "s1": 1}
+    assert {one.name: one.status for one in found.outcomes if one.status != "done"} == {"s2": "failed"}
+
+
 def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     with pytest.raises(BiodanceError, match="no Dask scheduler answers there"):

@@ -5,12 +5,13 @@ them.
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from random_bodies import random_body, random_motion
 from scipy.spatial.transform import Rotation
 
 from biodance.body.export import formats, write_model
-from biodance.body.export.csv import STANDARD, read_sip
+from biodance.body.export.csv import STANDARD
 from biodance.body.export.urdf import roll_pitch_yaw
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
@@ -189,10 +190,10 @@ def test_coordinates_survive_the_mot_file(tmp_path) -> None:
 
 def test_csv_reads_back_exactly_and_its_derived_rows_are_right(tmp_path) -> None:
     path = write_model(WOMAN, tmp_path / "m.csv", format="csv", source='identified, "session 1"')
-    back = read_sip(path)
-    assert back.segments == WOMAN.segments
-    assert np.array_equal(back.phi, WOMAN.sip.phi)
-    assert np.diag(back.covariance) == pytest.approx(np.diag(WOMAN.sip.covariance), rel=1e-15)
+    table = pd.read_csv(path, dtype=str).query("quantity in @STANDARD")
+    assert tuple(table["segment"].unique()) == WOMAN.segments
+    assert np.array_equal(table["value"].astype(float), WOMAN.sip.phi)
+    assert table["sd"].astype(float).to_numpy() ** 2 == pytest.approx(np.diag(WOMAN.sip.covariance), rel=1e-15)
     rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
     com = [float(row[2]) for row in rows if row[:2] == ["left_shank", "com_y"]]
     assert com == [pytest.approx(WOMAN.sip.com[5, 1])]
@@ -206,20 +207,6 @@ def test_csv_standard_deviations_of_the_centre_of_mass_are_those_of_samples(tmp_
     rng = np.random.default_rng(0)
     sample = rng.multivariate_normal(WOMAN.sip.phi[block], WOMAN.sip.covariance[block, block], 20000)
     assert float(line.split(",")[4]) == pytest.approx(np.std(sample[:, 2] / sample[:, 0]), rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda text: text.replace("value", "worth"), "columns"),
-        (lambda text: text.replace("trunk_head,mass", "trunk_head,weight"), "mass of trunk_head"),
-    ],
-)
-def test_a_damaged_csv_is_refused(change, message, tmp_path) -> None:
-    path = write_model(WOMAN, tmp_path / "m.csv", format="csv")
-    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
-    with pytest.raises(FileRefused, match=message):
-        read_sip(path)
 
 
 def test_biomod_holds_every_segment_joint_and_marker(tmp_path) -> None:

@@ -3,6 +3,7 @@ nothing heavy imported.
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,8 @@ from bad_sessions import UNREADABLE, bad_session
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED
 from biodance.errors import BiodanceError
+from biodance.lab.session.archive import archive_folders
+from biodance.lab.session.read import read_session
 
 KEPT = ("methods.md", "motions.npz", "scaled_body.json", "body.json")
 """Files beside page and numbers that export and a paper need."""
@@ -81,6 +84,7 @@ def test_every_bad_file_has_its_sentence_and_the_good_ones_their_numbers(reporte
 def test_an_unreadable_file_alone_is_not_done(session, tmp_path, capsys, name):
     shutil.copy(session / f"{name}.c3d", tmp_path)
     assert run(["inspect", str(tmp_path / f"{name}.c3d")]) == NOT_DONE
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == NOT_DONE
     sentence = capsys.readouterr().err.strip()
     assert f"{name}.c3d" in sentence
@@ -183,60 +187,60 @@ def test_ctrl_c_before_anything_was_done_writes_nothing(tmp_path, capsys, monkey
     assert not (tmp_path / "out").exists()
 
 
+_WHO = "--sex F --height 1.7 --mass 62"
+_STANDING = f"simulate --protocol standing {_WHO} --out x"
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["reprot"], "report"),
-        (["inspect"], "nothing to inspect"),
-        (["inspect", "no-such-file.c3d"], "no-such-file.c3d"),
-        (["report", "no-such-folder", "--out", "x"], "no-such-folder"),
-        (["report", "."], "--out"),
-        (
-            [
-                "simulate",
-                "--protocol",
-                "short",
-                "--sex",
-                "F",
-                "--height",
-                "170",
-                "--mass",
-                "62",
-                "--seed",
-                "1",
-                "--out",
-                "x",
-            ],
-            "stature",
-        ),
-        (
-            [
-                "simulate",
-                "--protocol",
-                "waltz",
-                "--sex",
-                "F",
-                "--height",
-                "1.7",
-                "--mass",
-                "62",
-                "--seed",
-                "1",
-                "--out",
-                "x",
-            ],
-            "waltz",
-        ),
+        ("reprot", "report"),
+        ("inspect", "nothing to inspect"),
+        ("inspect no-such-file.c3d --json", "no-such-file.c3d"),
+        ("report no-such-folder --out x", "no-such-folder"),
+        ("settings no-such-folder", "no such folder"),
+        ("report .", "--out"),
+        ("simulate --protocol short --sex F --height 170 --mass 62 --seed 1 --out x", "stature"),
+        ("simulate --protocol standing --sex F --height 1.7 --mass inf --seed 1 --out x", "mass = inf kg"),
+        (f"simulate --protocol waltz {_WHO} --seed 1 --out x", "waltz"),
+        (f"{_STANDING} --seed 1.5", "no whole number"),
+        (f"{_STANDING} --seed -1", "0 and more"),
+        (f"{_STANDING} --seed 1 --age -3", "0 to 120 years"),
+        (f"dance {_WHO} --age 200 --out x", "0 to 120 years"),
+        (f"dance {_WHO} --limits pipe --out x", "pipe: is a pipe"),
+        ("dance --urdf pipe --feet a,b --out x", "pipe: is a pipe"),
+        ("feedback empty --out x.html", "empty: is not a dance"),
+        ("foresee pipe", "pipe: is a pipe"),
+        ("plates loop --out x", "loop: is no folder"),
+        ("batch loop --out x", "loop: is no folder"),
+        ("batch static --limit nan --out x", "--limit nan"),
     ],
 )
-def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch):
+def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch, session):
     monkeypatch.chdir(tmp_path)
-    assert run(words) == NOT_DONE
-    printed = capsys.readouterr()
-    sentence = (printed.err.strip() or printed.out.strip()).splitlines()
-    assert says in " ".join(sentence)
-    assert "Traceback" not in printed.err
-    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "empty").touch()
+    (tmp_path / "static").mkdir()
+    shutil.copy(session / "static.c3d", tmp_path / "static")
+    (tmp_path / "loop").symlink_to("loop")
+    os.mkfifo(tmp_path / "pipe")
+    before = sorted(tmp_path.iterdir())
+    assert run(words.split()) == NOT_DONE
+    sentence = capsys.readouterr().err.strip()
+    assert says in sentence
+    assert len(sentence.splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_link_that_leads_nowhere_is_one_bad_file(session, tmp_path, monkeypatch):
+    for name in ("static.c3d", "walk.c3d", "session.toml"):
+        shutil.copy(session / name, tmp_path)
+    (tmp_path / "broken.c3d").symlink_to("nowhere")
+    (tmp_path / "again").symlink_to(".")
+    monkeypatch.chdir(tmp_path)
+    found = read_session(".")
+    assert found.folder.name == tmp_path.name
+    assert "broken.c3d: cannot be opened" in found.refused["broken.c3d"]
+    assert archive_folders(tmp_path) == ((tmp_path,), ())
 
 
 def test_a_fault_of_biodance_is_named_as_such(tmp_path, capsys, monkeypatch):

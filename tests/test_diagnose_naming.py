@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from diagnosed_sessions import known
 
-from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.naming import Round, suspicious
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.effects import effect
@@ -12,8 +11,7 @@ from biodance.effects import effect
 
 def scored(name: str, log_bayes_factor: float, *, targets: int = 1) -> ScoredCandidate:
     """Return a cause with its evidence and what ``targets`` take off it."""
-    cause = Candidate(effect(name), np.zeros((1, 0)), ())
-    return ScoredCandidate(cause, log_bayes_factor, log_bayes_factor - np.log(targets), np.zeros(0), 1.0)
+    return ScoredCandidate(effect(name), log_bayes_factor, log_bayes_factor - np.log(targets), np.zeros(0), 1.0)
 
 
 def test_a_cause_twenty_times_less_probable_is_not_in_the_set() -> None:

@@ -8,7 +8,7 @@ from diagnosed_sessions import body, known, looks
 from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import Candidate, candidates, changes, removed, slopes
+from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
 from biodance.diagnosis.evidence import believe, evidence, smallest
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
@@ -68,6 +68,15 @@ def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
     assert np.mean(left**2) == pytest.approx(0.9, abs=0.15)
 
 
+def test_what_comes_and_goes_bears_a_trial_of_which_too_little_is_measured() -> None:
+    whole, other = looks(3, trials=2)
+    short = problem(body(), (whole, replace(other, use=other.motion.time < 0.5)))
+    columns = local_basis(short, replace(effect("external_contact"), target="left_forearm_hand"))
+    first, last = model(short, (), known()).white_by_trial(columns).parts
+    assert first.values.any()
+    assert last.values.shape == (0, last.columns.size)
+
+
 def test_differences_of_a_cause_agree_with_its_columns(put) -> None:
     late = effect("time_delay")
     columns = put.columns([late])[0]
@@ -99,7 +108,7 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     suspects = screen(found, causes)
     assert len(suspects) == 12
     rows = detection_limits(visibility(found, causes), put.cases[0].body, 10.0)
-    assert {(row.effect, row.target) for row in rows} == {one.cause.names for one in suspects}
+    assert {(row.effect, row.target) for row in rows} == {one.names for one in suspects}
     assert all(row.told_from >= row.limit > 0 for row in rows)
 
 

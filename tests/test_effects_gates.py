@@ -204,7 +204,7 @@ def test_a_load_is_no_clock(segment: str, kilograms: float) -> None:
     place = np.array([0.0, -0.2, 0.05])
     phi[start] += kilograms
     phi[start + 1 : start + 4] += kilograms * place
-    value = case.trial.plates[0].wrench.value + case.regressor @ (phi - case.phi)
+    value = case.trial.plates[0].wrench.value + case.needed(phi - case.phi)
     plate = replace(case.trial.plates[0], wrench=Wrench(case.motion.time, value))
     loaded = replace(case, trial=replace(case.trial, plates=(plate,)))
     ratio, explained = clock_beside_body([loaded])

@@ -80,7 +80,7 @@ def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
         from biodance.diagnosis.naming import Round
         from biodance.diagnosis.screening import ScoredCandidate
 
-        return Round((ScoredCandidate(one[name], 50.0, 50.0, np.zeros(1), 0.9),))
+        return Round((ScoredCandidate(one[name].effect, 50.0, 50.0, np.zeros(1), 0.9),))
 
     kept, rounds = held(both, (round_of(("time_delay", "")), round_of(("plate_offset", "Fx"))))
     assert [cause.effect.name for cause in kept.named] == ["plate_offset"]

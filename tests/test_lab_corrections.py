@@ -103,7 +103,7 @@ def test_a_lab_file_comes_back_and_adds_up(tmp_path: Path) -> None:
         ('[corrections.plate_position."plate1:x"]\nshift = "far"', "expected a number in m"),
         ('[corrections.plate_position."x"]\nshift = 0.03', "no such target"),
         ("corrections = 3", "expected tables"),
-        ("[corrections", "is not TOML"),
+        ("[corrections", "is not valid TOML"),
     ],
 )
 def test_a_wrong_lab_file_is_refused_in_a_sentence(tmp_path: Path, text: str, said: str) -> None:

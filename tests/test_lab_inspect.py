@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lab_sessions import GRAVITY, MASS, write_trial
+from lab_sessions import GRAVITY, MASS, table_of, write_trial
 
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file, inspect_paths
-from biodance.lab.opensim.ground_forces import table_of
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.read import read_trial

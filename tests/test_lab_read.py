@@ -9,7 +9,7 @@ from lab_sessions import two_trials
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.read import format_of, read_trial
+from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.read import read_session
 
 
@@ -83,11 +83,11 @@ def test_a_reader_may_be_given_as_an_object(folder):
 def test_content_counts_more_than_the_name(tmp_path, folder):
     path = tmp_path / "renamed.c3d"
     path.write_bytes((folder / "static01.trc").read_bytes())
-    assert format_of(path) == ".trc"
+    assert reader_of(path).EXTENSIONS[0] == ".trc"
     assert read_trial(path).markers.names[0] == "LFHD"
     table = tmp_path / "numbers.dat"
     table.write_text("1,2,3,4,5,6\n-1,2.5,3e-1,4,5,6\n")
-    assert format_of(table) == ".asc"
+    assert reader_of(table).EXTENSIONS[0] == ".asc"
 
 
 def test_a_file_larger_than_any_recording_is_refused_without_reading_it(tmp_path):

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lab_sessions import GRAVITY, MASS, plate, roles, said, two_trials, write_trial
+from lab_sessions import GRAVITY, MASS, plate, roles, said, table_of, two_trials, write_trial
 
 from biodance.errors import SessionRefused
-from biodance.lab.opensim.ground_forces import table_of
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
@@ -157,8 +156,6 @@ def test_damaged_forces_leave_the_markers(folder):
 
 def test_forces_of_another_time_are_said(folder):
     (folder / "static01.mot").unlink()
-    from biodance.lab.opensim.ground_forces import table_of
-    from biodance.lab.opensim.mot import write_mot
 
     write_mot(folder / "static01_grf.mot", table_of((plate(frames=300),)))
     assert any("may not belong together" in warning for warning in read_trial(folder / "static01.trc").warnings)
@@ -187,13 +184,13 @@ def test_real_session_finds_static_and_subject(place, static, subject):
 
 
 def test_results_get_a_folder_of_their_own(folder):
-    made = results_folder(None, folder)
+    made = results_folder(folder / "biodance", folder)
     assert made == (folder / "biodance").resolve()
     assert made.is_dir()
     (made / "results.json").write_text("{}")
     with pytest.raises(SessionRefused, match="nothing is overwritten"):
-        results_folder(None, folder)
-    assert results_folder(None, folder, force=True) == made
+        results_folder(folder / "biodance", folder)
+    assert results_folder(folder / "biodance", folder, force=True) == made
     assert read_session(folder).refused == {}
 
 

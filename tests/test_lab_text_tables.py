@@ -4,9 +4,10 @@ the second reader.
 
 import numpy as np
 import pytest
+from lab_sessions import table_of
 
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.opensim.ground_forces import has_plates, plates_of, table_of
+from biodance.lab.opensim.ground_forces import has_plates, plates_of
 from biodance.lab.opensim.mot import TimeTable, read_mot, write_mot
 from biodance.records import Plate, Wrench
 

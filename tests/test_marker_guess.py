@@ -19,6 +19,8 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.names import meanings, meanings_of
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.markers.upright import axis_to_head
+from biodance.lab.opensim.trc import write_trc
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
 from biodance.lab.session.write import init_session
@@ -86,8 +88,37 @@ def test_a_guess_that_the_person_contradicts_is_none() -> None:
     assert "right where the person has the left" in exchanged.doubts[0]
     upside = OWN | {"right_asis": OWN["right_heel"], "right_heel": OWN["right_asis"]}
     assert guess_set(stand(upside)).name == ""
-    nameless = guess_set(stand({place: f"M{k:02d}" for k, place in enumerate(OWN)}))
-    assert (nameless.name, nameless.map) == ("", {})
+
+
+def test_posture_names_what_no_label_says() -> None:
+    numbered = {place: f"M{k:02d}" for k, place in enumerate(OWN)}
+    guess = guess_set(stand(numbered))
+    assert guess.map == {label: place for place, label in numbered.items()}
+    assert guess.name
+    assert len(guess.doubts) == len(OWN)
+    half = stand({place: label for place, label in numbered.items() if not place.endswith("knee_lateral")})
+    assert guess_set(half).name == ""
+
+
+def test_a_tongue_nobody_knows_is_learned_from_the_mirror_images() -> None:
+    strange = {place: f"{'Zil' if place.startswith('right') else 'Vob'} {label[:-2]}" for place, label in OWN.items()}
+    assert guess_set(stand(strange)).map == {label: place for place, label in strange.items()}
+
+
+def test_words_nobody_knows_are_told_by_where_the_markers_are() -> None:
+    words = {"knee": "Qux", "toe": "Zeb", "heel": "Plo"}
+    odd = {place: f"{words.get(place.split('_')[1], label[:-2])} {label[-1]}" for place, label in OWN.items()}
+    guess = guess_set(stand(odd))
+    assert guess.map == {label: place for place, label in odd.items()}
+    assert "Qux R stands where people have the right knee lateral" in guess.doubts[0]
+
+
+def test_the_only_way_to_stand_is_up() -> None:
+    numbered = {place: f"M{k:02d}" for k, place in enumerate((*OWN, "c7", "jugular_notch"))}
+    upright = stand(numbered)
+    assert axis_to_head(upright) == pytest.approx([0.0, 0.0, 1.0])
+    lying = Markers(upright.names, upright.time, upright.xyz[..., [1, 2, 0]])
+    assert axis_to_head(lying) == pytest.approx([0.0, 1.0, 0.0])
 
 
 SPEAKERS = {
@@ -205,6 +236,17 @@ def test_init_writes_its_guesses_once(tmp_path: Path, capsys: pytest.CaptureFixt
     with pytest.raises(SessionRefused, match="nothing of yours is overwritten"):
         init_session(folder)
     assert (folder / "session.toml").read_text() == text
+
+
+def test_init_begins_a_map_where_none_can_be_guessed(tmp_path: Path) -> None:
+    numbered = {place: f"M{k:02d}" for k, place in enumerate(OWN)}
+    still = stand(numbered | {"left_toe": "gone"})
+    write_trc(tmp_path / "static.trc", still.select([label for label in still.names if label != "gone"]))
+    init_session(tmp_path)
+    text = (tmp_path / "session.toml").read_text()
+    assert "# [markers.map]" in text
+    assert all(f'# "{label}" = ' in text for label in numbered.values() if label in still.names)
+    assert '# "M00" = "right_asis"' in text
 
 
 def test_inspect_honours_the_markers_of_the_session_file(tmp_path: Path) -> None:

@@ -174,7 +174,7 @@ def test_a_foot_held_in_the_air_is_told_from_a_foot_on_a_box_by_the_weight() -> 
     trial, soles = one_leg(("left",))
     contact = ground_contact(trial, soles, mass=MASS)
     assert contact.measured.all()
-    assert "The left foot rests in the air (1 times): the plates carry the weight meanwhile." in contact.notes
+    assert "The left foot rests in the air (1 time): the plates carry the weight meanwhile." in contact.notes
     assert not ground_contact(trial, soles).measured[held].any()
     trial, soles = one_leg(())
     boxed = ground_contact(trial, soles, mass=MASS)

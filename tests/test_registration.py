@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lab_sessions import table_of
 
 import biodance
 from biodance.cli import run
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.c3d.write import write_c3d
-from biodance.lab.opensim.ground_forces import table_of
 from biodance.lab.opensim.mot import write_mot
 from biodance.records import Markers, Plate, Subject, Wrench
 

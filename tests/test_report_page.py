@@ -126,7 +126,7 @@ def test_names_from_files_cannot_become_markup(full):
 def test_what_is_outside_its_limit_comes_first(full):
     assert (
         full.index("What needs a person")
-        < full.index("<strong>gaps, walk &lt;1&gt;</strong>")
+        < full.index("<strong>Gaps, walk &lt;1&gt;</strong>")
         < full.index("Quality checks")
     )
 

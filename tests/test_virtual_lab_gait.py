@@ -73,7 +73,7 @@ def test_angular_momentum_changes_as_the_forces_turn(going: GaitPerformance) -> 
 
 
 def test_nothing_carries_a_foot_in_the_air(going: GaitPerformance) -> None:
-    on = {side: going.on_belt(TIME, side) for side in ("right", "left")}
+    on = {side: going.gait.since_strike(TIME, side) < going.gait.contact for side in ("right", "left")}
     for side, there in on.items():
         assert np.abs(going.foot_wrench(TIME, side)[~there]).max() == 0
         assert going.foot_wrench(TIME, side)[there, 2].min() > -0.004 * going.person.mass * G
@@ -90,7 +90,7 @@ def test_a_standing_sole_moves_with_the_belt_and_presses_inside(going: GaitPerfo
         foot = going.person.body.feet[side]
         sole = pose.points([foot.segment] * len(foot.outline), foot.outline)
         lowest = np.take_along_axis(sole, sole[..., 2].argmin(axis=1)[:, None, None], axis=1)[:, 0]
-        on = going.on_belt(TIME, side)
+        on = going.gait.since_strike(TIME, side) < going.gait.contact
         assert np.abs(lowest[on, 2]).max() < 0.004
         flat = on & (np.ptp(sole[..., 2], axis=1) < 0.002)
         speed = np.gradient(sole.mean(axis=1), 1e-3, axis=0)[flat, :2]

@@ -7,13 +7,19 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from typing import TYPE_CHECKING
 
 from biodance.batch.work import Outcome, SessionStatus, SessionTask, untold
 from biodance.errors import BiodanceError
 
+if TYPE_CHECKING:
+    import distributed
+
 Work = Callable[[SessionTask], Outcome]
 TRIES = 3
 """Times that a session may lose its process before it is given up."""
+_AHEAD = 2
+"""Tasks sent to a cluster for each of its threads: the second waits where the first is worked on."""
 _FRESH = 50
 """Sessions after which a process is replaced, so that memory stays flat."""
 
@@ -112,10 +118,37 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
     except (OSError, ValueError) as error:
         raise BiodanceError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}).") from error
     with client:
-        flying = {client.submit(work, task, key=f"{task.name}-{task.fingerprint}"): task for task in tasks}
-        for future in dask.as_completed(list(flying)):
-            task = flying.pop(future)
-            try:
-                yield task, future.result()
-            except dask.KilledWorker:
+        waiting, alone = deque(tasks), deque[SessionTask]()
+        yield from _on_cluster(client, work, waiting, alone, lambda: _AHEAD * max(1, sum(client.nthreads().values())))
+        yield from _on_cluster(client, work, alone, None, lambda: 1)
+
+
+def _on_cluster(
+    client: "distributed.Client",
+    work: Work,
+    waiting: deque[SessionTask],
+    alone: deque[SessionTask] | None,
+    places: Callable[[], int],
+) -> Iterator[tuple[SessionTask, Outcome]]:
+    """Yield what is finished until all is, with as many tasks sent as there are ``places``.
+
+    Dask blames a worker's death on all that it held: such a task goes to ``alone``, or, without it, is given up.
+    """
+    import distributed as dask
+
+    flying, finished = dict[dask.Future, SessionTask](), dask.as_completed()
+    while waiting or flying:
+        while waiting and len(flying) < places():
+            task = waiting.popleft()
+            future = client.submit(work, task, key=f"{task.name}-{task.fingerprint}-{'alone' if alone is None else ''}")
+            flying[future] = task
+            finished.add(future)
+        future = next(finished)
+        task = flying.pop(future)
+        try:
+            yield task, future.result()
+        except dask.KilledWorker:
+            if alone is None:
                 yield task, _killed(task)
+            else:
+                alone.append(task)

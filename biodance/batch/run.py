@@ -97,11 +97,13 @@ def run_batch(
     """
     archive, folder = Path(archive), Path(out)
     assignments(chosen)
+    sessions, indices = archive_folders(archive)
     if folder.resolve() in (archive.resolve(), *archive.resolve().parents):
         raise BiodanceError(f"{folder}: results must not lie among the recordings. Choose another --out.")
     if isinstance(workers, int) and workers < 1:
         raise BiodanceError(f"--workers {workers}: at least one process is needed. Leave it out for one a core.")
-    sessions, indices = archive_folders(archive)
+    if not limit > 0:
+        raise BiodanceError(f"--limit {limit:g}: legal is more than 0 s for one session.")
     inside = folder.resolve()
     tasks = [
         SessionTask(

@@ -10,6 +10,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.parts import Foot, Joint, JointError, JointLimits, Part, SegmentMarkers
 from biodance.errors import BiodanceError, FileRefused
+from biodance.library import refuse_special
 from biodance.records import Sip
 
 _VERSION = 1
@@ -28,6 +29,7 @@ def read_body(path: str | Path) -> tuple[Body, str]:
     FileRefused
         The file cannot be read, is of another version, or is not such a file.
     """
+    refuse_special(Path(path))
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

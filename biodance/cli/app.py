@@ -24,8 +24,8 @@ app = App(
 
 
 def say(sentence: str) -> None:
-    """Write one line to stderr."""
-    sys.stderr.write(sentence.rstrip() + "\n")
+    """Write one line to stderr, also where a name holds a line's end."""
+    sys.stderr.write(sentence.rstrip().replace("\n", "\\n") + "\n")
 
 
 def print_json(document: object) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress, say
-from biodance.cli.options import ForceOption, JsonOption, OutOption, Set
+from biodance.cli.options import ForceOption, JsonOption, OutOption, Set, whole
 
 
 @app.command(name="batch")
@@ -15,7 +15,7 @@ def batch_command(
     archive: Path,
     *,
     out: OutOption,
-    workers: int | None = None,
+    workers: Annotated[int | None, Parameter(converter=whole)] = None,
     scheduler: str | None = None,
     chosen: Set = (),
     pages: Annotated[bool, Parameter(negative="--no-pages")] = True,
@@ -51,7 +51,8 @@ def batch_command(
         words = {"needs a person": "need a person"}
         sorts = sorted(found.counts.items())
         counts = ", ".join(f"{n} {words.get(sort, sort) if n > 1 else sort}" for sort, n in sorts)
-        say(f"{len(found.outcomes)} sessions: {counts}; {found.fresh} of them in this run. {out / 'report.html'}")
+        of = len(found.outcomes)
+        say(f"{of} session{'s' * (of > 1)}: {counts}; {found.fresh} of them in this run. {out / 'report.html'}")
     return NEEDS_A_PERSON if found.needs_a_person else DONE
 
 
@@ -66,13 +67,14 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     """
     from rich.console import Console
 
+    from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.plates import judge_plates
     from biodance.report.laboratory import print_plates
     from biodance.report.pages.plates import write_plates
 
     with progress() as tell:
-        folder = results_folder(out, archive, force=force)
+        folder = results_folder(out, archive_folder(archive), force=force)
         found = judge_plates(archive, tell=tell)
         tell("writing the page")
         document = write_plates(found, folder)

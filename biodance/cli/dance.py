@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
-from biodance.cli.options import NO_ROBOT, NOBODY, ForceOption, JsonOption, OutOption, PersonFacts, RobotFile
+from biodance.cli.options import (
+    NO_ROBOT,
+    NOBODY,
+    ForceOption,
+    JsonOption,
+    OutOption,
+    PersonFacts,
+    RobotFile,
+    not_negative,
+    whole,
+)
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -28,7 +38,9 @@ def dance_command(
     ] = "full",
     limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
     robot: RobotFile = NO_ROBOT,
-    seed: Annotated[int, Parameter(help="The same seed gives the same dance.")] = 0,
+    seed: Annotated[
+        int, Parameter(converter=whole, validator=not_negative, help="The same seed gives the same dance.")
+    ] = 0,
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,
@@ -95,7 +107,7 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     from biodance.dance.dance import Dance
     from biodance.report.feedback.write import write_feedback
 
-    if not write_feedback(Dance.load(dance / "dance.npz" if dance.is_dir() else dance), out, force=force):
+    if not write_feedback(Dance.load(dance), out, force=force):
         say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
     sys.stdout.write(f"{out}\n")
     return DONE

@@ -121,7 +121,11 @@ def inspect_command(
     else:
         print_inspected(records, Console())
     states = {record["status"] for record in records}
-    return NOT_DONE if states == {"refused"} else NEEDS_A_PERSON if states - {"ok"} else DONE
+    if states == {"refused"}:
+        more = f" Nor can the other {len(records) - 1}." if len(records) > 1 else ""
+        say(f"{records[0]['reason']}{more}")
+        return NOT_DONE
+    return NEEDS_A_PERSON if states - {"ok"} else DONE
 
 
 @app.command
@@ -134,9 +138,11 @@ def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption 
         A session folder, whose session.toml is then followed.
     """
     from biodance.lab.session.file import read_session_file
+    from biodance.lab.session.read import session_folder
     from biodance.settings import USUAL, assignments
 
-    found = (read_session_file(session).settings if session else USUAL).changed(assignments(chosen))
+    usual = read_session_file(session_folder(session)).settings if session else USUAL
+    found = usual.changed(assignments(chosen))
     if json:
         print_json([row._asdict() for row in found.all()])
     else:

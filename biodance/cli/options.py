@@ -1,11 +1,11 @@
 """The options that commands share, and the groups of them that travel together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from biodance.cli.app import say
 
@@ -98,6 +98,25 @@ class Reading:
 USUAL_READING = Reading()
 
 
+def whole(_: object, tokens: Sequence[Token]) -> int:
+    """Return a number of things: the parser itself would round 1.5."""
+    text = tokens[0].value
+    if not text.removeprefix("-").isdecimal():
+        raise ValueError(f"{text!r} is no whole number.")
+    return int(text)
+
+
+def not_negative(_: object, value: float | None) -> None:
+    """Refuse a number below zero."""
+    if value is not None and value < 0:
+        raise ValueError("Legal are 0 and more.")
+
+
+def _lived(_: object, age: float) -> None:
+    if age < 0 or age > 120:
+        raise ValueError("Legal are 0 to 120 years.")
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class PersonFacts:
@@ -106,7 +125,7 @@ class PersonFacts:
     sex: Annotated[Literal["F", "M"] | None, Parameter(help="Of the person.")] = None
     height: Annotated[float | None, Parameter(help="Stature, m.")] = None
     mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None
-    age: Annotated[float, Parameter(help="Age, years; strength falls with it.")] = float("nan")
+    age: Annotated[float, Parameter(validator=_lived, help="Age, years; strength falls with it.")] = float("nan")
 
 
 NOBODY = PersonFacts()

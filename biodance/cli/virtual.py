@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from biodance.cli.app import DONE, app, progress
-from biodance.cli.options import NOBODY, ForceOption, OutOption, PersonFacts
+from biodance.cli.options import NOBODY, ForceOption, OutOption, PersonFacts, not_negative, whole
 from biodance.cli.session import print_reported, report_session
 
 
@@ -19,7 +19,12 @@ class Drawn:
     hidden causes.
     """
 
-    seed: Annotated[int, Parameter(help="The same seed gives the same person and the same files.")]
+    seed: Annotated[
+        int,
+        Parameter(
+            converter=whole, validator=not_negative, help="The same seed gives the same person and the same files."
+        ),
+    ]
     performer: Annotated[
         Literal["steady", "normal", "restless"],
         Parameter(help="How well the dance is copied: 2, 5 or 7 degrees off; 5, 10 or 20 % off in tempo; swaying."),
@@ -29,7 +34,11 @@ class Drawn:
     ] = ()
     lab_seed: Annotated[
         int | None,
-        Parameter(help="Number of a laboratory of the family: other plates, cameras, soft tissue, tolerances."),
+        Parameter(
+            converter=whole,
+            validator=not_negative,
+            help="Number of a laboratory of the family: other plates, cameras, soft tissue, tolerances.",
+        ),
     ] = None
 
 

@@ -56,6 +56,10 @@ class CurveGroup:
     sd: Array
     parameters_sd: Array
 
+    def __repr__(self) -> str:
+        count = f"{len(self.values)} {self.kind} cycle{'s' * (len(self.values) != 1)}"
+        return f"CurveGroup({self.quantity} {self.side}, {count}, {self.unit})"
+
 
 def over_cycle(
     cycle: Cycle, quantity: str, side: str, unit: str, time: Array, value: Array, sd: Array | None = None

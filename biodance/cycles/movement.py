@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class TrialMovement:
         said = [f"{n} {_WORDS[kind][n > 1]}" for kind, n in counts.items() if n]
         return ", ".join(said) or "no repetition"
 
-    @property
+    @cached_property
     def groups(self) -> tuple[CurveGroup, ...]:
         """The curves of each quantity and side together, with mean and sd."""
         return group_curves(self.curves)

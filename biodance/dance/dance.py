@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
+from biodance.library import refuse_special
 from biodance.records import SIDES, Array, Motion, Subject, frozen_array
 from biodance.threads import Sendable
 
@@ -258,7 +260,7 @@ class Dance(Sendable):
         Parameters
         ----------
         path : str or pathlib.Path
-            The file.
+            The file, or the folder that holds it as dance.npz.
 
         Returns
         -------
@@ -275,6 +277,8 @@ class Dance(Sendable):
         >>> biodance.Dance.load("dance.npz").duration
         4.0
         """
+        path = Path(path) / "dance.npz" if Path(path).is_dir() else Path(path)
+        refuse_special(path)
         try:
             with np.load(path, allow_pickle=False) as found:
                 words: dict[str, Any] = json.loads(str(found["words"]))
@@ -290,7 +294,5 @@ class Dance(Sendable):
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
         except FileRefused:
             raise
-        except (ValueError, KeyError, TypeError, BiodanceError) as error:
-            raise FileRefused(
-                f"{path}: is not a dance that biodance wrote ({error}). Run biodance dance again."
-            ) from error
+        except (BadZipFile, EOFError, ValueError, KeyError, TypeError) as error:
+            raise FileRefused(f"{path}: is not a dance that biodance wrote. Run biodance dance again.") from error

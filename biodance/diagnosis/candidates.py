@@ -5,10 +5,12 @@ weighs something) is spanned by what it does at its typical size: the columns at
 other parameters make there.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.problem import Problem
@@ -20,7 +22,7 @@ SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
 _EMPTY = 50.0
 """N that a plate carries at most that is always empty."""
-_AT_ONCE = 32
+AT_ONCE = 32
 """Causes whose columns are computed at once: little memory, however many there are."""
 _NOTHING = 1e-7
 """Share of the largest column below which a column is zero."""
@@ -28,18 +30,26 @@ _NOTHING = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One cause: ``basis`` (r, k) rows per unit-normal coefficient; ``silent`` (p,) True for parameters whose column
-    vanishes at zero.
+    """One cause: ``basis`` (r, k) rows per unit-normal coefficient, in single precision because there are hundreds;
+    ``silent`` (p,) True for parameters whose column vanishes at zero.
     """
 
     effect: Effect
-    basis: Array
+    basis: NDArray[np.float32]
     silent: tuple[bool, ...]
 
     @property
     def names(self) -> tuple[str, str]:
         """Effect and target."""
         return self.effect.name, self.effect.target
+
+    @property
+    def units(self) -> Array:
+        """(p, k): what each column is in the parameters, for one unit of the first; zero for silent ones."""
+        loud = np.flatnonzero(~np.array(self.silent))
+        out = np.zeros((len(self.silent), self.basis.shape[1]))
+        out[loud, np.arange(loud.size)] = self.effect.typical[loud] / self.effect.typical[0]
+        return out
 
     def start(self, coefficients: Array) -> Array:
         """Return the parameters (p,) near which to begin fitting, from the coefficients (k,) of the basis."""
@@ -64,7 +74,7 @@ def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candida
     every = [one for one in every if not (one.by_load and one.target.partition(":")[0] in empty)]
     found = [
         candidate(problem, effect, columns)
-        for some in (every[start : start + _AT_ONCE] for start in range(0, len(every), _AT_ONCE))
+        for some in (every[start : start + AT_ONCE] for start in range(0, len(every), AT_ONCE))
         for effect, columns in zip(some, problem.columns(some), strict=True)
     ]
     return tuple(one for one in found if one.basis.shape[1])
@@ -91,7 +101,15 @@ def candidate(problem: Problem, effect: Effect, unit: Array) -> Candidate:
     if silent.any() and not silent.all():
         parts += _differences(problem, effect, silent)
     basis = SCALE * np.array(parts).T if parts else np.empty((len(columns), 0))
-    return Candidate(effect, basis, tuple(bool(s) for s in silent))
+    return Candidate(effect, basis.astype(np.float32), tuple(bool(s) for s in silent))
+
+
+def bases_of(causes: Sequence[Candidate]) -> tuple[Array, tuple[slice, ...]]:
+    """Return the columns (r, k) of all ``causes`` side by side, and where each of them lies."""
+    ends = np.cumsum([0, *(one.basis.shape[1] for one in causes)]).tolist()
+    return np.concatenate([one.basis for one in causes], axis=1, dtype=float), tuple(
+        slice(*pair) for pair in pairwise(ends)
+    )
 
 
 def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]:
@@ -115,7 +133,7 @@ def local_basis(problem: Problem, effect: Effect) -> ByTrial | None:
         if samples is None:
             return None
         block = problem.spectrum.of_trial(index, samples)
-        blocks.append(block.reshape(6 * len(block), -1))
+        blocks.append(block.reshape(6 * len(block), block.shape[2]))
     return ByTrial.of(blocks)
 
 

@@ -155,7 +155,7 @@ def judged(examined: Examined) -> Examined:
     naming, one = examined.naming, examined.diagnosis
     left, put, known = adequacy(naming.found), naming.found.problem, naming.found.tolerances
     plates = put.cases[0].trial.plates
-    named = tuple(_measured(cause, put, known) for cause in naming.found.named)
+    named = tuple(_measured(cause, naming.found) for cause in naming.found.named)
     hung = {names: one.over for names, one in hanging(naming.found).items()}
     every = [
         (cause, replace(_finding(cause, r, known, plates), hangs_on=hung.get(named_of(cause), "")))
@@ -251,13 +251,16 @@ def _relative(row: Unobservable) -> float:
     return row.limit / row.typical
 
 
-def _measured(one: NamedCause, put: Problem, known: Tolerances) -> NamedCause:
-    """Return a named cause with the size that the markers show by themselves, where they do (`Effect.measured`)."""
+def _measured(one: NamedCause, found: Model) -> NamedCause:
+    """Return a named cause with the whole of its size (`Model.whole`), or with the one that the markers show by
+    themselves, where they do (`Effect.measured`).
+    """
     if one.course:
         return one
-    covariance, shown = np.array(one.covariance), known.size(f"shown {one.effect.name}")
+    covariance, shown = np.array(one.covariance), found.tolerances.size(f"shown {one.effect.name}")
     covariance[0, 0] = shown**2 or covariance[0, 0]
-    return replace(one, theta=one.effect.measured(one.theta, *put.cases), covariance=covariance)
+    theta = one.effect.measured(found.whole(one), *found.problem.cases)
+    return replace(one, theta=theta, covariance=covariance)
 
 
 def _finding(one: NamedCause, found: Round, known: Tolerances, plates: tuple[Plate, ...]) -> Finding:

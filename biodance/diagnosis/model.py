@@ -44,7 +44,8 @@ class NamedCause:
 @dataclass(frozen=True, eq=False)
 class Model:
     """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the
-    ``named`` causes and what is ``expected`` (r,) of a session without fault taken off.
+    ``named`` causes and what is ``expected`` (r,) of a session without fault taken off; ``tolerated`` by effect and
+    target: where the columns of its tolerance lie in the belief, and (p, k) what one of each is in its parameters.
 
     ``log_likelihood`` of the target under it, up to a constant of the session.
     """
@@ -54,6 +55,16 @@ class Model:
     belief: Belief
     expected: Array
     named: tuple[NamedCause, ...] = ()
+    tolerated: Mapping[tuple[str, str], tuple[slice, Array]] = field(default_factory=dict)
+
+    def whole(self, one: NamedCause) -> Array:
+        """Return the size (p,) of a named cause with what its own tolerance has taken of it: both look alike, and the
+        sum is what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
+        """
+        where, unit = self.tolerated.get(
+            (one.effect.name, one.effect.target), (slice(0), np.zeros((one.theta.size, 0)))
+        )
+        return one.theta + unit @ self.belief.mean[where]
 
     @property
     def log_likelihood(self) -> float:
@@ -122,13 +133,15 @@ def marker_keys(problem: Problem) -> tuple[str, ...]:
 class Nuisances:
     """All that may be no fault: ``parts`` (r, k) of the columns (r, K), which times ``scale`` (K,) are per unit; the
     ``keys`` (K) of their sizes and ``means`` (K) of their means ("" for those that have none: the signs of slides and
-    tilts are mirrored between sides and persons).
+    tilts are mirrored between sides and persons); ``causes`` by effect and target: its columns, and (p, k) what one
+    unit of each is in its parameters.
     """
 
     parts: tuple[NDArray[np.floating], ...]
     scale: Array
     keys: tuple[str, ...]
     means: tuple[str, ...]
+    causes: Mapping[tuple[str, str], tuple[slice, Array]]
 
 
 def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
@@ -138,9 +151,11 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
     parts: list[NDArray[np.floating]] = [problem.kinematics]
     keys, scale = list(problem.groups), [1.0] * problem.kinematics.shape[1]
     means = [group if group.startswith("sag ") else "" for group in problem.groups]
+    tolerated = {}
     for one in causes:
         parts.append(one.basis)
         key, width = key_of(*one.names), one.basis.shape[1]
+        tolerated[one.names] = slice(len(keys), len(keys) + width), one.units
         scale += [1 / (SCALE * one.effect.typical[0])] * width
         own = in_state(key, one.effect.target if one.effect.target in joints else "", body)
         loud = [p.name for p, silent in zip(one.effect.parameters, one.silent, strict=True) if not silent]
@@ -151,10 +166,10 @@ def nuisances(problem: Problem, causes: tuple[Candidate, ...]) -> Nuisances:
             scale += scale[-width:]
             keys += [HABIT + key] * width
             means += [""] * width
-    return Nuisances(tuple(parts), np.array(scale), tuple(keys), tuple(means))
+    return Nuisances(tuple(parts), np.array(scale), tuple(keys), tuple(means), tolerated)
 
 
-def _where_not_shown(problem: Problem, columns: Array) -> Array:
+def _where_not_shown(problem: Problem, columns: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return ``columns`` (r, k) with zero in the rows of sizes shown: what everybody does by habit is taken off there
     already (`Effect.shown`).
     """
@@ -180,10 +195,13 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     columns = both[:, problem.sip.shape[1] : -1]
     columns *= known.scale
     expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), marker_keys(problem))
-    columns *= np.array([tolerances.size(key) for key in known.keys])
+    sizes = np.array([tolerances.size(key) for key in known.keys])
+    columns *= sizes
     both[:, -1] -= expected
     both = white(problem, tolerances, both, out=both)
-    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected)
+    first = problem.sip.shape[1]
+    own = {n: (slice(first + c.start, first + c.stop), u * sizes[c]) for n, (c, u) in known.causes.items()}
+    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected, tolerated=own)
 
 
 def heavier(found: Model) -> bool:
@@ -198,6 +216,6 @@ def stale(found: Model) -> bool:
     """
     both = np.zeros(2)
     for case in found.problem.cases:
-        wrench = case.regressor @ np.stack([found.phi - case.phi, case.phi], axis=1)
+        wrench = np.stack([case.needed(found.phi - case.phi), case.predicted], axis=2)
         both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
     return bool(both[0] > _STALE**2 * both[1])

@@ -105,7 +105,7 @@ def name_causes(
         again = stale(settled) and strain(settled) <= STRAINED
         found, causes = rebuilt(settled, tolerances, chosen) if again else (settled, causes)
         ranking = Round(
-            tuple(one for one in screen(found, causes) if one.cause.names not in {named_of(n) for n in found.named})
+            tuple(one for one in screen(found, causes) if one.names not in {named_of(n) for n in found.named})
         )
     found, kept = held(found, tuple(accepted))
     return Naming(first, found, kept, screening, first_causes, bare)
@@ -219,20 +219,28 @@ def named_of(one: NamedCause) -> tuple[str, str]:
 
 def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
-    one named.
+    one named. Where none of them is possible, they hide nobody: the next ones are fitted.
     """
-    near = _near(ranking)
-    refined = []
-    for one in near:
-        start = NamedCause(one.cause.effect, one.start, np.empty((0, 0)))
-        settled = settle(found, (*found.named, start))
-        gain = more_probable(settled, found)
-        last = settled.named[-1]
-        bayes = gain if last.effect.possible_in(found.problem.cases[0], last.theta) else -np.inf
-        refined.append((replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled))
+    refined, rest = [_refined(found, one) for one in _near(ranking)], ranking
+    while True:
+        tried = {one.names for one, _ in refined}
+        rest = Round(tuple(one for one in rest.suspects if one.names not in tried))
+        if any(np.isfinite(one.score) for one, _ in refined) or not suspicious(rest, found.tolerances):
+            break
+        refined += [_refined(found, one) for one in _near(rest)]
     refined.sort(key=lambda pair: -pair[0].score)
-    rest = (one for one in ranking.suspects if one not in near)
-    return Round((*(one for one, _ in refined), *rest)), refined[0][1]
+    return Round((*(one for one, _ in refined), *rest.suspects)), refined[0][1]
+
+
+def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model]:
+    """Return a cause with its evidence where it is most probable, none where it is not possible there, and the model
+    with it named.
+    """
+    settled = settle(found, (*found.named, NamedCause(one.effect, one.start, np.empty((0, 0)))))
+    last = settled.named[-1]
+    possible = last.effect.possible_in(found.problem.cases[0], last.theta)
+    bayes = more_probable(settled, found) if possible else -np.inf
+    return replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled
 
 
 def _near(ranking: Round) -> list[ScoredCandidate]:

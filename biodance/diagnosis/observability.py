@@ -7,14 +7,13 @@ follow from G.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import SCALE, Candidate, changes
+from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, changes
 from biodance.diagnosis.consequence import least, unit_at
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import smallest
@@ -108,7 +107,7 @@ def _really_seen(found: Model, one: Candidate, size: float, threshold: float) ->
     """Return the size from which a cause that is not in proportion to its size is expected to pass ``threshold``, from
     the ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
     """
-    Z, first = found.white(one.basis), np.eye(len(one.silent))[0]
+    Z, first = found.white(one.basis.astype(float)), np.eye(len(one.silent))[0]
     free = found.belief.free(Z)
     G = Z.T @ free
     inner = np.linalg.inv(np.eye(len(G)) + G)
@@ -131,11 +130,9 @@ def unit_directions(one: Candidate) -> list[Array]:
 
 def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
     """Return what ``found``, a model without named causes, lets every cause show."""
-    widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)])
-    Z = np.concatenate([one.basis for one in causes], axis=1)
-    Z = found.white(Z, out=Z)
-    _, G = found.belief.score(Z)
-    return Visibility(causes, G, tuple(slice(a, b) for a, b in pairwise(widths.tolist())), found)
+    Z, cuts = bases_of(causes)
+    _, G = found.belief.score(found.white(Z, out=Z))
+    return Visibility(causes, G, cuts, found)
 
 
 def after_calibration(seen: Visibility, body: Body) -> Visibility:

@@ -5,6 +5,7 @@ Each trial has its own course of the force in time, so there are hundreds of col
 free, which is why such a force does not explain just anything.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +14,7 @@ from scipy.linalg import cholesky, solve, solve_triangular
 
 from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
 from biodance.diagnosis.by_trial import ByTrial
-from biodance.diagnosis.candidates import Candidate, local_basis
+from biodance.diagnosis.candidates import local_basis
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.evidence import Evidence, believe, evidence, visible
 from biodance.diagnosis.model import Model, NamedCause
@@ -84,27 +85,39 @@ def _with(
     threshold, and above the log Bayes factor ``than`` of what it stands for.
     """
     kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
-    found = [one for one in (_passing(base, effect) for effect in kinds) if one is not None]
-    if not found:
+    best, suspects = _screened(base, kinds)
+    if best is None:
         return None
-    order = sorted(found, key=lambda one: -one.log_bayes_factor)
-    score = float(np.log(len(found)))
-    if order[0].log_bayes_factor - score < base.tolerances.threshold:
+    if suspects[0].score < max(base.tolerances.threshold, than, needed(base, best.visible)):
         return None
-    if order[0].log_bayes_factor - score < max(than, needed(base, order[0].visible)):
+    if not one_sided(best.found.mean.reshape(-1, len(best.effect.parameters))):
         return None
-    if not one_sided(order[0].found.mean.reshape(-1, len(order[0].effect.parameters))):
-        return None
-    effect, white = _placed(base, order[0])
-    course = white.scaled(SIZES[-1]).whole(base.belief.y.size)  # widest: the most probable one would shrink short peaks
-    belief = believe(np.concatenate([base.belief.X, course], axis=1), base.belief.y)
-    touch = _named(base, effect, SIZES[-1] * belief.mean[-white.width :], order[0])
+    effect, white = _placed(base, best)
+    wide = white.scaled(SIZES[-1])  # widest: the most probable one would shrink short peaks
+    course = SIZES[-1] * _believed(base, wide, np.zeros(wide.width))
+    touch = _named(base, effect, course, best)
     if not (stands(base, touch) and matters(touch.effect, touch.theta)):
         return None
+    belief = believe(np.concatenate([base.belief.X, wide.whole(base.belief.y.size)], axis=1), base.belief.y)
     named = (*base.named, touch)
     model = replace(base, belief=belief, named=named)
-    suspects = tuple(_suspect(one, score) for one in order)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
+
+
+def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_Passing | None, tuple[ScoredCandidate, ...]]:
+    """Return the most probable of all causes that come and go, None without one, and the evidence of all, most probable
+    first; the columns of the best one only are kept.
+    """
+    best, found = None, []
+    for effect in kinds:
+        one = _passing(base, effect)
+        if one is not None:
+            value = one.log_bayes_factor
+            found.append(ScoredCandidate(effect, value, value, np.zeros(0), one.visible))
+            best = one if best is None or value > best.log_bayes_factor else best
+    price = float(np.log(max(len(found), 1)))
+    found.sort(key=lambda one: -one.score)
+    return best, tuple(replace(one, score=one.score - price) for one in found)
 
 
 def one_sided(course: Array) -> bool:
@@ -115,11 +128,6 @@ def one_sided(course: Array) -> bool:
     along = course @ directions[0]
     sides = np.sum(np.maximum(along, 0) ** 2), np.sum(np.minimum(along, 0) ** 2)
     return bool(min(sides) <= OTHER_SIDE * sum(sides))
-
-
-def _suspect(one: _Passing, penalty: float) -> ScoredCandidate:
-    cause, value = Candidate(one.effect, np.empty((0, 0)), ()), one.log_bayes_factor
-    return ScoredCandidate(cause, value, value - penalty, np.zeros(0), one.visible)
 
 
 def _passing(base: Model, effect: Effect) -> _Passing | None:

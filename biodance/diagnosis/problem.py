@@ -20,6 +20,7 @@ from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
 from biodance.identification.posterior import prior_factor
 from biodance.identification.statistics import Fit, usable
+from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Sip, Trial
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.sources import Errors, forward, of_clusters
@@ -156,7 +157,7 @@ def problem(
     cases = tuple(case for case, _ in pairs)
     where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)
-    W = where.rows(case.regressor @ factor for case in cases)
+    W = where.rows(regressor_of(case.segments, gravity=body.gravity, sharing=body.sharing) @ factor for case in cases)
     shown = sizes_shown(cases, {**effects(), **effects(chosen)})
     rows, unit = _kinematic_rows(where, _errors(body, cases, where), len(shown))
     W = W.reshape(-1, W.shape[2])

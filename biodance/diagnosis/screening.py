@@ -1,13 +1,14 @@
 """The screening: the evidence of every cause beside those that were named, all at once."""
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from biodance.diagnosis.candidates import SCALE, Candidate, removed
+from biodance.diagnosis.candidates import AT_ONCE, SCALE, Candidate, bases_of, removed
 from biodance.diagnosis.diagnosis import Alias
-from biodance.diagnosis.evidence import evidence
+from biodance.diagnosis.evidence import Evidence, evidence
 from biodance.diagnosis.model import Model
 from biodance.effects import Effect
 from biodance.records import Array
@@ -16,39 +17,50 @@ from biodance.records import Array
 @dataclass(frozen=True, eq=False)
 class ScoredCandidate:
     """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets;
-    ``start`` (p,) parameters; ``visible`` share.
+    ``start`` (p,) parameters; ``visible`` share. Its columns are not kept.
     """
 
-    cause: Candidate
+    effect: Effect
     log_bayes_factor: float
     score: float
     start: Array
     visible: float
 
     @property
+    def names(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect.name, self.effect.target
+
+    @property
     def alias(self) -> Alias:
         """The cause with its evidence."""
-        return Alias(*self.cause.names, self.log_bayes_factor)
+        return Alias(*self.names, self.log_bayes_factor)
 
 
 def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate, ...]:
     """Return all causes with their evidence, most probable first."""
-    widths = np.cumsum([0, *(one.basis.shape[1] for one in causes)]).tolist()
-    Z = np.concatenate([one.basis for one in causes], axis=1)
+    parts = (causes[start : start + AT_ONCE] for start in range(0, len(causes), AT_ONCE))
+    near = [pair for some in parts for pair in zip(some, _scored(found, some), strict=True)]
+    targets = Counter(one.names[0] for one in causes)
+    suspects = []
+    for one, here in near:
+        tried = [(here.log_bayes_factor, one.start(here.mean)), *_at_sizes(found, one.effect)]
+        value, begin = max(tried, key=lambda pair: pair[0])
+        score = value - float(np.log(targets[one.names[0]]))
+        suspects.append(ScoredCandidate(one.effect, value, score, begin, here.visible))
+    return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
+
+
+def _scored(found: Model, causes: tuple[Candidate, ...]) -> Iterator[Evidence]:
+    """Yield the evidence of some causes near none, beside those that were named."""
+    Z, cuts = bases_of(causes)
     Z = found.white(Z, out=Z)
     s = Z.T @ found.belief.left
     half = found.belief.half(found.belief.X.T @ Z)
     lost = absorbed(found, Z, half)
-    targets = {name: sum(1 for one in causes if one.names[0] == name) for name, _ in (c.names for c in causes)}
-    suspects = []
-    for one, cut in zip(causes, (slice(*pair) for pair in pairwise(widths)), strict=True):
+    for cut in cuts:
         own, hides = Z[:, cut], np.concatenate([half[:, cut], lost[:, cut]])
-        here = evidence(s[cut], own.T @ own - hides.T @ hides, float(np.sum(own**2)))
-        tried = [(here.log_bayes_factor, one.start(here.mean)), *_at_sizes(found, one.effect)]
-        value, begin = max(tried, key=lambda pair: pair[0])
-        score = value - float(np.log(targets[one.names[0]]))
-        suspects.append(ScoredCandidate(one, value, score, begin, here.visible))
-    return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
+        yield evidence(s[cut], own.T @ own - hides.T @ hides, float(np.sum(own**2)))
 
 
 def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:

@@ -28,7 +28,10 @@ class AddedMass(Effect):
         *(Parameter(f"place_{axis}", "m", 0.05, "half the width of a limb (segment boxes)") for axis in "xyz"),
     )
     separated_by = "Move the loaded segment alone, the rest standing still; repeat the session without the load."
-    advice = "Weigh the load; or record a reference session without it and compare."
+    advice = (
+        "Weigh the load; its size is surest beside a reference session without it. Its place counts from where the "
+        "table has the segment's centre of mass (x forward, y up, z right)."
+    )
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
@@ -44,7 +47,7 @@ class AddedMass(Effect):
         index = case.body.segment_index(self.target)
         table = case.phi[10 * index : 10 * index + 10]
         load = point_mass(theta[0], table[1:4] / table[0] + np.asarray(theta[1:4]))
-        return np.asarray(case.regressor[:, :, 10 * index : 10 * index + 10] @ load)
+        return case.needed_by(load, index)
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: a load weighs something."""

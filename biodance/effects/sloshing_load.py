@@ -72,7 +72,7 @@ class SloshingLoad(Effect):
         """Return the wrenches (T, 6) per kilogram carried and per kilogram that sloshes."""
         index = case.body.segment_index(self.target)
         local = carried_at(case, index) + high * np.eye(3)[1]
-        rigid = case.regressor[:, :, 10 * index : 10 * index + 10] @ point_mass(1.0, local)
+        rigid = case.needed_by(point_mass(1.0, local), index)
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)
         level = np.array([1.0, 1.0, 0.0])

@@ -28,6 +28,7 @@ class TimeDelay(Effect):
             "delay", "s", 0.005, "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)"
         ),
     )
+    screened_at = (-4.0, 4.0, 12.0)  # -20, 20, 60 ms: seen from none, the evidence of 20 ms is 169 instead of 16,000
     separated_by = "Fast alternating movements (arms at 2-3 Hz) in every direction."
     advice = "Drop a marker on the plate: its stop and the force must come in one frame; correct the trigger."
 

@@ -11,7 +11,6 @@ what the plate does wrong.
 """
 
 import json
-import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.library import read_toml
 from biodance.records import CHANNELS, Array, Plate, Session, Trial, Wrench
 from biodance.spatial import axis_rotation, wrench_about_origin, wrench_about_point
 
@@ -160,13 +160,7 @@ def read_corrections(path: str | Path) -> tuple[PlateCorrection, ...]:
     FileRefused
         The file cannot be read, is not TOML, or names a cause, a target or a value that cannot be corrected.
     """
-    try:
-        raw = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileRefused(f"{path}: is not TOML ({error}). Mend it, or have biodance write it again.") from error
-    found = raw.get("corrections", {})
+    found = read_toml(Path(path)).get("corrections", {})
     if not isinstance(found, dict):
         raise FileRefused(f"{path}: corrections = {found!r}; expected tables [corrections.CAUSE.TARGET].")
     return tuple(

@@ -14,7 +14,7 @@ from biodance.lab.markers.dress import said_of
 from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
-from biodance.lab.read import format_of, read_trial
+from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature
@@ -175,7 +175,7 @@ def _refused(path: Path, reason: str) -> dict[str, Any]:
 
 def _subjects(path: Path) -> list[str]:
     """Return the names of the people in a C3D file; none for the other formats, which hold none."""
-    if format_of(path) != ".c3d":
+    if ".c3d" not in reader_of(path).EXTENSIONS:
         return []
     from biodance.lab.c3d.raw import read_raw
     from biodance.lab.c3d.subject import subjects_of

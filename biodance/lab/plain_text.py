@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 from biodance.errors import FileRefused
+from biodance.library import refuse_special
 
 _LARGEST = 2**31
 """Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
@@ -53,14 +54,6 @@ def write_new(path: Path, content: bytes) -> Path:
             f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
         ) from error
     return path
-
-
-def refuse_special(path: Path) -> None:
-    """Raise FileRefused for a pipe, socket or device, on which reading could wait for ever."""
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise FileRefused(
-            f"{path}: is a pipe, socket or device, an ordinary file is expected. Copy the recording into a file."
-        )
 
 
 def refuse_huge(path: Path) -> None:

@@ -7,19 +7,15 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.frozen import without_frozen
 from biodance.lab.markers.sets import MarkerSet, wearing
-from biodance.lab.plain_text import refuse_special
 from biodance.lab.readers import Reader, extensions, head_text, readers
+from biodance.library import refuse_special
 from biodance.records import Role, Trial
 
 SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
 _HEAD = 8192
 """Bytes of a file that are looked at to find its reader."""
-
-
-def format_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> str:
-    """Return the format of a file as the extension it should have (``.c3d``, ``.trc`` ...); raises as `reader_of`."""
-    return reader_of(path, chosen=chosen).EXTENSIONS[0]
 
 
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
@@ -126,7 +122,7 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = reader.read(path, role=role, subject=subject)
+        trial = without_frozen(reader.read(path, role=role, subject=subject))
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise

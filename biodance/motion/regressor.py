@@ -92,11 +92,16 @@ def _predicted(body: Body, motion: Motion, phi: Array) -> Wrench:
 
 def wrench_of_segments(body: Body, move: SegmentMotion, phi: Array) -> Array:
     """Return the wrench (T, 6) about the lab origin that segments which ``move`` need with the parameters ``phi``
-    (10N,): the regressor times phi, without the regressor.
+    (10N,): the regressor times phi, without the regressor; what has no parameters costs nothing.
     """
     links = np.array(phi if body.sharing is None else body.sharing @ phi, dtype=float).reshape(-1, 10)
-    value, drive = np.zeros((len(move.position), 6)), move.acceleration - body.gravity
-    fill_wrench(move.rotation, move.position, move.angular_velocity, move.angular_acceleration, drive, links, value)
+    heavy = np.flatnonzero(links.any(axis=1))
+    turn, place, omega, alpha, drive = (
+        part if heavy.size == len(links) else part.take(heavy, axis=1)
+        for part in (move.rotation, move.position, move.angular_velocity, move.angular_acceleration, move.acceleration)
+    )
+    value = np.zeros((len(move.position), 6))
+    fill_wrench(turn, place, omega, alpha, drive - body.gravity, links[heavy], value)
     return value
 
 

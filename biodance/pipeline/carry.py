@@ -3,7 +3,6 @@ and a copy in which exchanged labels are put right.
 """
 
 import json
-import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +29,7 @@ from biodance.lab.corrections import (
     joined_corrections,
     read_corrections,
 )
+from biodance.library import read_toml
 from biodance.pipeline.looked_at import all_looks, cases_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
@@ -69,7 +69,7 @@ def read_lab(path: str | Path | None) -> LabFile:
     if path is None:
         return NO_LAB
     corrections = read_corrections(path)
-    whole = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    whole = read_toml(Path(path))
     raw, where = whole.get("tolerances"), "norms"
     try:
         norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}

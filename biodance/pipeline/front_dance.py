@@ -201,8 +201,10 @@ def simulate(
     from biodance.virtual_lab.movement.protocol import read_protocol
     from biodance.virtual_lab.recording.family import draw_laboratory
     from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
+    from biodance.virtual_lab.simulate import check_simulated
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
+    check_simulated(subject)
     hidden = tuple(parse_cause(text) for text in effects)
     if (protocol is None) == (dance is None):
         raise BiodanceError("Simulating needs either a protocol or a dance. Give one of the two.")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -61,9 +62,12 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
         held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in _ARRAYS}
         held |= {f"{k}.{name}": np.array(getattr(one.motion, name), dtype=str) for name in _TEXTS}
     part = folder / f".{MOTIONS}.part"
-    with open(part, "wb") as stream:
-        np.savez(stream, **held)  # type: ignore[arg-type]
-    part.replace(folder / MOTIONS)
+    try:
+        with open(part, "wb") as stream:
+            np.savez(stream, **held)  # type: ignore[arg-type]
+        part.replace(folder / MOTIONS)
+    finally:
+        part.unlink(missing_ok=True)
     return folder / MOTIONS
 
 
@@ -96,7 +100,7 @@ def read_kept(folder: Path) -> KeptResults:
             loads = dict(zip(motions, held["loads"], strict=True))
             session = Path(os.path.normpath(folder / str(held["session"])))
             settings = json.loads(str(held["settings"]))
-    except (OSError, ValueError, KeyError) as error:
+    except (BadZipFile, EOFError, OSError, ValueError, KeyError) as error:
         raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
     return KeptResults(body, source, motions, hashes, loads, session, settings)
 

@@ -149,8 +149,8 @@ def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMo
 
 def contact_of(trial: Trial, one: TrialResult, body: Body) -> Contact | None:
     """Return the ground contact of an examined trial; None without plates, or where it is refused."""
-    if not trial.plates or one.motion is None:
-        return None
+    if one.contact is not None or not trial.plates or one.motion is None:
+        return one.contact
     try:
         return ground_contact(trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
     except BiodanceError:

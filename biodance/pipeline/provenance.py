@@ -116,7 +116,7 @@ def _kernels() -> list[str]:
     from threadpoolctl import threadpool_info
 
     found = [one for one in threadpool_info() if one.get("user_api") == "blas"]
-    return sorted({f"({one.get('architecture', _UNKNOWN)}, {one['num_threads']} threads)" for one in found})
+    return sorted({f"({one.get('architecture', _UNKNOWN)}, threads: {one['num_threads']})" for one in found})
 
 
 def provenance(result: SessionResult, *, created: str) -> Provenance:

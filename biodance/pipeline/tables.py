@@ -4,7 +4,8 @@ One row is one segment, one check, one marker of a trial, one frame of a trial, 
 everything else is SI.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,29 +31,18 @@ def movement_tables(moved: SessionMovement) -> dict[str, "DataFrame"]:
     """Return ``events``, ``cycles``, ``strides`` (spatio-temporal values, unit in the column's name),
     ``cycle_curves`` (every repetition by per cent), ``mean_curves`` and ``file_angles``.
     """
-    import pandas as pd
-
-    curves = [part for one in moved for part in _curves(one)]
+    events = ((one.trial, e.time, e.side, e.down, e.source) for one in moved for e in one.events)
+    cycles = ((*_named(one, k), c.start, c.end, c.off) for one in moved for k, c in enumerate(one.cycles))
+    angles = (
+        (one.trial, a.joint, a.label, a.offset, a.sd, a.correlation, a.frames) for one in moved for a in one.file_angles
+    )
     return {
-        "events": pd.DataFrame(
-            [(one.trial, e.time, e.side, e.down, e.source) for one in moved for e in one.events],
-            columns=["trial", "time_s", "side", "down", "source"],
-        ),
-        "cycles": pd.DataFrame(
-            [(*_named(one, k), c.start, c.end, c.off) for one in moved for k, c in enumerate(one.cycles)],
-            columns=list(_CYCLE),
-        ),
+        "events": _frame(events, ("trial", "time_s", "side", "down", "source")),
+        "cycles": _frame(cycles, _CYCLE),
         "strides": _strides(moved),
-        "cycle_curves": pd.concat(curves, ignore_index=True) if curves else pd.DataFrame(columns=["trial"]),
+        "cycle_curves": _joined(map(_curves, moved), ("trial",)),
         "mean_curves": moved.table(),
-        "file_angles": pd.DataFrame(
-            [
-                (one.trial, a.joint, a.label, a.offset, a.sd, a.correlation, a.frames)
-                for one in moved
-                for a in one.file_angles
-            ],
-            columns=["trial", "joint", "label", "offset_deg", "sd_deg", "cc", "frames"],
-        ),
+        "file_angles": _frame(angles, ("trial", "joint", "label", "offset_deg", "sd_deg", "cc", "frames")),
     }
 
 
@@ -62,33 +52,29 @@ def _named(one: TrialMovement, number: int) -> tuple[Any, ...]:
 
 
 def _strides(moved: SessionMovement) -> "DataFrame":
-    import pandas as pd
-
     columns = [f"{name}_{unit.replace('/', '_per_').replace('%', 'percent')}" for name, unit in STRIDE_UNITS.items()]
-    rows = [
+    rows = (
         (one.trial, one.cycles.index(s.cycle) + 1, s.cycle.side, *(s.values.get(name, np.nan) for name in STRIDE_UNITS))
         for one in moved
         for s in one.strides
-    ]
-    return pd.DataFrame(rows, columns=["trial", "cycle", "side", *columns])
+    )
+    return _frame(rows, ("trial", "cycle", "side", *columns))
 
 
-def _curves(one: TrialMovement) -> list["DataFrame"]:
-    import pandas as pd
-
+def _curves(one: TrialMovement) -> "DataFrame | None":
     if not one.curves:
-        return []
+        return None
     numbers = {id(cycle): k for k, cycle in enumerate(one.cycles)}
     rows = [(*_named(one, numbers[id(c.cycle)])[:3], c.quantity, c.side, c.unit) for c in one.curves]
-    about = pd.DataFrame(rows, columns=["trial", "cycle", "kind", "quantity", "side", "unit"])
+    about = _frame(rows, ("trial", "cycle", "kind", "quantity", "side", "unit"))
     lasting = about.loc[about.index.repeat(len(PERCENT))].reset_index(drop=True)
     lasting["percent"] = np.tile(PERCENT, len(rows))
     lasting["value"] = np.concatenate([curve.value for curve in one.curves])
     lasting["parameters_sd"] = np.concatenate([np.broadcast_to(curve.sd, curve.value.shape) for curve in one.curves])
-    return [lasting]
+    return lasting
 
 
-Row = Mapping[str, Any]
+Row = tuple[Any, ...]
 _UNITS = {"F": "N", "M": "Nm"}
 _AXES = ("x", "y", "z")
 _TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
@@ -96,18 +82,9 @@ TRIALS = ("trial", "role", "status", "reason", "marker_rms_m", "marker_max_m", "
 CHECKS = ("what", "where", "value", "limit", "inside", "advice")
 _MARKERS = ("trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s")
 FINDINGS = (
-    "effect",
-    "target",
-    "parameter",
-    "value",
-    "sd",
-    "unit",
-    "visible_fraction",
-    "log_bayes_factor",
-    "gain_low",
-    "gain_high",
-    "advice",
-)
+    "effect", "target", "parameter", "value", "sd", "unit", "visible_fraction", "log_bayes_factor", "gain_low",
+    "gain_high", "advice",
+)  # fmt: skip
 UNSEEN = ("effect", "target", "limit", "unit", "told_from", "typical")
 ADEQUACY = ("channel", "band_low_hz", "band_high_hz", "z", "trial", "second_s")
 
@@ -126,7 +103,7 @@ def session_tables(
     found = result.identification
     tables = {
         "trials": _frame(map(_trial, result.trials), TRIALS),
-        "checks": _frame(({name: getattr(check, name) for name in CHECKS} for check in result.all_checks), CHECKS),
+        "checks": _frame(map(attrgetter(*CHECKS), result.all_checks), CHECKS),
         "markers": _frame((row for one in result.trials for row in _markers(one)), _MARKERS),
         "marker_residuals": _joined(map(_residuals, result.trials)),
         "angles": _joined(_angles(result, one) for one in result.trials),
@@ -147,12 +124,14 @@ def _frame(rows: Iterable[Row], columns: Sequence[str]) -> "DataFrame":
     return pd.DataFrame(list(rows), columns=list(columns))
 
 
-def _joined(parts: Iterable["DataFrame | None"]) -> "DataFrame":
-    """Return the tables of several trials below each other; columns that one lacks are empty there."""
+def _joined(parts: Iterable["DataFrame | None"], columns: Sequence[str] = ("trial", "time_s")) -> "DataFrame":
+    """Return the tables of several trials below each other, with ``columns`` at least; columns that one lacks are empty
+    there.
+    """
     import pandas as pd
 
     some = [part for part in parts if part is not None]
-    return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=["trial", "time_s"])
+    return pd.concat(some, ignore_index=True) if some else _frame((), columns)
 
 
 def _by_frame(trial: str, time: Array, columns: Mapping[str, Any]) -> "DataFrame":
@@ -162,24 +141,17 @@ def _by_frame(trial: str, time: Array, columns: Mapping[str, Any]) -> "DataFrame
 
 
 def _trial(one: TrialResult) -> Row:
-    fit, used = one.fit, one.comparison
-    nothing = float("nan")
-    values = (
-        fit.total_rms if fit else nothing,
-        fit.total_max if fit else nothing,
-        one.gaps_percent,
-        int(used.used.sum()) if used else 0,
-    )
-    return dict(zip(TRIALS, (one.trial.name, one.trial.role, one.status, one.reason, *values), strict=True))
+    far = (one.fit.total_rms, one.fit.total_max) if one.fit else (float("nan"), float("nan"))
+    used = int(one.comparison.used.sum()) if one.comparison else 0
+    return (one.trial.name, one.trial.role, one.status, one.reason, *far, one.gaps_percent, used)
 
 
-def _markers(one: TrialResult) -> Iterable[Row]:
+def _markers(one: TrialResult) -> Iterator[Row]:
     distance = {n: (r, m) for n, r, m in zip(one.fit.names, one.fit.rms, one.fit.max, strict=True)} if one.fit else {}
     gaps = {gap.label: (gap.percent, gap.longest) for gap in one.gaps}
     nothing = (float("nan"), float("nan"))
     for name in dict.fromkeys((*gaps, *distance)):
-        values = (one.trial.name, name, *distance.get(name, nothing), *gaps.get(name, nothing))
-        yield dict(zip(_MARKERS, values, strict=True))
+        yield one.trial.name, name, *distance.get(name, nothing), *gaps.get(name, nothing)
 
 
 def _residuals(one: TrialResult) -> "DataFrame | None":
@@ -218,16 +190,12 @@ def _six(what: str, value: Array) -> dict[str, Array]:
 
 def _segments(found: SessionIdentification) -> "DataFrame":
     names = ["mass_kg", *(f"com_{a}_m" for a in _AXES), *(f"inertia_{t}_kgm2" for t in _TENSOR)]
-    columns = [
-        "segment",
-        *(f"{name}{kind}" for name in names for kind in ("", "_sd", "_table", "_table_sd", "_from_data")),
-    ]
+    columns = [f"{name}{kind}" for name in names for kind in ("", "_sd", "_table", "_table_sd", "_from_data")]
     rows = []
     for segment in found.identification.sip.segments:
         known = [one for one in found.identification.known if one.segment == segment]
-        values = [v for one in known for v in (one.value, one.sd, one.table, one.table_sd, one.from_data)]
-        rows.append(dict(zip(columns, [segment, *values], strict=True)))
-    return _frame(rows, columns)
+        rows.append((segment, *(v for k in known for v in (k.value, k.sd, k.table, k.table_sd, k.from_data))))
+    return _frame(rows, ("segment", *columns))
 
 
 def _moments(found: SessionIdentification) -> "DataFrame":
@@ -245,24 +213,15 @@ def _moments(found: SessionIdentification) -> "DataFrame":
 
 
 def _validation(found: SessionIdentification) -> "DataFrame":
-    columns = (
-        "trial",
-        "kept",
-        "channel",
-        "unit",
-        "rms_table",
-        "rms_identified",
-        "correlation_table",
-        "correlation_identified",
-    )
+    columns = ("rms_table", "rms_identified", "correlation_table", "correlation_identified")
     rows = []
     for kept, trials in ((True, found.validations), (False, found.fitted)):
         for one in trials:
             table, identified = one.table_agreement, one.identified_agreement
             for k, channel in enumerate(CHANNELS):
                 values = (table.rms[k], identified.rms[k], table.correlation[k], identified.correlation[k])
-                rows.append(dict(zip(columns, (one.name, kept, channel, _UNITS[channel[0]], *values), strict=True)))
-    return _frame(rows, columns)
+                rows.append((one.name, kept, channel, _UNITS[channel[0]], *values))
+    return _frame(rows, ("trial", "kept", "channel", "unit", *columns))
 
 
 def _diagnosed(one: Diagnosis) -> dict[str, "DataFrame"]:
@@ -270,15 +229,9 @@ def _diagnosed(one: Diagnosis) -> dict[str, "DataFrame"]:
     for finding in one.findings:
         gain = finding.gain.ci95 if finding.gain else (float("nan"), float("nan"))
         about = (finding.visible_fraction, finding.log_bayes_factor, *gain, finding.advice)
-        for p in finding.parameters:
-            rows.append(
-                dict(
-                    zip(FINDINGS, (finding.effect, finding.target, p.name, p.value, p.sd, p.unit, *about), strict=True)
-                )
-            )
-    left = [dict(zip(ADEQUACY, (a.channel, *a.band_hz, a.z, a.trial, a.second), strict=True)) for a in one.adequacy]
+        rows += [(finding.effect, finding.target, p.name, p.value, p.sd, p.unit, *about) for p in finding.parameters]
     return {
         "findings": _frame(rows, FINDINGS),
-        "unobservable": _frame(({name: getattr(cause, name) for name in UNSEEN} for cause in one.unobservable), UNSEEN),
-        "adequacy": _frame(left, ADEQUACY),
+        "unobservable": _frame(map(attrgetter(*UNSEEN), one.unobservable), UNSEEN),
+        "adequacy": _frame(((a.channel, *a.band_hz, a.z, a.trial, a.second) for a in one.adequacy), ADEQUACY),
     }

@@ -194,4 +194,4 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
         standing = attempt(steps, "standing", lambda: quiet_standing(trial, contact.measured, body, motion))
     if contact is not None and body is not None and motion is not None:
         comparison = attempt(steps, "compare", lambda: compare_wrenches(trial, body, motion, contact))
-    return TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing)
+    return TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing, contact=contact)

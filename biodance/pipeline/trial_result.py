@@ -14,12 +14,9 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.identification.statistics import Fit
 from biodance.lab.markers.gaps import MarkerGaps
+from biodance.motion.contact.contact import Contact
 from biodance.motion.optional_joints import JointGain
 from biodance.records import CHANNEL_TITLES, Array, Motion, Trial, Wrench
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -173,7 +170,7 @@ class ShownJoints:
 @dataclass(frozen=True, eq=False)
 class TrialResult:
     """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before
-    any was filled.
+    any was filled; ``contact`` of the feet with the ground by the tracked body.
 
     None where the data could not carry a result.
     """
@@ -186,6 +183,7 @@ class TrialResult:
     comparison: WrenchComparison | None = None
     standing: QuietStanding | None = None
     checks: tuple[Check, ...] = ()
+    contact: Contact | None = None
 
     def __repr__(self) -> str:
         close = f", markers {1000 * self.fit.total_rms:.1f} mm from the body" if self.fit else ""

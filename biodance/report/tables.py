@@ -44,16 +44,17 @@ def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path,
 
     Both by pyarrow: its text is the shortest that reads back exactly, like pandas' own, in a tenth of the time.
     """
-    from pyarrow import Table, csv
+    from pyarrow import Table, csv, parquet
 
     plain, written = csv.WriteOptions(quoting_style="needed", quoting_header="needed"), []
-    for name, table in tables.items():
+    for name, frame in tables.items():
+        table = Table.from_pandas(frame, preserve_index=False)
         for ending in ENDINGS:
             part, path = folder / f".{name}{ending}.part", folder / f"{name}{ending}"
             if ending == ".csv":
-                csv.write_csv(Table.from_pandas(table, preserve_index=False), part, plain)
+                csv.write_csv(table, part, plain)
             else:
-                table.to_parquet(part, index=False, engine="pyarrow")
+                parquet.write_table(table, part)
             part.replace(path)
             written.append(path)
     return tuple(written)

@@ -14,6 +14,11 @@ from biodance.records.attention import Attention, without_path
 from biodance.report.wording import format_number, millimetres, size_seen, trial_and_subject
 
 
+def _line(console: Console, text: str) -> None:
+    """Print a text as it is, in one line however long: a terminal breaks it, a file does not."""
+    console.print(escape(text), soft_wrap=True)
+
+
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
     """Return the lines under the name of one inspected file: markers, plates, masses, warnings."""
     lines = []
@@ -52,7 +57,7 @@ def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None
             else [without_path(str(record.get("reason")), str(record["file"]))]
         )
         for line in lines:
-            console.print(f"  {escape(line)}", soft_wrap=True)
+            _line(console, f"  {line}")
 
 
 def print_initialised(found: dict[str, Any], console: Console) -> None:
@@ -62,12 +67,10 @@ def print_initialised(found: dict[str, Any], console: Console) -> None:
         f"{key} {subject[key]}" for key in ("mass_kg", "height_m", "sex", "age") if subject[key] is not None
     )
     guessed = f" (guessed: {', '.join(subject['guessed'])})" if subject["guessed"] else ""
-    console.print(escape(f"subject: {said or 'not known'}{guessed}"), soft_wrap=True)
+    _line(console, f"subject: {said or 'not known'}{guessed}")
     for trial in found["trials"]:
-        console.print(escape(f"{trial['name']}: {trial['role']}, {trial['why']}"), soft_wrap=True)
-    console.print(
-        escape(f"markers: {found['marker_set'] or 'no known set, and none could be guessed'}"), soft_wrap=True
-    )
+        _line(console, f"{trial['name']}: {trial['role']}, {trial['why']}")
+    _line(console, f"markers: {found['marker_set'] or 'no known set, and none could be guessed'}")
     if found["marker_map"]:
         table = Table("label", "landmark or segment", box=None)
         for label, place in found["marker_map"].items():
@@ -75,8 +78,8 @@ def print_initialised(found: dict[str, Any], console: Console) -> None:
         console.print(table)
         console.print("Confirm or correct this map: a wrong one is worse than none.")
     for file, reason in found["refused"].items():
-        console.print(escape(f"look: {file}: {reason}"), soft_wrap=True)
-    console.print(escape(found["file"]), soft_wrap=True)
+        _line(console, f"look: {file}: {reason}")
+    _line(console, found["file"])
 
 
 def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
@@ -135,12 +138,12 @@ def print_identification(found: dict[str, Any], console: Console) -> None:
         told = ", ".join(
             f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified")
         )
-        console.print(f"{escape(row['trial'])}, RMS Fx Fy Fz Mx My Mz: {told}", soft_wrap=True)
-    console.print(f"added mass: {escape(found['added_mass_search']['text'])}", soft_wrap=True)
+        _line(console, f"{row['trial']}, RMS Fx Fy Fz Mx My Mz: {told}")
+    _line(console, f"added mass: {found['added_mass_search']['text']}")
     if found["performance"]:
         _print_performance(found["performance"], console)
     for note in found["notes"]:
-        console.print(f"note: {escape(note)}", soft_wrap=True)
+        _line(console, f"note: {note}")
 
 
 def print_robot_diagnosis(found: dict[str, Any], console: Console) -> None:
@@ -151,7 +154,7 @@ def print_robot_diagnosis(found: dict[str, Any], console: Console) -> None:
         size = f"{format_number(one['value'], 4)} ± {format_number(1.96 * one['sd'], 4)} {one['unit']}".rstrip()
         others = f"; not told from {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
         text = f"{one['cause'].replace('_', ' ')}, {one['where']}: {size}, {one['evidence_nats']:.0f} nats{others}"
-        console.print(escape(text), soft_wrap=True)
+        _line(console, text)
 
 
 def _print_performance(found: dict[str, Any], console: Console) -> None:
@@ -179,10 +182,10 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
         if pair["log_bayes_factor"] is None or pair["log_bayes_factor"] < 3:
             console.print(f"will confuse: {escape(pair['cause'])} with {escape(pair['other'])}")
     hidden = ", ".join(f"{row['effect']} {row['target']}".strip() for row in found["unobservable"])
-    console.print(f"cannot see: {escape(hidden or 'nothing of what it looks for')}", soft_wrap=True)
-    console.print(escape(found["summary"]), soft_wrap=True)
+    _line(console, f"cannot see: {hidden or 'nothing of what it looks for'}")
+    _line(console, found["summary"])
     if found["care"]:
-        console.print(escape(found["care"]), soft_wrap=True)
+        _line(console, found["care"])
     for one in found["changes"]:
         console.print(
             f"to change: {escape(one['do'])} ({len({*one['unseen'], *one['confused']})} causes)", soft_wrap=True
@@ -192,13 +195,13 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
 def _print_accepted(found: dict[str, Any], console: Console) -> None:
     """Print what accepting the findings has written for the next session."""
     for what in found["corrections"]:
-        console.print(f"accepted: {escape(what)}", soft_wrap=True)
+        _line(console, f"accepted: {what}")
     for what in found["not_in_recordings"]:
-        console.print(f"accepted in the body only, no recording is corrected: {escape(what)}", soft_wrap=True)
+        _line(console, f"accepted in the body only, no recording is corrected: {what}")
     written = ", ".join([*found["files"], *(["corrected/"] if found["trials"] else [])])
-    console.print(f"written: {written or 'nothing, there is nothing to accept'}", soft_wrap=True)
+    _line(console, f"written: {written or 'nothing, there is nothing to accept'}")
     for why in found["refused"]:
-        console.print(f"look: {escape(why)}", soft_wrap=True)
+        _line(console, f"look: {why}")
 
 
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
@@ -224,7 +227,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
                 f"  accepting it{beside} removes {low:.0f} to {high:.0f} % of the difference on trials not used",
                 soft_wrap=True,
             )
-        console.print(f"  {escape(finding['advice'])}", soft_wrap=True)
+        _line(console, f"  {finding['advice']}")
     if found["verdict"] in ("unexplained", "named, incomplete") and found["adequacy"]:
         worst = found["adequacy"][0]
         low, high = worst["band_hz"]
@@ -232,7 +235,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         console.print(f"left unexplained: {escape(where)} ({worst['z']:.0f} times what sessions without fault vary)")
     _print_witnesses(found, console)
     for note in found["notes"]:
-        console.print(f"note: {escape(note)}", soft_wrap=True)
+        _line(console, f"note: {note}")
     if "accepted" in found:
         _print_accepted(found["accepted"], console)
 
@@ -252,7 +255,7 @@ def _print_witnesses(found: dict[str, Any], console: Console) -> None:
     console.print(table)
     blind = [f"{row['effect'].replace('_', ' ')} {row['target']}" for row in found["witness_table"] if row not in seen]
     if blind:
-        console.print(f"witnesses are blind to: {escape(', '.join(blind))}", soft_wrap=True)
+        _line(console, f"witnesses are blind to: {', '.join(blind)}")
 
 
 def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:

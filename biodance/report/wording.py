@@ -43,6 +43,7 @@ def size_seen(row: dict[str, Any], key: str) -> str:
 def trial_and_subject(one: Attention) -> str:
     """Return where a sentence belongs, to stand before it: file, check and trial, step, or trial."""
     about = one.about.replace("_", " ")
-    if one.trial:
-        return one.trial if about == "file" else f"{about}, {one.trial}" if about else f"Trial {one.trial}"
-    return f"{about[:1].upper()}{about[1:]}" or "Session"
+    if one.trial and about in ("", "file"):
+        return one.trial if about else f"Trial {one.trial}"
+    place = f", {one.trial}" if one.trial else ""
+    return f"{about[:1].upper()}{about[1:]}{place}" or "Session"

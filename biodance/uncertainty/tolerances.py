@@ -7,6 +7,7 @@ learned together on null sessions (`learning`): of virtual subjects, whose sizes
 in ``anthropometry/uncertainty/null_sessions.toml``, or a laboratory's own.
 """
 
+import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -279,7 +280,7 @@ def whitened(
     """
     count = 6 * band.size
     out = np.empty(rows.shape, rows.dtype) if out is None else out
-    wrench, white = (some[:count].reshape(band.size, 6, -1) for some in (rows, out))
+    wrench, white = (some[:count].reshape(band.size, 6, math.prod(rows.shape[1:])) for some in (rows, out))
     for b, matrix in enumerate(tolerances.whiteners(mass).astype(rows.dtype)):
         for some in _in_pieces(np.flatnonzero(band == b)):
             white[some] = matrix @ wrench[some]

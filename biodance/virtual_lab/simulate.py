@@ -84,7 +84,9 @@ def write_visit(
     BiodanceError
         The folder is not empty, or the subject is outside the range that the virtual body covers.
     """
-    _check(subject, out)
+    check_simulated(subject)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
     if plan.belts:
         visit = replace(visit, laboratory=replace(visit.laboratory, belts=plan.belts))
     person = make_person(
@@ -122,7 +124,8 @@ def _swinging_flesh(person: Person, laboratory: Laboratory) -> tuple[AppliedForc
     return tuple(wobbling_mass(person, name, SWINGING * mass[TRUE_SEGMENTS.index(on)]) for name, on in parts)
 
 
-def _check(subject: Subject, out: Path) -> None:
+def check_simulated(subject: Subject) -> None:
+    """Raise BiodanceError for a person whom the virtual body does not cover."""
     for name, (low, high, unit) in _LEGAL.items():
         value = getattr(subject, name)
         if not low <= value <= high:
@@ -133,8 +136,6 @@ def _check(subject: Subject, out: Path) -> None:
         raise BiodanceError(
             f"Simulated subject: sex = {subject.sex!r}; legal are 'F' and 'M', whose proportions differ."
         )
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BiodanceError(f"{out}: exists and is not an empty folder; nothing was written. Choose another --out.")
 
 
 def session_toml(person: Person, protocol: Protocol, mass: float, *, joints: str = "functional") -> str:

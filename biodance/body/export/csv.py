@@ -7,14 +7,12 @@ deviations to first order.
 
 import csv
 import io
-from pathlib import Path
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import rigid_inertia
-from biodance.errors import FileRefused
-from biodance.records import Array, Sip
+from biodance.records import Array
 
 FORMAT = "csv"
 SUFFIX = ".csv"
@@ -40,36 +38,6 @@ def text(body: Body, source: str) -> str:
             frame = COM_FRAME if quantity.startswith("central") else "" if quantity == "mass" else JOINT_FRAME
             write.writerow([name, quantity, repr(float(value)), _unit(quantity), repr(float(deviation)), frame, source])
     return stream.getvalue()
-
-
-def read_sip(path: str | Path) -> Sip:
-    """Return the parameters of a file that ``text`` wrote; the covariance is diagonal, since the table holds standard
-    deviations only.
-
-    Raises
-    ------
-    FileRefused
-        The file cannot be read, misses a column or a parameter, or holds something that is no number.
-    """
-    try:
-        with open(path, encoding="utf-8", newline="") as stream:
-            rows = list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FileRefused(f"{path}: cannot be read as CSV ({error}).") from error
-    if not rows or not set(HEADER[:5]) <= set(rows[0]):
-        raise FileRefused(f"{path}: is no table of inertial parameters. It needs the columns {', '.join(HEADER)}.")
-    found = {(row["segment"], row["quantity"]): row for row in rows}
-    segments = tuple(dict.fromkeys(row["segment"] for row in rows))
-    phi, sd = [], []
-    for key in ((segment, quantity) for segment in segments for quantity in STANDARD):
-        if key not in found:
-            raise FileRefused(f"{path}: {key[1]} of {key[0]} is missing. Every segment needs {', '.join(STANDARD)}.")
-        try:
-            phi.append(float(found[key]["value"]))
-            sd.append(float(found[key]["sd"]))
-        except (TypeError, ValueError):
-            raise FileRefused(f"{path}: {key[1]} of {key[0]} has a value or sd that is no number.") from None
-    return Sip(segments, np.array(phi), np.diag(np.square(sd)))
 
 
 def _unit(quantity: str) -> str:

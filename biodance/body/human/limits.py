@@ -135,9 +135,10 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
         for i, joint in enumerate(body.joints)
         if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
     )
+    lean = round(np.degrees(tilt))
     tilted = (
-        f"Pelvis markers stand tilted {round(np.degrees(tilt))} degrees forwards: ranges of hip and trunk flexion are "
-        f"widened by as much."
+        f"Pelvis markers stand tilted {lean} degree{'s' * (abs(lean) != 1)} forwards: ranges of hip and trunk flexion "
+        f"are widened by as much."
     )
     return replace(limits, lower=lower, upper=upper), (tilted, *notes)
 

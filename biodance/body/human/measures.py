@@ -157,7 +157,8 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
     guessed = sorted(set(widths) - typed)
     if guessed:
         notes.append(
-            f"Joint widths not in the file, taken from stature where a medial marker is missing: {', '.join(guessed)}."
+            f"Joint widths not in the file, taken from stature where a medial marker is missing: "
+            f"{', '.join(guessed).replace('_', ' ')}."
         )
     return Measures(
         marker_radius=(diameter or MARKER_DIAMETER) / 2,

@@ -22,7 +22,7 @@ from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
 from biodance.records import SIDES, Array, Subject, Trial
-from biodance.settings import STANDARD_GRAVITY, Hip
+from biodance.settings import STANDARD_GRAVITY
 
 _ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
@@ -69,12 +69,12 @@ class Scaling:
         return widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
 
 
-def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Scaling:
-    """Return what the static trial says about the body of a subject; what is None is as ``static.settings`` have it.
+def measure_static(subject: Subject, static: Trial) -> Scaling:
+    """Return what the static trial says about the body of a subject, by the table and the regression of the hip joint
+    centres that ``static.settings`` choose.
 
-    ``hip``: "harrington" (regressions on the pelvis markers) or "davis" (plug-in gait). ``table`` gives masses, CoM,
-    inertias and where the trunk joint lies between mid hip and mid shoulder. ``notes`` of the body say what was
-    measured, assumed, contradicted and warned about.
+    The table gives masses, CoM, inertias and where the trunk joint lies between mid hip and mid shoulder. ``notes`` of
+    the body say what was measured, assumed, contradicted and warned about.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, t
         The mass or the stature of the subject is not known.
     """
     subject.require("mass", "stature")
-    hip, table = hip or static.settings.hip, table or static.settings.table
+    hip, table = static.settings.hip, static.settings.table
     usual = reference(table, subject)
     lengths = usual.lengths
     tall = subject.stature / usual.stature
@@ -103,7 +103,7 @@ def measure_static(subject: Subject, static: Trial, *, hip: Hip | None = None, t
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
 
 
-def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str | None = None) -> Body:
+def scale(subject: Subject, static: Trial) -> Body:
     """Return the body of a subject, scaled on the static trial alone, with every marker calibrated in its segment.
 
     Parameters
@@ -111,11 +111,8 @@ def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str
     subject : Subject
         Mass kg, stature m, sex.
     static : Trial
-        Standing still, with markers of a known set.
-    hip : {"harrington", "davis"}, optional
-        Regression of the hip joint centres; by default as ``static.settings`` say.
-    table : str, optional
-        Table of segment inertial parameters; by default as ``static.settings`` say.
+        Standing still, with markers of a known set; its settings choose the regression of the hip joint centres and
+        the table of segment inertial parameters.
 
     Returns
     -------
@@ -140,7 +137,7 @@ def scale(subject: Subject, static: Trial, *, hip: Hip | None = None, table: str
     >>> biodance.scale(session.subject, session["static"])
     Body('visit', 12 segments, 23 joint angles, 61.9 kg)
     """
-    return measure_static(subject, static, hip=hip, table=table).body()[0]
+    return measure_static(subject, static).body()[0]
 
 
 def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> SegmentMarkers:
@@ -289,7 +286,7 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
         tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
         if tilt > TILT[joint.split("_")[1]]:
             notes.append(
-                f"Warning: {joint} stands {tilt:.0f} deg away from its axes: check the markers beside it and the wand "
-                f"above it."
+                f"Warning: {joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes: check the markers "
+                f"beside it and the wand above it."
             )
     return notes

@@ -14,6 +14,7 @@ import numpy as np
 from biodance.body.inertia import RigidInertia
 from biodance.body.robot.sole import mesh_file, mesh_hull
 from biodance.errors import FileRefused
+from biodance.library import refuse_special
 from biodance.records import Array
 from biodance.spatial import axis_rotation
 
@@ -78,6 +79,7 @@ def read_urdf_file(path: str | Path) -> UrdfFile:
         names it.
     """
     path = Path(path)
+    refuse_special(path)
     try:
         text = path.read_bytes()
     except OSError as error:

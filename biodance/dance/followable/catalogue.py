@@ -27,8 +27,8 @@ _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
 _BACK = 0.03
 """m behind the middle of the support where people stand: over the arch of the foot."""
-_LEAN, _TILT = ROOT - 2, ROOT - 1
-"""Coordinates of the pelvis' lean to the right, and of its tilt backward."""
+_TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
+"""Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +104,10 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
     for column, (part, group) in enumerate(words.items()):
         for k, word in enumerate(group):
             rows = index[:, column] == k
-            ahead, aside = (0.0, 0.0) if stance.seat else word.pelvis  # whoever sits keeps the pelvis on the seat
+            turn, aside, ahead = (0.0, 0.0, 0.0) if stance.seat else word.pelvis  # whoever sits keeps it on the seat
+            x[rows, _TURN] += turn
+            x[rows, _LEAN] += -aside if part.startswith("right") else aside
             x[rows, _TILT] -= ahead
-            x[rows, _LEAN] += aside if part.startswith("left") else -aside
             for joint, angle in word.angles:
                 if part == "legs" and joint == "knee_flexion":
                     knee[rows] = angle

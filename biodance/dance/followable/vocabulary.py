@@ -3,7 +3,7 @@
 The words lie in ``protocols/vocabulary/people.toml``, which explains its keys.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -16,10 +16,13 @@ from biodance.errors import BiodanceError
 from biodance.library import locate, read_toml
 from biodance.records import SIDES
 
-_KEYS = ("name", "angles", "mirror", "rest", "gentle", "deep", "double")
+_FLAGS = ("rest", "gentle", "deep", "lively", "double")
+_KEYS = ("name", "angles", "mirror", *_FLAGS)
 _GROUPS = ("arm", "trunk", "legs", "lifted", "hanging")
-PELVIS_TILT, PELVIS_LEAN = "pelvis_tilt", "pelvis_lean"
-"""Angles of a word that are no joint's: how far the pelvis leans forward, and towards the leg that stands."""
+PELVIS_TURN, PELVIS_LEAN, PELVIS_TILT = _PELVIS = ("pelvis_turn", "pelvis_lean", "pelvis_tilt")
+"""Angles of a word that are no joint's: how far the pelvis turns to the left, leans towards the leg that stands (of
+words of the trunk: to the right), and leans forward.
+"""
 _FREE = {
     "shoulder_flexion": (0, 30, 60, 90, 120),
     "shoulder_adduction": (-45, -60, -75, -90),
@@ -50,13 +53,14 @@ class Word:
     rest: bool = False
     gentle: bool = False
     deep: bool = False
+    lively: bool = False
     double: bool = False
 
     @property
-    def pelvis(self) -> tuple[float, float]:
-        """How far the pelvis leans forward, and towards the leg that stands, rad."""
+    def pelvis(self) -> tuple[float, float, float]:
+        """How far the pelvis turns to the left, leans towards the leg that stands, and leans forward, rad."""
         angles = dict(self.angles)
-        return angles.get(PELVIS_TILT, 0.0), angles.get(PELVIS_LEAN, 0.0)
+        return angles.get(PELVIS_TURN, 0.0), angles.get(PELVIS_LEAN, 0.0), angles.get(PELVIS_TILT, 0.0)
 
 
 Vocabulary = dict[str, tuple[Word, ...]]
@@ -96,7 +100,7 @@ def _word(where: str, key: str, raw: dict[str, Any]) -> Word:
     if unknown := set(raw) - set(_KEYS):
         raise BiodanceError(f"{where}: unknown key {sorted(unknown)[0]!r}; legal are {', '.join(_KEYS)}.")
     angles = tuple((joint, float(np.radians(angle))) for joint, angle in raw.get("angles", {}).items())
-    flags = {name: bool(raw.get(name, False)) for name in ("rest", "gentle", "deep", "double")}
+    flags = {name: bool(raw.get(name, False)) for name in _FLAGS}
     return Word(key, str(raw["name"]), angles, str(raw.get("mirror", key)), **flags)
 
 
@@ -130,7 +134,10 @@ def _asked(plan: Plan, stance: Stance, words: tuple[Word, ...]) -> list[Word]:
     return [
         word
         for word in words
-        if (plan.deep or not word.deep) and (word.gentle or not plan.gentle) and not (alone and word.double)
+        if (plan.deep or not word.deep)
+        and (plan.lively or not word.lively)
+        and (word.gentle or not plan.gentle)
+        and not (alone and word.double)
     ]
 
 
@@ -193,7 +200,7 @@ def _fitted(body: Body, part: str, word: Word) -> Word | None:
     if not word.rest and _short_of(body, part, word):
         return None
     within = tuple((joint, _near(body, part, joint, angle)) for joint, angle in word.angles)
-    return Word(word.key, word.text, within, word.mirror, word.rest, word.gentle, word.deep, word.double)
+    return replace(word, angles=within)
 
 
 def _short_of(body: Body, part: str, word: Word) -> str:
@@ -207,7 +214,7 @@ def _short_of(body: Body, part: str, word: Word) -> str:
 
 def _near(body: Body, part: str, joint: str, angle: float) -> float:
     """Return the angle of a word within the range of this body's joint; the pelvis' own are free."""
-    if joint in (PELVIS_TILT, PELVIS_LEAN):
+    if joint in _PELVIS:
         return angle
     j = body.joint_index(own_joint(part, joint))
     low, high = body.limits.lower[j] + _STOP, body.limits.upper[j] - _STOP

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from biodance.dance.dance import Dance
+from biodance.dance.followable.centres import CENTRES, told_of_centres
 from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
 from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
 from biodance.dance.followable.vocabulary import rest_cut_short
@@ -84,6 +86,9 @@ class Walk:
         before = np.sum(self.factor**2, axis=1)
         weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
         self.scale = self.factor * np.sqrt(weight / np.where(before > 0, before, 1.0))[:, None]
+        if plan.lively:
+            self.factor = np.pad(self.factor, ((0, 0), (0, CENTRES)))
+            self.scale = block_diag(self.scale, np.eye(CENTRES))
         self.samples = rest_to_rest(plan.move, via=0, rate=_RATE)
 
     def take(self, stances: tuple[Stance, ...]) -> tuple[list[DanceStep], list[Move]]:
@@ -250,6 +255,8 @@ class Walk:
     def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
         still = self._white(step.catalogue.standing[step.s : step.s + 1])[0]
+        if self.work.plan.lively:
+            still = np.concatenate([still, told_of_centres(self.work.chain, step.x, still.shape[1])])
         if last is None:
             return still
         ends, chain = np.array([last.x, step.x]), self.work.chain

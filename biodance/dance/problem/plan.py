@@ -19,6 +19,7 @@ shipped ones are in ``protocols/dances``:
     budget_s = 115               of free ones: those that inform most per second are danced until the time is used up
     gentle = false               true: only what people can do who tire or fear to fall
     deep = false                 true: deep squats and bows, one-leg squats, too
+    lively = false               true: wider postures, too, for people who move easily
     wide = 1.35                  distance between the feet, times the usual one (free: 1)
     other_weight = 1.0           emphasis of the segments that [weights] does not name
     ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
@@ -71,9 +72,10 @@ class Plan:
     eq. 12 on top of the masses, ``other_weight`` the factor of all segments not named; ``simplicity`` >= 0 of the
     performer's term beside the excitation; ``alone`` the legs on which the person may stand alone, be it for a step;
     ``instructions`` most that is called at once (inf: free postures, no vocabulary); ``gentle`` only postures that
-    people can take who tire or fear to fall; ``deep`` deep ones, too; ``wide`` times the usual distance between the
-    feet; ``whom`` for whom it is, in words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what
-    joints may use: what is reached without effort, or all that a healthy joint allows (the paper).
+    people can take who tire or fear to fall; ``deep`` deep ones, too; ``lively`` wider ones, too, chosen also for what
+    they tell of the joint centres; ``wide`` times the usual distance between the feet; ``whom`` for whom it is, in
+    words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached
+    without effort, or all that a healthy joint allows (the paper).
     """
 
     name: str
@@ -90,6 +92,7 @@ class Plan:
     wide: float = 1.0
     gentle: bool = False
     deep: bool = False
+    lively: bool = False
     alone: tuple[str, ...] = SIDES
     holds: tuple[str, ...] = ()
     ranges: Range = "comfortable"
@@ -173,7 +176,7 @@ _NUMBERS = {
 """Key of the file: field of the Plan."""
 _SHORT = {"share_of_support": ("balance", "share")}
 """Key of the file: limit and its number."""
-_FLAGS = ("free", "gentle", "deep")
+_FLAGS = ("free", "gentle", "deep", "lively")
 _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.35}
 """Of protocols that are not free, unless the file says otherwise."""
 FOLLOWABLE_SHARE = 0.8

@@ -12,11 +12,11 @@ from biodance.effects._base.geometry import Geometry, GeometryChanges, geometry
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
-from biodance.motion.regressor import regressor_of, wrench_of_segments
+from biodance.motion.regressor import wrench_of_segments
 from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
 from biodance.spatial import wrench_about_point
 
-OF_MOTION = ("regressor", "segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
+OF_MOTION = ("segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
 """What a case computes once from body, motion and markers, whatever the forces and the parameters."""
 _ALIKE = 0.3
 """Share of a segment's mass by which it may change before the answers to changes of the geometry are computed again:
@@ -49,11 +49,6 @@ class Case:
             )
 
     @cached_property
-    def regressor(self) -> Array:
-        """(T, 6, 10N) root regressor about the lab origin."""
-        return regressor_of(self.segments, gravity=self.body.gravity, sharing=self.body.sharing)
-
-    @cached_property
     def segments(self) -> SegmentMotion:
         """Spatial motion of all segments in the lab frame."""
         return segment_motion(self.body, self.motion, pose=self.poses)
@@ -63,7 +58,19 @@ class Case:
         """(T, 6) N, N·m wrench about the lab origin that the motion needs. Candidate causes are built from this one,
         never from the measured wrench: columns of measured channels reproduce any residual exactly.
         """
-        return wrench_of_segments(self.body, self.segments, self.phi)
+        return self.needed(self.phi)
+
+    def needed(self, phi: Array) -> Array:
+        """Return (T, 6) N, N·m the wrench about the lab origin that the motion needs of the parameters ``phi``
+        (10N,).
+        """
+        return wrench_of_segments(self.body, self.segments, phi)
+
+    def needed_by(self, load: Array, segment: int) -> Array:
+        """Return (T, 6) N, N·m the wrench about the lab origin that a ``load`` (10,) fixed to a segment needs."""
+        phi = np.zeros_like(self.phi)
+        phi[10 * segment : 10 * segment + 10] = load
+        return self.needed(phi)
 
     @cached_property
     def measured(self) -> Array:

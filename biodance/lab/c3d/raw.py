@@ -184,22 +184,9 @@ def read_raw(path: str | Path) -> RawC3d:
         The path is no readable file, no C3D file, or a C3D file that is damaged, cut off or contradicts itself.
     """
     path = Path(path)
-    refuse_huge(path)
-    try:
-        content = path.read_bytes()
-    except IsADirectoryError as error:
-        raise FileRefused(
-            f"{path}: this is a folder, not a C3D file. Name one file, or inspect the folder as a session."
-        ) from error
-    except FileNotFoundError as error:
-        raise FileRefused(f"{path}: there is no such file. Check the path.") from error
-    except OSError as error:
-        raise FileRefused(f"{path}: the file cannot be opened ({error.strerror}). Check the permissions.") from error
-    header = read_header(content, str(path))
-    parameters = read_parameters(content, header, str(path))
-    layout = read_layout(len(content), header, parameters, str(path))
+    content, parameters, layout = open_c3d(path)
     points, analog = numbers = read_numbers(content, layout)
-    labels = _fit(texts(parameters, "POINT", "LABELS"), layout.points)
+    labels = point_labels(parameters, layout)
     smells, reader = _smells(numbers, labels, layout, parameters, path)
     for values in numbers:
         values.setflags(write=False)
@@ -218,6 +205,35 @@ def read_raw(path: str | Path) -> RawC3d:
         parameters=parameters,
         warnings=(*layout.notes, *layout.remarks, *smells),
     )
+
+
+def open_c3d(path: Path) -> tuple[bytes, Parameters, Layout]:
+    """Return the bytes of a C3D file, its parameters and where its numbers lie, none of which is read yet.
+
+    Raises
+    ------
+    FileRefused
+        As `read_raw`.
+    """
+    refuse_huge(path)
+    try:
+        content = path.read_bytes()
+    except IsADirectoryError as error:
+        raise FileRefused(
+            f"{path}: this is a folder, not a C3D file. Name one file, or inspect the folder as a session."
+        ) from error
+    except FileNotFoundError as error:
+        raise FileRefused(f"{path}: there is no such file. Check the path.") from error
+    except OSError as error:
+        raise FileRefused(f"{path}: the file cannot be opened ({error.strerror}). Check the permissions.") from error
+    header = read_header(content, str(path))
+    parameters = read_parameters(content, header, str(path))
+    return content, parameters, read_layout(len(content), header, parameters, str(path))
+
+
+def point_labels(parameters: Parameters, layout: Layout) -> tuple[str, ...]:
+    """Return the label of every point as written, "" = none."""
+    return _fit(texts(parameters, "POINT", "LABELS"), layout.points)
 
 
 def _smells(

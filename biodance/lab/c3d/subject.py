@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.layout import parameter_numbers, texts
-from biodance.lab.c3d.raw import RawC3d, model_outputs, read_raw, split_label, unlabelled
+from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
+from biodance.lab.c3d.numbers import read_numbers
+from biodance.lab.c3d.parameters import Parameters
+from biodance.lab.c3d.raw import RawC3d, model_outputs, open_c3d, point_labels, split_label, unlabelled
 from biodance.records import Array
 
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
@@ -46,28 +48,28 @@ def read_outputs(path: str | Path) -> FileOutputs:
     FileRefused
         The file cannot be read.
     """
-    raw = read_raw(path)
-    listed = {split_label(label)[1] for label in texts(raw.parameters, "POINT", "ANGLES")}
-    unit = next(iter(texts(raw.parameters, "POINT", "ANGLE_UNITS")), "deg")
+    content, parameters, layout = open_c3d(Path(path))
+    listed = {split_label(label)[1] for label in texts(parameters, "POINT", "ANGLES")}
+    unit = next(iter(texts(parameters, "POINT", "ANGLE_UNITS")), "deg")
     degrees = 180 / np.pi if unit.lower().startswith("rad") else 1.0
+    names = [split_label(label)[1] for label in point_labels(parameters, layout)]
+    columns = {name: column for column, name in enumerate(names) if name in listed or name.endswith("Angles")}
     angles = {}
-    for column, label in enumerate(raw.labels):
-        name = split_label(label)[1]
-        if name in listed or name.endswith("Angles"):
-            value = degrees * raw.points[:, column]
+    if columns:
+        points, _ = read_numbers(content, layout)
+        for name, column in columns.items():
+            value = degrees * points[:, column]
             angles[name] = np.where((value != 0).any(axis=1)[:, None], value, np.nan)
-    said = [*texts(raw.parameters, "MANUFACTURER", "SOFTWARE"), *texts(raw.parameters, "MANUFACTURER", "COMPANY")]
-    return FileOutputs(angles, _events(raw), " ".join(said[:1]))
+    said = [*texts(parameters, "MANUFACTURER", "SOFTWARE"), *texts(parameters, "MANUFACTURER", "COMPANY")]
+    return FileOutputs(angles, _events(parameters, layout), " ".join(said[:1]))
 
 
-def _events(raw: RawC3d) -> tuple[FileEvent, ...]:
-    times = np.asarray(raw.parameters.get("EVENT", {}).get("TIMES", np.empty((2, 0))), dtype=float)
+def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:
+    times = np.asarray(parameters.get("EVENT", {}).get("TIMES", np.empty((2, 0))), dtype=float)
     times = times.reshape(2, -1, order="F") if times.ndim == 1 else times
-    first = (raw.first_frame - 1) / raw.rate
+    first = (layout.first_frame - 1) / layout.rate
     found = []
-    words = zip(
-        times.T, texts(raw.parameters, "EVENT", "CONTEXTS"), texts(raw.parameters, "EVENT", "LABELS"), strict=False
-    )
+    words = zip(times.T, texts(parameters, "EVENT", "CONTEXTS"), texts(parameters, "EVENT", "LABELS"), strict=False)
     for (minutes, seconds), context, label in words:
         side, down = _SIDES.get(context.strip().lower()), _WORDS.get(label.strip().lower())
         if side is not None and down is not None:

@@ -3,10 +3,12 @@ other side's, or the hindmost and foremost of the foot. What is found so is said
 """
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 
 import numpy as np
 
 from biodance.lab.markers.names import Meaning, sides_of
+from biodance.lab.markers.posture import joint_by_posture, middle_by_posture, taken_by_posture, toes_by_posture
 from biodance.lab.markers.set_file import LANDMARKS
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.standing import Standing
@@ -20,6 +22,10 @@ _NEEDS = (
     ("toe", ("toe_lateral", "toe_medial")),
 )
 """Landmarks that a body needs on each side, and what stands in for them."""
+_USEFUL = ("knee_medial", "ankle_medial", "acromion")
+"""Landmarks that a body can do without, and that posture tells as well."""
+_TRUE = 0.85
+"""Share of the labels with a side whose markers must lie on it."""
 _MIRRORED = 0.035
 """m: a marker so near to the mirror image of the other side's is the same landmark, if no other is nearly as near."""
 _ALONE = 1.6
@@ -48,30 +54,111 @@ def fill_absent(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
     """Take markers without a landmark for those that a body needs and that no label names; return what was taken, in
     sentences. ``places`` landmark -> label is added to.
     """
-    taken, markers, sides = [], plain_labels(stand.at), sides_of(stand.at)
-    lacking = {f"{side}_{part}" for side in SIDES for part, others in _NEEDS} - places.keys()
+    taken = _by_mirror_image(places, stand, said) + _by_posture(places, stand, said)
+    sides = _said_sides(stand)
+    for place in _lacking(places):
+        side, _, part = place.partition("_")
+        own = [label for label in _free(place, places, stand, said) if sides.get(label) == side]
+        found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), own, stand)
+        if found is not None:
+            places[place] = found
+            which = "hind" if part == "heel" else "fore"
+            taken.append(f"{found} is the {which}most of its foot: taken for the {_words(place)}.")
+    return taken
+
+
+def _lacking(places: Mapping[str, str]) -> list[str]:
+    """Return the needed landmarks of both sides that nothing is taken for."""
+    lacking = {
+        f"{side}_{part}"
+        for side in SIDES
+        for part, others in _NEEDS
+        if not {f"{side}_{one}" for one in (part, *others)} & places.keys()
+    }
     if "mid_psis" not in places:
         lacking |= {f"{side}_psis" for side in SIDES} - places.keys()
-    for place in sorted(lacking):
+    return sorted(lacking)
+
+
+def _by_mirror_image(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Take the markers at the mirror images of those that are known on the other side; return them in sentences."""
+    taken = []
+    for place in _lacking(places):
         side, _, part = place.partition("_")
-        if part == "toe" and places.keys() & {f"{side}_toe_lateral", f"{side}_toe_medial"}:
-            continue
         other = places.get(f"{'left' if side == 'right' else 'right'}_{part}")
-        free = [label for label in markers if label not in places.values() and _may_be(place, said.get(label, ()))]
-        found = _at_mirror_image(place, other, free, stand) if other else None
+        found = _at_mirror_image(place, other, _free(place, places, stand, said), stand) if other else None
         if found is not None:
             places[place] = found
             taken.append(f"{found} lies where the mirror image of {other} is: taken for the {_words(place)}.")
-        elif part in ("heel", "toe"):
-            own = [label for label in free if sides.get(label) == side]
-            found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), own, stand)
-            if found is not None:
-                places[place] = found
-                taken.append(
-                    f"{found} is the {'hind' if part == 'heel' else 'fore'}most of its foot: taken for the "
-                    f"{_words(place)}."
-                )
     return taken
+
+
+def _by_posture(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Take pairs of markers for what nobody named, where no other markers of a standing person can be it: of those
+    whose labels say nothing, then of those that say no more than a segment; return what was taken, in sentences.
+    """
+    before = dict(places)
+    for mute in (True, False):
+        free = partial(_free_on_sides, places, stand, said, mute)
+        for joint in ("knee", "ankle"):
+            if not _have(places, f"{joint}_lateral", f"{joint}_medial"):
+                places.update(joint_by_posture(joint, free(f"{joint}_lateral"), places, stand))
+        for part in (*(part for part, _ in _NEEDS if part != "toe"), "psis", *(_USEFUL if mute else ())):
+            outer = part.replace("_medial", "_lateral")
+            if (part != "psis" or "mid_psis" not in places) and (outer == part or _have(places, outer)):
+                places.update(taken_by_posture(part, free(part), places, stand))
+        if not _have(places, "psis") and "mid_psis" not in places:
+            middle = middle_by_posture("mid_psis", _free("mid_psis", places, stand, said, mute=mute), places, stand)
+            places.update({"mid_psis": middle} if middle else {})
+        if not _have(places, "toe", "toe_lateral", "toe_medial"):
+            places.update(toes_by_posture(free("toe"), places, stand))
+    return [
+        f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
+        for place, label in places.items()
+        if place not in before
+    ]
+
+
+def _free_on_sides(
+    places: Mapping[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]], mute: bool, part: str
+) -> dict[str, list[str]]:
+    return {side: _free(f"{side}_{part}", places, stand, said, mute=mute) for side in SIDES}
+
+
+def _said_sides(stand: Standing) -> dict[str, str]:
+    """Return label -> the side that it says; nothing where the words mean something else, for too many of these markers
+    lie on the other side.
+    """
+    sides = sides_of(stand.at)
+    right = [
+        bool((stand.at[label] - stand.middle) @ stand.right > 0) == (side == SIDES[0]) for label, side in sides.items()
+    ]
+    return sides if right and np.mean(right) > _TRUE else {}
+
+
+def _have(places: Mapping[str, str], *parts: str) -> bool:
+    return any(f"{side}_{part}" in places for side in SIDES for part in parts)
+
+
+def _free(
+    place: str,
+    places: Mapping[str, str],
+    stand: Standing,
+    said: Mapping[str, tuple[Meaning, ...]],
+    *,
+    mute: bool = False,
+) -> list[str]:
+    """Return the labels without a landmark that say nothing (``mute``), or nothing else than this place; none that says
+    the other side.
+    """
+    side, sides = place.partition("_")[0], _said_sides(stand)
+    return [
+        label
+        for label in plain_labels(stand.at)
+        if label not in places.values()
+        and (side not in SIDES or sides.get(label, side) == side)
+        and (not said.get(label) if mute else _may_be(place, said.get(label, ())))
+    ]
 
 
 def _words(place: str) -> str:
@@ -101,7 +188,7 @@ def _end_of_foot(place: str, ankle: str | None, own: Iterable[str], stand: Stand
     """Return the hindmost (heel) or foremost (toe) marker near the ground and this ankle, of those whose labels say its
     side; None if none lies far enough from the ankle.
     """
-    if ankle is None:
+    if ankle is None or not place.endswith(("heel", "toe")):
         return None
     way = {label: (stand.at[label] - stand.at[ankle]) / stand.stature for label in own}
     ahead = {

@@ -7,14 +7,16 @@ lacks a landmark the body needs, or of which too much is contradicted, is none.
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from biodance.lab.markers.absent import absent_landmarks, fill_absent
-from biodance.lab.markers.names import Meaning, meanings_of
+from biodance.lab.markers.names import Meaning, meanings_of, sides_exchanged
+from biodance.lab.markers.person import mirror_images, person_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
 from biodance.lab.markers.sets import GUESSED
+from biodance.lab.markers.spelling import plain_labels, side_words
 from biodance.lab.markers.standing import Standing, standing_person
 from biodance.lab.markers.still import posture_frames
 from biodance.records import SIDES, Array, Markers
@@ -48,6 +50,22 @@ def guess_set(markers: Markers) -> GuessedSet:
     Geometry needs z up; for a recording without anybody upright nothing is believed.
     """
     at = _posture(markers)
+    named = _by_names(at)
+    if named.name:
+        return named
+    plain = plain_labels(at)
+    person = person_of({label: at[label] for label in plain})
+    if person is None:
+        return named
+    words = side_words((plain[right], plain[left]) for right, left in mirror_images(person))
+    if sides_exchanged(words):
+        return named
+    stood = _on(replace(person, at=at), meanings_of(at, sides=words))
+    return stood if stood.name or len(stood.map) > len(named.map) else named
+
+
+def _by_names(at: Mapping[str, Array]) -> GuessedSet:
+    """Return the guess in which the names say who stands where."""
     said = meanings_of(at)
     named = _assigned(said, lambda place, label: 0.0)
     stand = standing_person(at, named)
@@ -56,8 +74,13 @@ def guess_set(markers: Markers) -> GuessedSet:
         stand = standing_person(at, named)
     if stand is None:
         return GuessedSet({}, ("Too few labels say which landmark they mark, so no marker set can be guessed.",))
-    if isinstance(stand, str):
-        return GuessedSet({}, (stand,))
+    return GuessedSet({}, (stand,)) if isinstance(stand, str) else _on(stand, said)
+
+
+def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
+    """Return the guess for a standing person: what the labels say and the person confirms, then what posture tells."""
+    named = _assigned(said, stand.misfit)
+    stand = replace(stand, named=named)
     confirmed = {
         label: tuple(one for one in found if stand.believed(one.place, label)) for label, found in said.items()
     }

@@ -72,13 +72,18 @@ def meanings(label: str) -> tuple[Meaning, ...]:
     return _of(words, readings(label, words.pairs, words.noise))
 
 
-def meanings_of(labels: Iterable[str]) -> dict[str, tuple[Meaning, ...]]:
+def meanings_of(labels: Iterable[str], *, sides: Iterable[tuple[str, str]] = ()) -> dict[str, tuple[Meaning, ...]]:
     """Return label -> what it may mean, the most usual first, read as the whole set of labels is written; labels that
-    mean nothing are left out.
+    mean nothing are left out. ``sides`` are words (right, left) that this set uses, beside those that are known.
     """
     words = _vocabulary()
-    every = readings_of(labels, words.pairs, words.noise)
+    every = readings_of(labels, (*dict.fromkeys((*sides, *words.pairs)),), words.noise)
     return {label: found for label, ways in every.items() if (found := _of(words, ways))}
+
+
+def sides_exchanged(sides: Iterable[tuple[str, str]]) -> bool:
+    """Return whether words (right, left) are known ones the other way round: the sides are, too."""
+    return any((left, right) in _vocabulary().pairs for right, left in sides)
 
 
 def sides_of(labels: Iterable[str]) -> dict[str, str]:

@@ -45,7 +45,7 @@ def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     bones = {
         name[:-1]
         for name in given.values()
-        if any({name[:-1] + end for end in ends} <= set(given.values()) for ends in _AXES)
+        if not name[-2:-1].isdigit() and any({name[:-1] + end for end in ends} <= set(given.values()) for ends in _AXES)
     }
     given = {label: name for label, name in given.items() if name and not _is_no_marker(name, bones)}
     shared = _beginning(list(given.values()))
@@ -142,6 +142,28 @@ def readings_of(
         own = tuple(one for one in every[label] if not one.side or not ways or one.way in ways)
         out[label] = own
     return {label: out[label] for label in every}
+
+
+def side_words(mirrored: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return the pairs of words (right, left) by which the labels of mirror images (right, left) differ, the most usual
+    first: what this laboratory says for right and left, in whatever language.
+    """
+    counts: Counter[tuple[str, str]] = Counter()
+    for right, left in mirrored:
+        counts.update(set(_differences(right, left)))
+    return [pair for pair, times in counts.most_common(4) if times > _PAIRS]
+
+
+def _differences(one: str, other: str) -> list[tuple[str, str]]:
+    """Return by what two labels differ: the shortest remainders, and the whole words that hold them."""
+    words = [(a, b) for a, b in zip(tokens_of(one), tokens_of(other), strict=False) if a != b]
+    whole = words if len(words) == 1 else []
+    one, other = one.lower(), other.lower()
+    start = next((k for k, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+    rest = one[start:], other[start:]
+    end = next((k for k, (a, b) in enumerate(zip(rest[0][::-1], rest[1][::-1], strict=False)) if a != b), 0)
+    short = rest[0][: len(rest[0]) - end], rest[1][: len(rest[1]) - end]
+    return [pair for pair in (short, *whole) if all(part.isalnum() for part in pair)]
 
 
 def _mirrored(every: Mapping[str, Iterable[Spelled]]) -> dict[tuple[str, str, str], set[str]]:

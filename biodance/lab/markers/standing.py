@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.lab.markers.spelling import plain_labels
 from biodance.records import SIDES, Array
 
 _HEIGHT = {
@@ -171,7 +172,8 @@ def _size(at: Mapping[str, Array], named: Mapping[str, str]) -> tuple[float, flo
     without one.
     """
     heights = {place: float(at[label][2]) for place, label in named.items()}
-    floor = min((z for place, z in heights.items() if place.endswith(_FEET)), default=np.nan) - 0.02
+    feet = [z for place, z in heights.items() if place.endswith(_FEET)]
+    floor = min(feet or (float(at[label][2]) for label in plain_labels(at))) - 0.02
     shares = [
         (z - floor) / _HEIGHT[kind][0]
         for place, z in heights.items()

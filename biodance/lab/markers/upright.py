@@ -1,34 +1,25 @@
-"""Which way is up, by the person: the axis from the feet to the head, by what labels say of high and low markers."""
-
-import re
+"""Which way is up, by the person: the axis from the feet to the head, by what labels say of high and low markers; where
+they say nothing, the only way up in which somebody stands.
+"""
 
 import numpy as np
 
 from biodance.lab.markers.names import meanings_of
+from biodance.lab.markers.person import person_of
+from biodance.lab.markers.set_file import LANDMARKS, segment_of
 from biodance.lab.markers.sets import landmark, recognise
-from biodance.lab.markers.standing import part_of
+from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.markers.still import quietest
 from biodance.records import Array, Markers
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
 LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
-_HIGH = re.compile(
-    r"head|[fb]hd|^hd|nasion|sellion|c7|clav|acr|sho(u|$)|asis?$|psis?$|[_.]?i[ap]s$|sacr", re.IGNORECASE
-)
-_DEEP = re.compile(r"hee|calc|cal[0-9]?$|toe|hallux|ank|mal|mt[p0-9]|foot|^[lr][lm]m$|f[cm][ac]|fm[125]", re.IGNORECASE)
-"""What labels of the upper and of the lowest part of the body are called in sets that nobody described."""
-_HIGH_PARTS = (
-    "asis",
-    "psis",
-    "mid_psis",
-    "acromion",
-    "c7",
-    "t10",
-    "jugular_notch",
-    "xiphoid",
-    "head_front",
-    "head_back",
-)
-_DEEP_PARTS = ("heel", "toe", "toe_lateral", "toe_medial", "ankle_lateral", "ankle_medial", "foot")
+_HIGH, _DEEP = ("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank")
+"""Segments of the upper and of the lowest part of the body, for sets that nobody described."""
+_CLOUD = 16
+"""Markers of a body of which pelvis, knees, ankles and feet can be told without names."""
+_TALL = 0.7
+"""Share of the longest extent of a body that its height may be; arms may be spread."""
 _CLEAR = 2.0
 """A direction counts if its largest component is so many times the others."""
 
@@ -42,16 +33,39 @@ def axis_to_head(markers: Markers) -> Array | None:
         [p for name in names if known and (p := landmark(markers, known, name)) is not None] for names in (UPPER, LOWER)
     ]
     if not all(ends):
-        parts = {label: part_of(found[0].place) for label, found in meanings_of(markers.names).items()}
-        ends = [[markers[label] for label in parts if parts[label] in group] for group in (_HIGH_PARTS, _DEEP_PARTS)]
+        on = {label: _segment(found[0].place) for label, found in meanings_of(markers.names).items()}
+        ends = [[markers[label] for label in on if on[label] in group] for group in (_HIGH, _DEEP)]
     if not all(ends):
-        ends = [[markers[name] for name in markers.names if words.search(name)] for words in (_HIGH, _DEEP)]
-    if not all(ends):
-        return None
+        return _only_way_to_stand(markers)
     top, bottom = (np.concatenate(points) for points in ends)
     if not (np.isfinite(top).any() and np.isfinite(bottom).any()):
         return None
     return clear_axis(np.nanmedian(top, axis=0) - np.nanmedian(bottom, axis=0))
+
+
+def _only_way_to_stand(markers: Markers) -> Array | None:
+    """Return the signed axis (3,) along which alone the points are a standing person; None if none or several are."""
+    near = markers.xyz[quietest(markers)]
+    points = {
+        label: np.median(path[seen], axis=0)
+        for label, path in zip(markers.names, near.swapaxes(0, 1), strict=True)
+        if (seen := np.isfinite(path).all(axis=1)).any()
+    }
+    at = {label: points[label] for label in plain_labels(points)}
+    if len(at) < _CLOUD:
+        return None
+    extent = np.ptp(np.percentile(list(at.values()), (5, 95), axis=0), axis=0)
+    found = []
+    for up in (sign * np.eye(3)[k] for k in np.flatnonzero(extent > _TALL * extent.max()) for sign in (1.0, -1.0)):
+        first = np.roll(np.abs(up), 1)
+        turned = np.stack([first, np.cross(up, first), up])
+        if person_of({label: turned @ point for label, point in at.items()}) is not None:
+            found.append(up)
+    return found[0] if len(found) == 1 else None
+
+
+def _segment(place: str) -> str:
+    return segment_of(place) if place in LANDMARKS else place
 
 
 def clear_axis(direction: Array) -> Array | None:

@@ -156,27 +156,6 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     return tuple(plates), tuple(history)
 
 
-def table_of(plates: tuple[Plate, ...], *, name: str = "ground_reactions") -> TimeTable:
-    """Return the plates as OpenSim's columns, y up; force and torque stand at the fixed centre of each plate, so that
-    nothing is NaN.
-
-    Columns are ``ground_force_1_vx`` ... in N, ``ground_force_1_px`` ... in m, ``ground_torque_1_x`` ... in N·m.
-    """
-    columns: list[str] = []
-    values: list[Array] = []
-    for i, plate in enumerate(plates, start=1):
-        point = np.broadcast_to(plate.centre, (plate.wrench.time.size, 3))
-        torque = wrench_about_point(plate.wrench.value, point)[:, 3:]
-        columns += [
-            f"ground_{kind}_{i}_{part}{axis}"
-            for kind, part in (("force", "v"), ("force", "p"), ("torque", ""))
-            for axis in _AXES
-        ]
-        values += [part @ Y_UP_TO_Z_UP for part in (plate.wrench.force, point, torque)]
-    time = plates[0].wrench.time if plates else np.empty(0)
-    return TimeTable(name, tuple(columns), time, np.hstack(values) if values else np.empty((0, 0)))
-
-
 def _groups(columns: tuple[str, ...]) -> dict[str, dict[str, str]]:
     """Return per plate its columns by part (``vx`` ... ``pz``, and ``mx`` ... where there is a torque), in the
     file's order.

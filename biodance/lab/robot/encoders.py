@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.plain_text import refuse_special
+from biodance.library import refuse_special
 from biodance.records import Array
 from biodance.records.motion import Encoders
 

@@ -195,9 +195,7 @@ def archive_folders(archive: str | Path) -> tuple[tuple[Path, ...], tuple[Path, 
     SessionRefused
         There is no such folder, or nothing in it.
     """
-    archive = Path(archive)
-    if not archive.is_dir():
-        raise SessionRefused(f"{archive}: is no folder. Give the folder that holds the sessions of a laboratory.")
+    archive = archive_folder(archive)
     sessions: list[Path] = []
     indices: list[Path] = []
     _collect(archive, sessions, indices)
@@ -208,19 +206,34 @@ def archive_folders(archive: str | Path) -> tuple[tuple[Path, ...], tuple[Path, 
     return tuple(sessions), tuple(indices)
 
 
+def archive_folder(archive: str | Path) -> Path:
+    """Return the path of an archive; SessionRefused if it is no folder."""
+    archive = Path(archive)
+    if not archive.is_dir():
+        raise SessionRefused(f"{archive}: is no folder. Give the folder that holds the sessions of a laboratory.")
+    return archive
+
+
 def _collect(folder: Path, sessions: list[Path], indices: list[Path]) -> None:
     """Add what lies in ``folder`` and below it."""
     index = index_of(folder)
     if index is not None:
         indices.append(index)
         return
-    below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
+    below = sorted(
+        path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".") and not _leads_up(path)
+    )
     parts = [path for path in below if _PART_FOLDERS.match(path.name) and recordings_in(path)]
     if parts or recordings_in(folder):
         sessions.append(folder)
     for path in below:
         if path not in parts:
             _collect(path, sessions, indices)
+
+
+def _leads_up(folder: Path) -> bool:
+    """Return whether a folder is a link to one above it, below which there would be no end."""
+    return folder.is_symlink() and folder.parent.resolve().is_relative_to(folder.resolve())
 
 
 def visit_date(folder: Path) -> str:

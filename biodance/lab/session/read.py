@@ -121,7 +121,7 @@ def read_session(
     >>> session.settings
     Settings(filter.cutoff=6.0)
     """
-    folder = _checked(Path(folder))
+    folder = session_folder(folder)
     file_says = read_session_file(folder)
     chosen = settings if isinstance(settings, Settings) else file_says.settings.changed(settings or {})
     worn = str(markers) if markers is not None else file_says.marker_set
@@ -162,14 +162,16 @@ def read_session(
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 
-def _checked(folder: Path) -> Path:
+def session_folder(folder: str | Path) -> Path:
+    """Return the path of a session, with a name also where it is "."; SessionRefused if it is missing or no folder."""
+    folder = Path(folder)
     if not folder.exists():
         raise SessionRefused(f"{folder}: there is no such folder. Check the path.")
     if not folder.is_dir():
         raise SessionRefused(
             f"{folder}: is a file; a session is a folder with a static trial and trials. Give the folder."
         )
-    return folder
+    return folder.resolve() if folder.name in ("", "..") else folder
 
 
 def _refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:

@@ -117,7 +117,9 @@ def _is_whole(part: Path, files: list[Path]) -> bool:
 
 
 def _same_bytes(one: Path, other: Path) -> bool:
-    return one.stat().st_size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
+    """Return whether two ordinary files are alike; a pipe is not opened, and a broken link is left to its reader."""
+    ordinary = one.is_file() and other.is_file()
+    return ordinary and one.stat().st_size == other.stat().st_size and filecmp.cmp(one, other, shallow=False)
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:

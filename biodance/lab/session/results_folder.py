@@ -9,12 +9,9 @@ from biodance.errors import SessionRefused
 from biodance.lab.readers import extensions
 from biodance.lab.session.recordings import RESULTS, TEXT
 
-DEFAULT = "biodance"
 
-
-def results_folder(out: str | Path | None, session: str | Path, *, force: bool = False) -> Path:
-    """Return the folder for the results of a session, made if missing; ``out`` None is ``biodance`` inside the session
-    folder.
+def results_folder(out: str | Path, session: str | Path, *, force: bool = False) -> Path:
+    """Return the folder for the results of a session, made if missing.
 
     ``force`` allows a folder that holds results of an earlier run (a results.json or report.html); they are overwritten
     one by one.
@@ -25,12 +22,11 @@ def results_folder(out: str | Path | None, session: str | Path, *, force: bool =
         Another run is writing there; the folder is the session folder or one above it, is a file, holds recordings,
         holds anything at all without ``force``, or holds only files that biodance did not write.
     """
-    session = Path(session).resolve()
-    folder = (Path(out) if out is not None else session / DEFAULT).resolve()
+    session = Path(os.path.realpath(session))  # unlike Path.resolve, it takes a circle of links
+    folder = Path(os.path.realpath(out))
     if folder == session or folder in session.parents:
         raise SessionRefused(
-            f"{folder}: results must not lie among the recordings. Give another folder, for example "
-            f"{session / DEFAULT}."
+            f"{folder}: results must not lie among the recordings. Give another folder, for example {session}-results."
         )
     if folder.exists() and not folder.is_dir():
         raise SessionRefused(f"{folder}: is a file; the results need a folder. Choose another name.")

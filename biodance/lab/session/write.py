@@ -13,7 +13,9 @@ import numpy as np
 
 from biodance.errors import SessionRefused
 from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED
+from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.session.file import FILES
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import made_folder
@@ -57,7 +59,7 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
     _refuse_existing(target)
-    lines = [" ".join(line.split()) for line in _lines(found)]
+    lines = [" ".join(line.split()) for line in (*_lines(found), *_begun_map(session, found))]
     with open(target, "x", encoding="utf-8") as stream:
         stream.write("\n".join(lines) + "\n")
     return found
@@ -129,6 +131,19 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
     yield from ("", *_marker_lines(found))
     for plate in found["plates"]:
         yield f"# {plate['trial']}: {plate['name']}, TYPE {plate['type']}. {' '.join(plate['decisions'])}".rstrip()
+
+
+def _begun_map(session: Session, found: dict[str, Any]) -> Iterator[str]:
+    """Yield, where no set could be guessed, a map to complete: what is certain, and the other labels."""
+    worn = [trial.markers for trial in _statics_first(session) if trial.markers is not None]
+    if found["marker_set"] or not worn:
+        return
+    begun = guess_set(worn[0]).map
+    yield "# A map to complete: write a landmark (left_asis) or a segment (left_thigh) behind every label; take away"
+    yield "# the lines of labels that mark nothing, and the # before the others."
+    yield "# [markers.map]"
+    for label in sorted(plain_labels(worn[0].names), key=lambda one: (begun.get(one, "~"), one)):
+        yield f"# {json.dumps(label)} = {json.dumps(begun.get(label, ''))}"
 
 
 def _marker_lines(found: dict[str, Any]) -> Iterator[str]:

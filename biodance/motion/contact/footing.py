@@ -224,7 +224,8 @@ def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight
             when = f"{soles.time[start]:.2f} to {soles.time[stop - 1]:.2f} s"
             notes.append(f"The {side} foot stands beside the plates on a surface at {level:z.2f} m, {when}.")
         if lifted:
-            notes.append(f"The {side} foot rests in the air ({lifted} times): the plates carry the weight meanwhile.")
+            often = f"{lifted} time{'s' * (lifted != 1)}"
+            notes.append(f"The {side} foot rests in the air ({often}): the plates carry the weight meanwhile.")
     lowest = float(np.nanmin(low, initial=plates[0]))
     if lowest < min([*bare, plates[0]]) - SAME_LEVEL:
         notes.append(

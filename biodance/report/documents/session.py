@@ -223,17 +223,7 @@ def results_document(result: SessionResult, provenance: Provenance) -> dict[str,
             **_optional_joints(result.shown_joints),
         },
         "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
-        "checks": [
-            {
-                "what": c.what,
-                "where": c.where,
-                "value": c.value,
-                "limit": c.limit,
-                "inside": c.inside,
-                "advice": c.advice,
-            }
-            for c in result.all_checks
-        ],
+        "checks": [vars(check) for check in result.all_checks],
         "mass_check": _mass_check(result),
         "identification": None if found is None else identification_document(found),
         "added_mass": None if found is None else added_mass_document(found.search),

@@ -92,7 +92,7 @@ def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
     return drawn
 
 
-def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(W_bi), kg") -> "Figure":
+def criterion_figure(values: Array, bound: float) -> "Figure":
     """Draw the criterion (K,) after each transition, above the smallest value that it can have."""
     from matplotlib.ticker import MaxNLocator
 
@@ -103,7 +103,7 @@ def criterion_figure(values: Array, bound: float, *, what: str = "sum of M cond(
             np.arange(1, len(values) + 1), values, color=BLUE, marker="o", markersize=3, label="after the transition"
         )
         axes.axhline(bound, color=GREEN, linestyle="--", label=f"bound {bound:.3g}")
-        axes.set(xlabel="transition", ylabel=what)
+        axes.set(xlabel="transition", ylabel="sum of M cond(W_bi), kg")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend()
     return drawn

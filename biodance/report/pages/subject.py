@@ -1,8 +1,9 @@
 """The page for the person who was measured: plain words, ranges first, at most two A4 pages; computes nothing."""
 
+from base64 import b64encode
 from collections.abc import Mapping
+from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,41 +14,40 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.records import Array
-from biodance.report.figures.style import figure, look, svg_address
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}
 """rad: arms and legs a little away from the body, so that no part hides another."""
-_COLUMN, _STEP = 0.62, 0.13
-"""m from the middle to the labels, and between two of them (a body of 1.75 m)."""
+_COLUMN, _STEP, _HALF = 620, 130, 1350
+"""mm from the middle to the labels, between two of them, and to the picture's edge (a body of 1.75 m)."""
+_LETTERS = 50
+"""mm, the size of the letters."""
 
 
-def subject_figure(body: Body, labels: Mapping[str, str], measured: frozenset[str]) -> "Figure":
-    """Draw ``body`` from the front, its right side on the left; ``labels`` (segment -> text) beside it; segments in
-    ``measured`` are filled, the others white with a broken outline.
+def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str]) -> str:
+    """Draw ``body`` from the front, its right side on the left, as SVG text; ``labels`` (segment -> lines of text)
+    beside it; segments in ``measured`` are filled, the others white with a broken outline.
     """
-    from matplotlib.patches import Polygon
+    outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline in _outlines(body)]
+    marks = [_part(outline, known=segment in measured) for segment, outline in outlines]
+    middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
+    for right in (True, False):
+        marks += _labels({name: at for name, at in middles.items() if name in labels}, labels, right=right)
+    heights = np.concatenate([outline[:, 1] for _, outline in outlines])
+    low, high = heights.min() - _LETTERS, heights.max() + _LETTERS
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{-_HALF} {low:g} {2 * _HALF} {high - low:g}" '
+        f'width="{2 * _HALF}" height="{high - low:g}" font-family="sans-serif" font-size="{_LETTERS}">'
+        f"{''.join(marks)}</svg>"
+    )
 
-    outlines = _outlines(body)
-    with look():
-        drawn = figure(4.9)
-        axes = drawn.subplots()
-        for segment, outline in outlines:
-            known = segment in measured
-            fill, edge, line, alpha = (BLUE, BLACK, "-", 0.45) if known else ("white", GREY, "--", 1.0)
-            axes.add_patch(Polygon(outline, facecolor=fill, edgecolor=edge, linestyle=line, alpha=alpha, linewidth=0.9))
-        middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
-        for right in (True, False):
-            _label(axes, {name: at for name, at in middles.items() if name in labels}, labels, right=right)
-        axes.set_xlim(-1.35, 1.35)
-        axes.set_ylim(*_reach(outlines))
-        axes.set_aspect("equal")
-        axes.set_axis_off()
-    return drawn
+
+def _part(outline: Array, *, known: bool) -> str:
+    """Return the polygon of a part with the outline (n, 2) mm."""
+    look = f'fill="{BLUE}" opacity="0.45" stroke="{BLACK}"' if known else f'{_BROKEN} stroke="{GREY}"'
+    return f'<polygon points="{" ".join(f"{x:g},{y:g}" for x, y in outline)}" {look} stroke-width="5"/>'
+
+
+_BROKEN = 'fill="white" stroke-dasharray="18 10"'
 
 
 def _outlines(body: Body) -> list[tuple[str, Array]]:
@@ -65,27 +65,19 @@ def _outlines(body: Body) -> list[tuple[str, Array]]:
     return found
 
 
-def _reach(outlines: list[tuple[str, Array]]) -> tuple[float, float]:
-    heights = np.concatenate([outline[:, 1] for _, outline in outlines])
-    return float(heights.min()) - 0.05, float(heights.max()) + 0.05
-
-
-def _label(axes: "Axes", middles: Mapping[str, Array], labels: Mapping[str, str], *, right: bool) -> None:
-    """Write the labels of one side of the body in a column, from the top down, each with a line to its part."""
+def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], *, right: bool) -> list[str]:
+    """Return the labels of one side of the body in a column, from the top down, each with a line to its part."""
     own = [name for name in middles if (name.startswith("right") or name == "trunk_head") is right]
-    own.sort(key=lambda name: -middles[name][1])
-    x, last = (-_COLUMN if right else _COLUMN), np.inf
+    own.sort(key=lambda name: middles[name][1])
+    x, anchor, last, found = (-_COLUMN if right else _COLUMN), "end" if right else "start", -np.inf, []
     for name in own:
-        last = min(float(middles[name][1]), last - _STEP)
-        axes.annotate(
-            labels[name],
-            (float(middles[name][0]), float(middles[name][1])),
-            (x, last),
-            fontsize=9,
-            ha="right" if right else "left",
-            va="center",
-            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.7, "shrinkA": 2, "shrinkB": 0},
-        )
+        last = max(float(middles[name][1]), last + _STEP)
+        to, lines = middles[name], labels[name].split("\n")
+        found.append(f'<path d="M{x * 0.98:g} {last:g}L{to[0]:g} {to[1]:g}" stroke="{GREY}" stroke-width="4"/>')
+        for k, line in enumerate(lines):
+            down = last + _LETTERS * (1.15 * (k - len(lines) / 2) + 0.9)
+            found.append(f'<text x="{x}" y="{down:g}" text-anchor="{anchor}">{escape(line)}</text>')
+    return found
 
 
 PLAIN_NAMES = {
@@ -162,7 +154,8 @@ def _picture(account: SubjectAccount) -> str:
         return ""
     labels = {p.segments[0]: f"{_name(p)}\n{kilograms(p)}" for p in account.parts}
     measured = frozenset(p.segments[0] for p in account.parts if p.measured)
-    return svg_address(subject_figure(account.body, labels, measured))
+    drawn = subject_drawing(account.body, labels, measured)
+    return "data:image/svg+xml;base64," + b64encode(drawn.encode()).decode("ascii")
 
 
 def _name(part: PartMass) -> str:

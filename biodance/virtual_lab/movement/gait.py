@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from biodance.records import SIDES, Array, Wrench
@@ -44,10 +43,6 @@ class GaitPerformance(Performance):
     def wrench(self, time: Array) -> Wrench:
         """Return the true ground wrench on the person about the lab origin, both feet together."""
         return Wrench(time, self.foot_wrench(time, "right") + self.foot_wrench(time, "left"))
-
-    def on_belt(self, time: Array, side: str) -> NDArray[np.bool_]:
-        """Return (T,) True while a foot touches the belt."""
-        return np.asarray(self.gait.since_strike(time, side) < self.gait.contact)
 
     def _asked(self, foot: BeltFoot, time: Array) -> Array:
         """Return the prescribed wrench (T, 6) of one foot about the lab origin."""

@@ -1,0 +1,53 @@
+"""Frames that carry the markers of the frame before to the last digit: the recording hung, or a gap of all markers was
+filled by holding them. Nobody stands so still, and noise alone moves markers more.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.records import Array, Mask, Trial
+
+_FEWEST = 4
+"""Markers that must be seen; fewer may rest on something, or be rounded to the same digits."""
+_LASTING = 5
+"""Frames in a row; shorter runs come from a slower camera whose frames were repeated."""
+
+
+def frozen_frames(xyz: Array) -> Mask:
+    """Return (T,) True where all markers ``xyz`` (T, N, 3) m, NaN = unseen, repeat the frame before for at least five
+    frames; nowhere in a recording that never moves, as a posture kept as many equal frames is.
+    """
+    seen: Mask = np.asarray(np.isfinite(xyz).all(axis=2))
+    equal = np.all(xyz[1:] == xyz[:-1], axis=2) | ~(seen[1:] | seen[:-1])
+    repeats = np.zeros(len(xyz), dtype=bool)
+    repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
+    if repeats.sum() >= len(repeats) - 1:
+        return np.zeros(len(xyz), dtype=bool)
+    for start, stop in _runs(repeats):
+        repeats[start:stop] = stop - start >= _LASTING
+    return repeats
+
+
+def without_frozen(trial: Trial) -> Trial:
+    """Return the trial with its markers unseen where they are frozen, and a warning that says so; as it is where none
+    are.
+    """
+    markers = trial.markers
+    frozen = np.zeros(0, dtype=bool) if markers is None else frozen_frames(markers.xyz)
+    if markers is None or not frozen.any():
+        return trial
+    xyz = np.where(frozen[:, None, None], np.nan, markers.xyz)
+    spans = [f"{markers.time[start]:.2f} to {markers.time[stop - 1]:.2f} s" for start, stop in _runs(frozen)]
+    said = ", ".join(spans[:3]) + (f" and {len(spans) - 3} times more" if len(spans) > 3 else "")
+    warning = (
+        f"All markers stand still to the last digit at {said}: the recording hung, or a gap was filled by holding "
+        f"them. These {int(frozen.sum())} frames count as not seen."
+    )
+    return replace(trial, markers=replace(markers, xyz=xyz), warnings=(*trial.warnings, warning))
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return where the runs of True begin and end (one behind)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
