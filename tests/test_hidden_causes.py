@@ -52,7 +52,6 @@ UNTOLD = (
     "sloshing_load:target=trunk_head,mass=6,sloshing=4.5",
     "joint_centre:target=right_shoulder,shift=0;0;0.07",
     "shoulder_girdle:angle=0.25",
-    "marker_misplaced:target=RKNE,shift=0.06;0;0",
 )
 """What half a minute of this movement does not tell (a body explains most of it): these must not name another cause.
 Whoever makes one of them nameable takes it out of here.
