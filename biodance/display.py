@@ -53,6 +53,13 @@ def card(title: str, table: "pd.DataFrame | None" = None, notes: Iterable[str] =
     return "".join([*parts, *(f"<p>{escape(note)}</p>" for note in notes)])
 
 
+def digits(value: float, count: int) -> str:
+    """Return a number with so many digits that say something, without an exponent where people write none: ``20`` for
+    2e+01.
+    """
+    return f"{float(f'{value:.{count}g}'):g}"
+
+
 def axes_or_new(axes: "Axes | None") -> "Axes":
     """Return ``axes``, or those of a new figure."""
     if axes is not None:

@@ -47,3 +47,10 @@ def test_repeated_frames_of_a_slow_camera_noise_and_a_kept_posture_stay(xyz, hel
 def test_one_marker_on_the_floor_that_never_moves_is_no_frozen_frame(xyz) -> None:
     xyz[:, 0] = xyz[0, 0]
     assert not frozen_frames(xyz).any()
+
+
+def test_a_computed_movement_that_comes_to_rest_by_and_by_is_no_frozen_frame() -> None:
+    phase = np.clip(np.linspace(-1.0, 2.0, 300), 0.0, 1.0)  # a second of rest, one of movement, one of rest
+    moved = np.linspace(0.1, 0.6, 6)[:, None] * [1.0, 0.5, 0.2]
+    way = phase**3 * (10 - 15 * phase + 6 * phase**2)
+    assert not frozen_frames((way[:, None, None] * moved).astype(np.float32).astype(float)).any()

@@ -234,6 +234,15 @@ def test_an_unknown_mass_and_missing_feet_are_silence_not_an_error() -> None:
     assert size_by(hear(session(replace(bare, markers=None))), ("time_delay", "")) is None
 
 
+def test_witnesses_that_contradict_each_other_exclude_little() -> None:
+    """30 ms early here and 30 ms late there is no clock that is right to some milliseconds."""
+    delay = ("time_delay", "")
+    agreed = size_by(hear(session(walk(), walk(name="again"))), delay)
+    torn = size_by(hear(session(walk(Wrong(late=0.03)), walk(Wrong(late=-0.03), name="again"))), delay)
+    assert torn[1] > 2.0 * agreed[1]
+    assert all(abs(torn[0] - late) < 4.0 * torn[1] for late in (0.03, -0.03))
+
+
 def test_one_odd_step_names_nothing() -> None:
     odd = walk(Wrong(late=0.03))
     others = [walk(name=f"walk{i}") for i in range(3)]

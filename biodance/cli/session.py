@@ -80,7 +80,8 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
     if result.stopped:
         say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
         return STOPPED
-    return NEEDS_A_PERSON if result.needs_a_person else DONE
+    verdict = found["diagnosis"]["verdict"] if found.get("diagnosis") else "nothing wrong"
+    return NEEDS_A_PERSON if result.needs_a_person or verdict != "nothing wrong" else DONE
 
 
 def examine_with_reference(

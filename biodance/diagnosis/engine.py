@@ -39,9 +39,9 @@ from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
 STRANGE = (
-    "What the plates measured fits only a body that is more unlike the table than people are. Something that looks "
-    "like a body is wrong: "
-    "a load that nobody noted, a gain, or the declared mass or stature."
+    "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
+    "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass hides "
+    "in it."
 )
 
 UNASKED = (

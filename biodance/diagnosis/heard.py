@@ -75,6 +75,11 @@ class Testimony:
         best = max(size, key=lambda name: size[name], default=("", ""))
         return best if size.get(best, 0.0) * _FAULT > _BLIND * self.observations[index].expected_sd else ("", "")
 
+    def sees(self, cause: tuple[str, str]) -> Array:
+        """Return (n,) bool: which observations alone see the usual fault of a cause at one standard deviation."""
+        expected = np.array([one.expected_sd for one in self.observations])
+        return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= expected)
+
     def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
         """Return the witnesses that see the usual fault of a cause at ``least`` standard deviations, all their
         observations together; none: all are blind to it.

@@ -223,13 +223,28 @@ def _findings(heard: Testimony, value: Array, named: list[tuple[Hypothesis, tupl
 
 
 def size_by(heard: Testimony, names: tuple[str, str]) -> tuple[float, float] | None:
-    """Return the size of a cause and its standard deviation by the witnesses alone; None where they are blind to it."""
+    """Return the size of a cause and its standard deviation by the witnesses alone, wider by as much as they contradict
+    each other; None where they are blind to it.
+    """
     counting = heard.counting
     if names not in counting.causes or not counting.seen_by(names):
         return None
     value = np.array([one.value - one.expected for one in counting.observations])
     one = _sized(counting, value, (names,))
-    return float(one.theta[0]), float(np.hypot(one.covariance[0, 0] ** 0.5, _ALIKE.get(names[0], 0.0)))
+    sd = _disagreement(counting, names, value - counting.traces[names] * one.theta[0]) * one.covariance[0, 0] ** 0.5
+    return float(one.theta[0]), float(np.hypot(sd, _ALIKE.get(names[0], 0.0)))
+
+
+def _disagreement(heard: Testimony, names: tuple[str, str], left: Array) -> float:
+    """Return how many times as far apart the observations that see a cause lie as their errors say, at least 1, from
+    what is ``left`` (n,) of all: the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207).
+    """
+    sees = heard.sees(names)
+    if sees.sum() < 2:
+        return 1.0
+    own = np.array([one.sd for one in heard.observations])[sees]
+    spread = np.diag(own**2) + heard.shared[sees] @ heard.shared[sees].T
+    return max(1.0, float(left[sees] @ np.linalg.solve(spread, left[sees]) / (sees.sum() - 1)) ** 0.5)
 
 
 def _visible(heard: Testimony, names: tuple[str, str]) -> float:

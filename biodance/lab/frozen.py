@@ -1,5 +1,6 @@
 """Frames that carry the markers of the frame before to the last digit: the recording hung, or a gap of all markers was
-filled by holding them. Nobody stands so still, and noise alone moves markers more.
+filled by holding them. Nobody stands so still, noise alone moves markers more, and what hangs begins or ends abruptly:
+a computed movement that rests comes to it by and by.
 """
 
 from dataclasses import replace
@@ -12,11 +13,16 @@ _FEWEST = 4
 """Markers that must be seen; fewer may rest on something, or be rounded to the same digits."""
 _LASTING = 5
 """Frames in a row; shorter runs come from a slower camera whose frames were repeated."""
+_ABRUPT = 0.5
+"""Share of the step beside it (m a frame) that the last step before a rest or the first behind it has at least."""
+_FELT = 1e-5
+"""m: smaller steps are the last digits of a computed movement."""
 
 
 def frozen_frames(xyz: Array) -> Mask:
     """Return (T,) True where all markers ``xyz`` (T, N, 3) m, NaN = unseen, repeat the frame before for at least five
-    frames; nowhere in a recording that never moves, as a posture kept as many equal frames is.
+    frames, into or out of which they move abruptly; nowhere in a recording that never moves, as a posture kept as many
+    equal frames is.
     """
     seen: Mask = np.asarray(np.isfinite(xyz).all(axis=2))
     equal = np.all(xyz[1:] == xyz[:-1], axis=2) | ~(seen[1:] | seen[:-1])
@@ -24,9 +30,20 @@ def frozen_frames(xyz: Array) -> Mask:
     repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
     if repeats.sum() >= len(repeats) - 1:
         return np.zeros(len(xyz), dtype=bool)
+    steps = np.zeros(len(xyz))
+    steps[1:] = np.nan_to_num(np.linalg.norm(xyz[1:] - xyz[:-1], axis=2)).max(axis=1)
     for start, stop in _runs(repeats):
-        repeats[start:stop] = stop - start >= _LASTING
+        repeats[start:stop] = stop - start >= _LASTING and _abrupt(steps, start, stop)
     return repeats
+
+
+def _abrupt(steps: Array, start: int, stop: int) -> bool:
+    """Return whether the movement of ``steps`` (T,) m breaks off at frame ``start`` or sets in at ``stop`` in full."""
+    before, behind = steps[max(start - 2, 0) : start], steps[stop : stop + 2]
+    return any(
+        pair.size == 2 and pair[near] > _FELT and pair[near] >= _ABRUPT * pair[1 - near]
+        for pair, near in ((before, 1), (behind, 0))
+    )
 
 
 def without_frozen(trial: Trial) -> Trial:

@@ -10,6 +10,7 @@ from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
 from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.spectrum import SHORTEST_RUN
+from biodance.display import digits
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.looked_at import TOO_SHORT
 from biodance.pipeline.results import SessionResult
@@ -95,7 +96,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     """Return the one sentence that says the verdict, what it rests on, and what it does not know."""
     beside = _beside(judged, outside)
     names = " and ".join(in_words(finding) for finding in one.findings)
-    like = " and ".join(in_words(finding) for finding in one.resembles)
+    like = f" It resembles {' and '.join(map(in_words, one.resembles))}, which is not enough." if one.resembles else ""
     level: Level = "fail"
     if one.findings:
         rest = f"In {rests_on}, " if rests_on else ""
@@ -121,9 +122,11 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
     elif one.doubt:
         level = "warn"
         text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
+    elif _only_strange(one):
+        level = "warn"
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}{beside}.{like}"
     else:
-        text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}"
-        text += f" It resembles {like}, which is not enough." if like else ""
+        text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}{like}"
     return Attention(level, text.strip(), about=ABOUT)
 
 
@@ -144,7 +147,10 @@ def in_words(finding: Finding) -> str:
     deviations from none is not known.
     """
     name = f"{finding.effect} {finding.target}".replace("_", " ").replace("->", " into ").strip()
-    sizes = [f"{p.name.replace('_', ' ')} {p.value:.2g} ± {p.sd:.1g} {p.unit}".strip(" 1") for p in finding.parameters]
+    sizes = [
+        f"{p.name.replace('_', ' ')} {digits(p.value, 2)} ± {digits(p.sd, 1)} {p.unit}".removesuffix(" 1")
+        for p in finding.parameters
+    ]
     known = [abs(p.value) >= 2 * p.sd for p in finding.parameters if p.sd == p.sd]
     if not known:
         return name
@@ -255,11 +261,18 @@ def _sentence(beside: str) -> str:
     return f" Beside it: {text}." if text else ""
 
 
+def _only_strange(one: Diagnosis) -> bool:
+    """Return whether a strange body alone speaks against "nothing wrong": how unlike the table people are was learned
+    from few laboratories, and clean people of another one are beyond it.
+    """
+    return STRANGE in one.notes and UNASKED not in one.notes and alarming(one.adequacy) <= LIMIT
+
+
 def _where(one: Diagnosis) -> str:
     """Return where what is left is largest, with its size."""
     rows = [row for row in one.adequacy if row.matters and row.z > LIMIT] or list(one.adequacy)
     if STRANGE in one.notes and alarming(one.adequacy) <= LIMIT:
-        return "what the plates measured fits only a body that is more unlike the table than people are"
+        return f"w{STRANGE[1:-1]}"
     if UNASKED in one.notes and alarming(one.adequacy) <= LIMIT:
         return "what the plates measured fits only if something that is small elsewhere is many times as large here"
     if SEVERAL in one.notes and alarming(one.adequacy) <= LIMIT:

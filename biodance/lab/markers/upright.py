@@ -4,7 +4,7 @@ they say nothing, the only way up in which somebody stands.
 
 import numpy as np
 
-from biodance.lab.markers.names import meanings_of
+from biodance.lab.markers.names import meanings, meanings_of
 from biodance.lab.markers.person import person_of
 from biodance.lab.markers.set_file import LANDMARKS, segment_of
 from biodance.lab.markers.sets import landmark, recognise
@@ -33,7 +33,7 @@ def axis_to_head(markers: Markers) -> Array | None:
         [p for name in names if known and (p := landmark(markers, known, name)) is not None] for names in (UPPER, LOWER)
     ]
     if not all(ends):
-        on = {label: _segment(found[0].place) for label, found in meanings_of(markers.names).items()}
+        on = _segments(markers.names)
         ends = [[markers[label] for label in on if on[label] in group] for group in (_HIGH, _DEEP)]
     if not all(ends):
         return _only_way_to_stand(markers)
@@ -64,8 +64,14 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
     return found[0] if len(found) == 1 else None
 
 
-def _segment(place: str) -> str:
-    return segment_of(place) if place in LANDMARKS else place
+def _segments(labels: tuple[str, ...]) -> dict[str, str]:
+    """Return label -> segment, read as the whole set is written or, where that says nothing, alone: high and low have
+    no sides that could be mistaken.
+    """
+    together = meanings_of(labels)
+    found = {label: together.get(label) or meanings(label) for label in labels}
+    places = {label: said[0].place for label, said in found.items() if said}
+    return {label: segment_of(place) if place in LANDMARKS else place for label, place in places.items()}
 
 
 def clear_axis(direction: Array) -> Array | None:
