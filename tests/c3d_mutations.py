@@ -46,31 +46,54 @@ def transform(raw, channels):
     return scale[:channels] * general[0], offset[:channels]
 
 
-@st.composite
-def mutations(draw, content, start):
+@dataclass(frozen=True)
+class Damage:
+    """What happens to a file: its ``kind``; ``places`` (3,) as shares of where that may be, the ``count`` first of them
+    hit by ``values``; the ``word`` put in, the ``size`` of a piece lost or doubled, the ``extra`` bytes at the end.
+
+    Every damage is drawn whole, whatever its kind needs, so that hypothesis sees one shape of examples.
+    """
+
+    kind: str
+    places: tuple[float, ...]
+    values: tuple[int, ...]
+    count: int
+    word: int
+    size: int
+    extra: bytes
+
+
+DAMAGES = st.builds(
+    Damage,
+    kind=st.sampled_from(["header", "parameters", "parameters", "word", "cut", "add", "lose", "double", "anywhere"]),
+    places=st.tuples(*[st.floats(0.0, 1.0, exclude_max=True)] * 3),
+    values=st.tuples(*[st.sampled_from([0, 1, 2, 127, 128, 255]) | st.integers(0, 255)] * 3),
+    count=st.integers(1, 3),
+    word=st.sampled_from([0, 1, 2, 255, 256, 32767, 32768, 65535]),
+    size=st.sampled_from([1, 2, 16, 512]),
+    extra=st.binary(min_size=1, max_size=2000),
+)
+
+
+def damaged(first: Original, one: Damage) -> bytes:
     """Return the content with some bytes of header or parameters overwritten, or with a piece of the file missing,
     doubled or added.
     """
-    kind = draw(
-        st.sampled_from(["header", "parameters", "parameters", "word", "cut", "add", "lose", "double", "anywhere"])
-    )
-    raw = bytearray(content)
-    if kind in ("header", "parameters", "anywhere"):
-        low, high = {"header": (0, 24), "parameters": (512, start), "anywhere": (0, len(raw))}[kind]
-        for _ in range(draw(st.integers(1, 3))):
-            raw[draw(st.integers(low, high - 1))] = draw(
-                st.sampled_from([0, 1, 2, 127, 128, 255]) | st.integers(0, 255)
-            )
-    elif kind == "word":
-        at = draw(st.sampled_from(range(0, 24, 2)) | st.integers(512, start - 2))
-        raw[at : at + 2] = draw(st.sampled_from([0, 1, 2, 255, 256, 32767, 32768, 65535])).to_bytes(2, "little")
-    elif kind == "cut":
-        raw = raw[: draw(st.integers(0, len(raw)))]
-    elif kind == "add":
-        raw += draw(st.binary(min_size=1, max_size=2000))
+    raw, start, place = bytearray(first.content), first.data_start, one.places[0]
+    if one.kind in ("header", "parameters", "anywhere"):
+        low, high = {"header": (0, 24), "parameters": (512, start), "anywhere": (0, len(raw))}[one.kind]
+        for share, value in list(zip(one.places, one.values, strict=True))[: one.count]:
+            raw[low + int(share * (high - low))] = value
+    elif one.kind == "word":
+        at = 2 * int(12 * one.places[1]) if place < 0.5 else 512 + int((2 * place - 1) * (start - 514))
+        raw[at : at + 2] = one.word.to_bytes(2, "little")
+    elif one.kind == "cut":
+        raw = raw[: int(place * (len(raw) + 1))]
+    elif one.kind == "add":
+        raw += one.extra
     else:
-        at, size = draw(st.integers(512, start)), draw(st.sampled_from([1, 2, 16, 512]))
-        raw[at : at + size] = raw[at : at + size] * 2 if kind == "double" else b""
+        at = 512 + int(place * (start - 511))
+        raw[at : at + one.size] = raw[at : at + one.size] * 2 if one.kind == "double" else b""
     return bytes(raw)
 
 
