@@ -11,7 +11,6 @@ from biodance.body.human.optional_joints import with_optional
 from biodance.body.inertia import shift_matter
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
-from biodance.identification.base_parameters import BaseParameters, parameter_names, structural_base
 from biodance.identification.information import Information
 from biodance.identification.mismatch import (
     Mismatch,
@@ -62,20 +61,6 @@ def test_a_short_run_tells_how_far_markers_should_be_off(frames: int) -> None:
     motion = replace(fit.motion, residual=np.full((4 * frames, len(names)), 0.02), marker_names=names)
     found = mismatch(body, (replace(fit, motion=motion),), Noise.unit(np.zeros(3), BANDS))
     assert np.isfinite(found.kinematics).all()
-
-
-def test_scores_are_those_of_all_columns(monkeypatch: pytest.MonkeyPatch) -> None:
-    body, _, rng = person(3)
-    fit = noisy_fit(body, smooth_motion(body, rng, frames=40), body.sip.phi, rng)
-    noise = Noise.unit(np.zeros(3), BANDS)
-    few = mismatch(body, (fit,), noise)
-    names = parameter_names(body)
-    every = BaseParameters(tuple(range(len(names))), np.eye(len(names)), names)
-    monkeypatch.setattr("biodance.identification.mismatch.structural_base", lambda *_, **__: every)
-    assert structural_base(body).count < len(names)
-    whole = mismatch(body, (fit,), noise)
-    for got, all_sent in ((few.kinematics, whole.kinematics), (few.plates, whole.plates)):
-        np.testing.assert_allclose(got, all_sent, rtol=0, atol=1e-9 * np.abs(all_sent).max())
 
 
 def test_neighbours_are_at_the_ends() -> None:

@@ -12,8 +12,11 @@ import pytest
 from example_results import full_session
 from rich.console import Console
 
+from biodance.cli.app import DONE, NEEDS_A_PERSON
+from biodance.cli.session import print_reported
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.engine import STRANGE, UNASKED
 from biodance.pipeline.attention import told
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import provenance
@@ -91,6 +94,28 @@ def test_nothing_says_all_is_well_beside_a_failed_check_or_an_unjudged_trial(ver
             assert not WELL.findall(said), f"{where} beside {check.what} ({check.inside}): {WELL.search(said)}"
             if not check.inside:
                 assert check.what in said, where
+
+
+def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> None:
+    quiet = (replace(LEFT[0], z=1.0),)
+    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=(STRANGE,), resembles=(FOUND,))
+    for one, level, begins in (
+        (strange, "warn", "Cannot tell whether anything is wrong"),
+        (replace(strange, notes=(STRANGE, UNASKED)), "fail", "Something is wrong"),
+        (replace(strange, adequacy=LEFT), "fail", "Something is wrong"),
+    ):
+        first = told(one, replace(FULL, checks=()), (STATIC,)).attention[0]
+        assert (first.level, first.text[: len(begins)]) == (level, begins)
+        assert "It resembles plate gain Fz (gain 0.06 ± 0.002), which is not enough." in first.text
+
+
+@pytest.mark.parametrize(("verdict", "code"), [(WHOLE, DONE), (VERDICTS[1], NEEDS_A_PERSON), (None, DONE)])
+def test_report_asks_for_a_person_whenever_its_diagnosis_does(verdict: Diagnosis | None, code: int, tmp_path) -> None:
+    trial = replace(FULL.trials[0], fit=None, comparison=None, standing=None, checks=())
+    result = replace(FULL, trials=(trial,), checks=(), standing=None, still=None)
+    found = {"attention": [], "diagnosis": verdict and {"verdict": verdict.verdict}}
+    assert not result.needs_a_person
+    assert print_reported(result, tmp_path, found, json=True) == code
 
 
 def test_a_session_without_fault_may_say_so() -> None:

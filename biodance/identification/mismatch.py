@@ -16,7 +16,6 @@ from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.inertia import shift_matter
 from biodance.body.tables.error_sizes import error_size
-from biodance.identification.base_parameters import structural_base
 from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.kinematics import segment_motion
@@ -60,13 +59,10 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
     """Return the scores of kinematics and plates over all trials.
 
     Skin and flesh slide as much as the table says, or more where the markers' residuals are larger than that predicts.
-    Only the columns of the regressor that move independently are sent back: the others are combinations of them.
     """
     whole, shares = parts_as_segments(body), share_errors(body)
     found, sources, plates = nothing(body), of_markers(whole), plate_sources()
-    base = structural_base(body, gravity=body.gravity)
-    shown, sd = list(base.columns), deviations(sources[0].body, sources)
-    scores, plate_scores = np.zeros((base.count, sd.size)), np.zeros((base.count, found.plates.shape[1]))
+    sd, scores, plate_scores = deviations(sources[0].body, sources), np.array(found.kinematics), np.array(found.plates)
     predicted, observed = 0.0, 0.0
     for fit in fits:
         white = noise.at(fit.motion.rate)
@@ -76,7 +72,7 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
             motion = fit.motion.at(pick)
             links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
             W = links if body.sharing is None else links @ body.sharing
-            weight = white.weighted(W[:, :, shown])
+            weight = white.weighted(W)
             scores += transpose(sources, trial, weight).T
             wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
             plate_scores += np.tensordot(weight, np.concatenate([wrong, links @ shares], axis=2), axes=((0, 1), (0, 1)))
@@ -85,7 +81,7 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
                 observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0
-    return Mismatch(base.regroup.T @ (scores * np.where(soft, more, 1.0) * sd), base.regroup.T @ plate_scores)
+    return Mismatch(scores * np.where(soft, more, 1.0) * sd, plate_scores)
 
 
 def nothing(body: Body) -> Mismatch:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.records import Array, Mask, Trial
+from biodance.records import Array, Mask, Trial, runs
 
 _FEWEST = 4
 """Markers that must be seen; fewer may rest on something, or be rounded to the same digits."""
@@ -32,7 +32,7 @@ def frozen_frames(xyz: Array) -> Mask:
         return np.zeros(len(xyz), dtype=bool)
     steps = np.zeros(len(xyz))
     steps[1:] = np.nan_to_num(np.linalg.norm(xyz[1:] - xyz[:-1], axis=2)).max(axis=1)
-    for start, stop in _runs(repeats):
+    for start, stop in runs(repeats):
         repeats[start:stop] = stop - start >= _LASTING and _abrupt(steps, start, stop)
     return repeats
 
@@ -55,16 +55,10 @@ def without_frozen(trial: Trial) -> Trial:
     if markers is None or not frozen.any():
         return trial
     xyz = np.where(frozen[:, None, None], np.nan, markers.xyz)
-    spans = [f"{markers.time[start]:.2f} to {markers.time[stop - 1]:.2f} s" for start, stop in _runs(frozen)]
+    spans = [f"{markers.time[start]:.2f} to {markers.time[stop - 1]:.2f} s" for start, stop in runs(frozen)]
     said = ", ".join(spans[:3]) + (f" and {len(spans) - 3} times more" if len(spans) > 3 else "")
     warning = (
         f"All markers stand still to the last digit at {said}: the recording hung, or a gap was filled by holding "
         f"them. These {int(frozen.sum())} frames count as not seen."
     )
     return replace(trial, markers=replace(markers, xyz=xyz), warnings=(*trial.warnings, warning))
-
-
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return where the runs of True begin and end (one behind)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
