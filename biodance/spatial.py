@@ -6,6 +6,8 @@ moment N·m]. The compiled inverse kinematics (`motion/ik/compiled`) keeps its o
 The virtual laboratory keeps its own algebra ON PURPOSE: a bug in a formula that maker and finder share would cancel.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -44,9 +46,19 @@ def skew(vector: _Array) -> _Array:
 
 def axis_rotation(axis: _Array, angle: _Array) -> _Array:
     """Return rotation matrices (T, 3, 3) about one unit ``axis`` (3,) by ``angle`` (T,) rad (Rodrigues)."""
-    turned = skew(np.asarray(axis))
+    still, turned, twice = _about(*axis)
     sine, versine = np.sin(angle)[:, None, None], (1 - np.cos(angle))[:, None, None]
-    return np.eye(3) + sine * turned + versine * (turned @ turned)
+    return still + sine * turned + versine * twice
+
+
+@lru_cache(maxsize=64)
+def _about(*axis: float) -> tuple[_Array, _Array, _Array]:
+    """Return the matrices (3, 3) of Rodrigues' formula, read-only: 1, that of the product with the axis, its square."""
+    turned = skew(np.array(axis))
+    parts = np.eye(3), turned, turned @ turned
+    for part in parts:
+        part.setflags(write=False)
+    return parts
 
 
 def quaternion_product(a: _Array, b: _Array) -> _Array:

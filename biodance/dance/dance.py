@@ -185,15 +185,17 @@ class Dance(Sendable):
         >>> dance.state(dance.phases[0], np.array([0.0, 0.5])).x.shape
         (2, 29)
         """
+        return close_legs(self.chain, phase.stance, *self.path(phase, time))
+
+    def path(self, phase: Phase, time: Array) -> tuple[Array, Array, Array]:
+        """Return coordinates (T, n) of a phase and their derivatives, planted legs not yet holding their feet."""
         if phase.kind == "hold":
             x = np.repeat(self.postures[None, phase.posture], len(time), axis=0)
-            return close_legs(self.chain, phase.stance, x, *np.zeros((2, *x.shape)))
+            return x, np.zeros_like(x), np.zeros_like(x)
         move = phase.posture - 1
         points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
         basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
-        return close_legs(
-            self.chain, phase.stance, basis.position @ points, basis.velocity @ points, basis.acceleration @ points
-        )
+        return basis.position @ points, basis.velocity @ points, basis.acceleration @ points
 
     def motion(self, rate: float) -> Motion:
         """Return the whole dance, holds included, from 0 to its end.

@@ -6,6 +6,7 @@ corrected. Planted feet stay where they are, and a leg errs the more the farther
 performs dances by other code.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -14,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
-from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Copied
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.stance import Phase, Stance
+from biodance.dance.problem.stance import Phase, Stance, phase_at
+from biodance.motion.kinematics import poses
 from biodance.records import Array
 
 _RATE, _PLAN_RATE = 5.0, 25.0
@@ -31,6 +32,8 @@ _PENDULUM = 0.1
 """s²: height of the centre of mass over gravity."""
 _LIFT = 1.0
 """Share of a move in which a foot leaves the ground, or comes back."""
+_FELT = 3.0
+"""s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
 _ROUNDS = 2
 """Corrections of the pelvis; what is left is a tenth of a millimetre a degree."""
 _CARRIED = 0.85
@@ -89,9 +92,11 @@ def _waves(instants: bytes, cutoff: float) -> tuple[Array, Array, Array]:
 
 
 class PlannedDance:
-    """The dance laid out in time: coordinates, place of the centre of mass and of the pelvis, feet of the phases."""
+    """The dance laid out in time: coordinates, place of the centre of mass and of the pelvis, feet of the phases; with
+    ``between``, two instants s of the dance, no more of it than can be felt there.
+    """
 
-    def __init__(self, dance: Dance) -> None:
+    def __init__(self, dance: Dance, between: tuple[float, float] = (-np.inf, np.inf)) -> None:
         self.dance, self.chain, phases = dance, dance.chain, dance.phases
         self.start, self.end = (np.array([getattr(phase, name) for phase in phases]) for name in ("start", "end"))
         self.posture = np.array([phase.posture for phase in phases])
@@ -103,17 +108,29 @@ class PlannedDance:
         )
         self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
         self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
-        time = np.unique(np.concatenate([_instants(phase) for phase in phases]))
-        rows, x = self.phase_at(time), np.empty((len(time), self.chain.size))
-        for p, phase in enumerate(phases):
-            x[rows == p] = dance.state(phase, time[rows == p]).x
+        first, last = between[0] - _FELT, between[1] + _FELT
+        near = [phase for phase in phases if phase.end >= first and phase.start <= last]
+        time = np.unique(np.concatenate([_instants(phase) for phase in near]))
+        rows = self.phase_at(time)
+        x = self._coordinates(rows, time)
         up, ankle = self._feet(rows, time)
         over = x[:, 2] - self._tops(x, up, ankle)
         self.spline = CubicSpline(time, np.column_stack([x, mass_centre(self.chain, x)[:, :2], over]))
 
     def phase_at(self, when: Array) -> NDArray[np.intp]:
         """Return the phase (T,) at instants of the plan."""
-        return np.asarray(np.clip(np.searchsorted(self.start, when + 1e-9, side="right") - 1, 0, None))
+        return phase_at(self.dance.phases, when)
+
+    def _coordinates(self, rows: NDArray[np.intp], when: Array) -> Array:
+        """Return the coordinates (T, n) of the dance, planted legs holding their feet."""
+        x = np.concatenate([self.dance.path(self.dance.phases[p], when[rows == p])[0] for p in np.unique(rows)])
+        turn = self.chain.root_rotation(x)
+        for side, columns in enumerate(self.chain.leg_columns):
+            down = np.flatnonzero(np.array([side in stance.planted for stance in self.stances])[rows])
+            ankle = np.array([stance.ankle[side] for stance in self.stances])[rows[down]]
+            flat = np.broadcast_to(UPRIGHT, (down.size, 3, 3))
+            x[down[:, None], columns] = self.chain.legs[side].solve(turn[down], x[down, :3], flat, ankle)
+        return x
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands if it does (T, 2, 3)
@@ -141,9 +158,21 @@ class PlannedDance:
         self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision, part: slice = slice(None)
     ) -> Copied:
         """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s; ``part`` of it."""
-        error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
-        sway = how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM, part=part)
-        return self._copied(time[part], when[part], error, sway, how)
+        return self.performed_by(((rng, time, when, part),), how)
+
+    def performed_by(
+        self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
+    ) -> Copied:
+        """Return the performances of several people, each as `performed`, one behind the other: of each the first and
+        the last two frames have differences to somebody else's.
+        """
+        parts = list[tuple[Array, Array, Array, Array]]()
+        for rng, time, when, part in people:
+            error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
+            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM, part=part)
+            parts.append((time[part], when[part], error, sway))
+        times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
+        return self._copied(times, places, errors, sways, how)
 
     def held_by(self, count: int, when: Array, how: Imprecision = USUAL_IMPRECISION) -> Copied:
         """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by
@@ -159,8 +188,7 @@ class PlannedDance:
         centre of mass off by its ``sway`` m (T, 2).
         """
         x, rows = self._off(when, error, sway, how)
-        q = self.chain.motion(time, x, *np.zeros((2, *x.shape))).q
-        return Copied(self.chain.body, time, q, self.stances, rows)
+        return Copied(self.chain.body, time, self.chain.positions(x), self.stances, rows)
 
     def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
         chain, rows = self.chain, self.phase_at(when)
@@ -183,10 +211,12 @@ class PlannedDance:
     def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
         """Return x (T, n) with legs that hold their feet, as far as these are not up; then they do as ``wanted``."""
         out, turn = x.copy(), self.chain.root_rotation(x)
-        flat = np.broadcast_to(UPRIGHT, turn.shape)
         for side, columns in enumerate(self.chain.leg_columns):
-            held = self.chain.legs[side].solve(turn, x[:, :3], flat, ankle[:, side])
-            out[:, columns] = held + up[:, side, None] * (wanted[:, columns] - held)
+            own, meant = np.flatnonzero(up[:, side] < 1), wanted[:, columns]
+            flat = np.broadcast_to(UPRIGHT, (own.size, 3, 3))
+            held = self.chain.legs[side].solve(turn[own], x[own, :3], flat, ankle[own, side])
+            meant[own] = held + up[own, side, None] * (meant[own] - held)
+            out[:, columns] = meant
         return out
 
 
@@ -206,5 +236,7 @@ def _instants(phase: Phase) -> Array:
 
 def mass_centre(chain: Chain, x: Array) -> Array:
     """Return the centre of mass (S, 3) m of coordinates (S, n), lab frame."""
-    pin = load_pinocchio()
-    return np.array([pin.centerOfMass(chain.model, chain.data, row) for row in x]).reshape(-1, 3)
+    pose, sip = poses(chain.body, chain.positions(x)), chain.body.sip
+    first = sip.mass[:, None] * sip.com
+    moment = np.einsum("snij,nj->si", pose.rotation, first) + sip.mass @ pose.position
+    return np.asarray(moment / sip.mass.sum())

@@ -2,9 +2,11 @@
 place is everybody's own and not judged.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from biodance.dance.dance import Dance
 from biodance.dance.imprecision import USUAL_IMPRECISION, Imprecision, PlannedDance, draw_clock
 from biodance.dance.limits import ForImprecise, Limit
+from biodance.dance.problem.stance import phase_at
 from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
@@ -22,6 +25,8 @@ PERFORMER_COUNT = 200
 """Performers that a dance is tried on."""
 _DRAWN = 96
 """Imprecise copies of an instant that are looked at."""
+_TOGETHER = 1000
+"""Frames of performers that are looked at together."""
 _STILL = 1e-4
 """Least deviation, in the limit's unit."""
 
@@ -89,19 +94,20 @@ def rehearse_imprecisely(
     """Return what performers leave of the ``limits`` in ``dance``; ``who`` are their numbers, and each is the same
     whoever else dances. ``only``: neighbouring postures (indices) to or in which they are looked at.
     """
-    plan, postures = PlannedDance(dance), len(dance.postures)
+    people = [_person(dance, k, seed, only, how) for k in who]
+    when = np.concatenate([when[part] for _, _, when, part in people])
+    plan, postures = PlannedDance(dance, (when.min(), when.max())), len(dance.postures)
     asked = for_imprecise(limits)
     found: dict[Limit, list[_Least]] = {limit: [] for limit in asked}
-    for k in who:
-        time, when = draw_clock(np.random.default_rng([seed, 7, k]), dance.duration, how)
-        part = _part(plan.posture[plan.phase_at(when)], only)
-        copy = plan.performed(np.random.default_rng([seed, 8, k]), time, when, how, part)
-        rows, posture = copy.on, plan.posture[copy.on]
+    for some in _groups(people):
+        copy, end = plan.performed_by(some, how), np.cumsum([when[part].size for _, _, when, part in some])
+        posture, inside = plan.posture[copy.on], [slice(a + 2, b - 2) for a, b in pairwise([0, *end])]
         for limit, one in asked.items():
             left = one.left(copy)
-            value = np.where(plan.stepping[rows][:, None], np.inf, left.value)[2:-2]
-            what = left.of[int(value.min(axis=0).argmin())]
-            found[limit].append(_Least.of(value.min(axis=1), posture[2:-2], postures, what))
+            value = np.where(plan.stepping[copy.on][:, None], np.inf, left.value)
+            for own in inside:
+                what = left.of[int(value[own].min(axis=0).argmin())]
+                found[limit].append(_Least.of(value[own].min(axis=1), posture[own], postures, what))
     rooms = tuple(_joined(limit, asked[limit].least, least) for limit, least in found.items())
     bad = {
         (int(p), limit.name)
@@ -115,12 +121,28 @@ def rehearse_imprecisely(
     return Rehearsed(len(who), rooms, tuple(sorted(bad)), tuple(sorted(failed)))
 
 
-def _part(posture: NDArray[np.intp], only: tuple[int, ...]) -> slice:
-    """Return the instants at which somebody dances to or in the postures ``only``, and two beyond for differences."""
-    if not only:
-        return slice(None)
-    inside = np.flatnonzero(np.isin(posture, only))
-    return slice(max(0, inside[0] - 2), inside[-1] + 3)
+_Person = tuple[np.random.Generator, Array, Array, slice]
+"""What a performer's errors are drawn from, instants s of the performance and of the plan, and which of them count."""
+
+
+def _person(dance: Dance, k: int, seed: int, only: tuple[int, ...], how: Imprecision) -> _Person:
+    """Return performer ``k``, and the instants at which he or she dances to or in the postures ``only``, and two beyond
+    for differences.
+    """
+    time, when = draw_clock(np.random.default_rng([seed, 7, k]), dance.duration, how)
+    part = slice(None)
+    if only:
+        posture = np.array([phase.posture for phase in dance.phases])[phase_at(dance.phases, when)]
+        inside = np.flatnonzero(np.isin(posture, only))
+        part = slice(max(0, inside[0] - 2), inside[-1] + 3)
+    return np.random.default_rng([seed, 8, k]), time, when, part
+
+
+def _groups(people: list[_Person]) -> Iterator[list[_Person]]:
+    """Yield people who are looked at together: calls cost more than a few frames, and many frames need memory."""
+    frames = np.cumsum([when[part].size for _, _, when, part in people])
+    for _, some in groupby(zip(frames // _TOGETHER, people, strict=True), key=itemgetter(0)):
+        yield [one for _, one in some]
 
 
 def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -> tuple[float, str]:

@@ -161,6 +161,8 @@ def deepest(ends: Array, half: Array) -> Array:
 
 _CLOSE = 0.25
 """m between the axes of two segments whose distance is worked out; others' is a lower bound."""
+_LOOKS = 4
+"""Places on a limb at which it is held against a box before its distance is worked out."""
 
 
 def surface_distances(body: Body, pose: Poses, *, near: float = _CLOSE) -> tuple[Array, tuple[str, ...]]:
@@ -196,7 +198,9 @@ def _boxes_apart(line: Array, half: Array, enough: float) -> Array:
     """Return the signed distances (T, K) of lines (T, K, 2, 3) from boxes about the origin with half sides ``half`` (K,
     3).
     """
-    out = _depth(np.abs(_middle(line)) - half) - _length(_along(line)) / 2
+    first, along = line[..., 0, :], _along(line)
+    looked = [_depth(np.abs(first + (k + 0.5) / _LOOKS * along) - half) for k in range(_LOOKS)]
+    out = np.min(looked, axis=0) - _length(along) / (2 * _LOOKS)
     near = out < enough
     line, half = line[near], np.broadcast_to(half, (*out.shape, 3))[near]
     out[near] = _depth(np.abs(_on(line, deepest(line[None], half)[0])) - half)

@@ -138,10 +138,16 @@ class Chain(Sendable):
             )
         return out
 
-    def motion(self, time: Array, x: Array, rate: Array, rate2: Array) -> Motion:
-        """Return the Motion of the body from coordinates (T, n) and their first and second derivatives."""
+    def positions(self, x: Array) -> Array:
+        """Return the positions (T, nq) of the body, as in `Motion`, from coordinates (T, n)."""
         from scipy.spatial.transform import Rotation
 
+        quaternion = Rotation.from_matrix(self.root_rotation(x)).as_quat()
+        quaternion *= np.where(quaternion[:, 3:] < 0, -1.0, 1.0)
+        return np.concatenate([x[:, :3], quaternion, x[:, ROOT:]], axis=1)
+
+    def motion(self, time: Array, x: Array, rate: Array, rate2: Array) -> Motion:
+        """Return the Motion of the body from coordinates (T, n) and their first and second derivatives."""
         turn = self.root_rotation(x)
         drop, tilt = (axis_rotation(np.array(_TURNS[k]), x[:, 3 + k]) for k in (1, 2))
         spin = np.zeros((len(x), 3))
@@ -154,9 +160,6 @@ class Chain(Sendable):
                 spin, spin2 = (np.einsum("tji,tj->ti", onward, s) for s in (spin, spin2))
         linear = np.einsum("tji,tj->ti", turn, rate[:, :3])
         linear2 = np.einsum("tji,tj->ti", turn, rate2[:, :3]) - np.cross(spin, linear)
-        quaternion = Rotation.from_matrix(turn).as_quat()
-        quaternion *= np.where(quaternion[:, 3:] < 0, -1.0, 1.0)
-        q = np.concatenate([x[:, :3], quaternion, x[:, ROOT:]], axis=1)
         v = np.concatenate([linear, spin, rate[:, ROOT:]], axis=1)
         a = np.concatenate([linear2, spin2, rate2[:, ROOT:]], axis=1)
-        return Motion(time, q, v, a, joint_names=tuple(joint.name for joint in self.body.joints))
+        return Motion(time, self.positions(x), v, a, joint_names=tuple(joint.name for joint in self.body.joints))

@@ -43,11 +43,11 @@ class State:
         model, data, count = self.chain.model, self.chain.data, self.chain.size
         twists = np.empty((len(self.x), count, 6))
         rotation, position = np.empty((len(self.x), count, 3, 3)), np.empty((len(self.x), count, 3))
-        links = sorted({*self.chain.carriers})
+        links, places = sorted({*self.chain.carriers}), data.oMi
         for t, x in enumerate(self.x):
             twists[t] = pin.computeJointJacobians(model, data, x).T
             for k in links:
-                place = data.oMi[k + 1]
+                place = places[k + 1]
                 rotation[t, k], position[t, k] = place.rotation, place.translation
         return twists, rotation, position
 
