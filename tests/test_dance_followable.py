@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from small_dances import BODY, small_dance
 
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
@@ -14,7 +15,8 @@ from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.reach import Reach
 from biodance.dance.followable.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
 from biodance.dance.followable.walk import NoWay, Walk, walked_dance
-from biodance.dance.imprecision import Imprecision, mass_centre
+from biodance.dance.imprecision import Imprecision, PlannedDance, mass_centre
+from biodance.dance.limits._imprecise import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
 from biodance.dance.performers import Rehearsed, Room, perform_with, rehearse_imprecisely
 from biodance.dance.postures.ordering import support_sequence
@@ -143,6 +145,35 @@ def test_performers_are_the_same_in_groups() -> None:
     with ThreadPoolExecutor(2) as pool:
         together = perform_with(pool, small_dance(), PLAN.limits, who=range(4))
     assert together == rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4))
+
+
+def test_performers_looked_at_together_are_those_looked_at_alone() -> None:
+    dance = small_dance()
+    alone = [rehearse_imprecisely(dance, PLAN.limits, who=(k,), only=(1, 2)) for k in range(3)]
+    together = rehearse_imprecisely(dance, PLAN.limits, who=range(3), only=(1, 2))
+    assert set(together.bad) == {bad for one in alone for bad in one.bad}
+    assert together.failed == tuple(k for one in alone for k in one.failed)
+    for room in together.rooms:
+        assert room.worst == pytest.approx(min(one[room.limit].worst for one in alone), abs=1e-12)
+        assert room.failing == pytest.approx(np.mean([one[room.limit].failing for one in alone]))
+
+
+def test_a_part_of_the_plan_is_that_of_the_whole_plan() -> None:
+    dance = small_dance()
+    long = replace(dance, hold=dance.hold + 6.0)
+    when = long.phases[2].start + np.linspace(1.5, 2.5, 7)  # the move is felt there, what was before it is not
+    part, whole = PlannedDance(long, (when[0], when[-1])), PlannedDance(long)
+    assert part.spline.x.size < whole.spline.x.size
+    np.testing.assert_allclose(part.spline(when), whole.spline(when), rtol=0, atol=1e-12)
+    state = long.state(long.phases[2], when)
+    np.testing.assert_allclose(whole.spline(when)[:, : CHAIN.size], state.x, rtol=0, atol=1e-3)
+
+
+def test_small_turns_have_the_vectors_of_scipy() -> None:
+    turns = np.random.default_rng(5).normal(scale=0.5, size=(50, 4, 3))
+    turns[0] = 0.0
+    found = _vector(Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(50, 4, 3, 3))
+    np.testing.assert_allclose(found, turns, rtol=0, atol=1e-14)
 
 
 def test_closed_form_distances_are_those_of_coal() -> None:

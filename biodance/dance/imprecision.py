@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
+from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Copied
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Phase, Stance, phase_at
-from biodance.motion.kinematics import poses
 from biodance.records import Array
 
 _RATE, _PLAN_RATE = 5.0, 25.0
@@ -236,7 +236,5 @@ def _instants(phase: Phase) -> Array:
 
 def mass_centre(chain: Chain, x: Array) -> Array:
     """Return the centre of mass (S, 3) m of coordinates (S, n), lab frame."""
-    pose, sip = poses(chain.body, chain.positions(x)), chain.body.sip
-    first = sip.mass[:, None] * sip.com
-    moment = np.einsum("snij,nj->si", pose.rotation, first) + sip.mass @ pose.position
-    return np.asarray(moment / sip.mass.sum())
+    centre, model, data = load_pinocchio().centerOfMass, chain.model, chain.data
+    return np.array([centre(model, data, row) for row in x]).reshape(-1, 3)
