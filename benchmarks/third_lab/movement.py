@@ -1,13 +1,13 @@
-"""Movement: planned angles of trunk and arms, legs that keep the feet where they stand, balance by the zero-moment point."""
+"""Movement: planned trunk and arms, legs that keep the feet where they stand, balance by the zero-moment point."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import solve_banded
 from scipy.spatial.transform import Rotation
 
+from third_lab.arrays import Array
 from third_lab.people import Person
 from third_lab.skeleton import COLUMNS, GRAVITY, SIDES, WIDTH, find_wrench, pose_segments
 
@@ -39,18 +39,18 @@ class Plan:
         Where under each foot its load is wanted, m.
     """
 
-    times: NDArray
-    angles: dict[str, NDArray]
-    pelvis: NDArray
-    ankles: dict[str, NDArray]
-    feet: dict[str, NDArray]
-    toes: dict[str, NDArray]
-    share: NDArray
-    centres: dict[str, NDArray]
-    sway: NDArray = field(default_factory=lambda: np.zeros(2))
+    times: Array
+    angles: dict[str, Array]
+    pelvis: Array
+    ankles: dict[str, Array]
+    feet: dict[str, Array]
+    toes: dict[str, Array]
+    share: Array
+    centres: dict[str, Array]
+    sway: Array = field(default_factory=lambda: np.zeros(2))
 
 
-def ease(times: NDArray, knots: NDArray, values: NDArray) -> NDArray:
+def ease(times: Array, knots: Array, values: Array) -> Array:
     """Go from value to value with least jerk and stand still in each.
 
     Parameters
@@ -97,21 +97,21 @@ def realize(person: Person, plan: Plan, rounds: int = 5) -> BSpline:
     return _solve_legs(person, plan, shift)
 
 
-def find_zmp(person: Person, path: BSpline, times: NDArray) -> NDArray:
+def find_zmp(person: Person, path: BSpline, times: Array) -> Array:
     """Zero-moment point on the floor, shape (n, 2), m."""
     forces, moments = find_wrench(person, path, times)
     return np.stack([-moments[:, 1], moments[:, 0]], axis=1) / forces[:, 2:]
 
 
-def _lead(times: NDArray, error: NDArray, height: float) -> NDArray:
-    """Solve shift - height/g d²shift/dt² = error, m: how an inverted pendulum must move to shift its zero-moment point."""
+def _lead(times: Array, error: Array, height: float) -> Array:
+    """Solve shift - height/g d²shift/dt² = error, m: how an inverted pendulum moves its zero-moment point."""
     k = height / -GRAVITY[2] / (times[1] - times[0]) ** 2
     bands = np.array([np.full(len(times), -k), np.full(len(times), 1 + 2 * k), np.full(len(times), -k)])
     bands[1, [0, -1]], bands[0, 1], bands[2, -2] = 1.0, 0.0, 0.0  # at both ends the person stands still
     return solve_banded((1, 1), bands, error)
 
 
-def _solve_legs(person: Person, plan: Plan, shift: NDArray) -> BSpline:
+def _solve_legs(person: Person, plan: Plan, shift: Array) -> BSpline:
     """Bend hips, knees and ankles so that the feet are where the plan has them; q as a spline."""
     q = np.zeros((len(plan.times), WIDTH))
     for name, angles in plan.angles.items():
@@ -138,19 +138,19 @@ def _solve_legs(person: Person, plan: Plan, shift: NDArray) -> BSpline:
     return make_interp_spline(plan.times, q, k=5)
 
 
-def _lower(person: Person, plan: Plan, place: NDArray, turn: NDArray) -> NDArray:
-    """Height of the pelvis, m: as planned, or softly less where a leg would be too short."""
+def _lower(person: Person, plan: Plan, place: Array, turn: Array) -> Array:
+    """Height of the pelvis, m: as planned, or softly less where a leg would not reach the floor, lifted or not."""
     heights = [place[:, 2]]
     for side in SIDES:
         hip = turn @ person.offsets[f"{side}_thigh"]
-        longest = 0.9975 * -(person.offsets[f"{side}_shank"][2] + person.offsets[f"{side}_foot"][2])
+        longest = 0.996 * -(person.offsets[f"{side}_shank"][2] + person.offsets[f"{side}_foot"][2])
         flat = np.linalg.norm((plan.ankles[side] - place - hip)[:, :2], axis=1)
-        heights.append(plan.ankles[side][:, 2] + np.sqrt(np.maximum(longest**2 - flat**2, 0.01)) - hip[:, 2])
-    soft = 0.004
+        heights.append(person.sizes["ankle"] + np.sqrt(np.maximum(longest**2 - flat**2, 0.01)) - hip[:, 2])
+    soft = 0.006
     return -soft * np.log(np.exp(-(np.array(heights) - heights[0]) / soft).sum(axis=0)) + heights[0]
 
 
-def _bend_knee(person: Person, side: str, distance: NDArray) -> tuple[NDArray, NDArray]:
+def _bend_knee(person: Person, side: str, distance: Array) -> tuple[Array, Array]:
     """Angles of the knee (n, 3) for hip-to-ankle distances (m), and the ankle as seen from the thigh (n, 3).
 
     The shank turns inwards and abducts a little as the knee bends (screw-home movement: no ideal hinge).
@@ -169,7 +169,7 @@ def _bend_knee(person: Person, side: str, distance: NDArray) -> tuple[NDArray, N
     return value[:, 3:], value[:, :3]
 
 
-def _frame(along: NDArray, beside: NDArray) -> NDArray:
+def _frame(along: Array, beside: Array) -> Array:
     """Orthogonal frames (n, 3, 3) whose first axis is `along` and whose second is as near `beside` as can be."""
     first = along / np.linalg.norm(along, axis=1, keepdims=True)
     second = beside - (beside * first).sum(axis=1, keepdims=True) * first
@@ -177,7 +177,7 @@ def _frame(along: NDArray, beside: NDArray) -> NDArray:
     return np.stack([first, second, np.cross(first, second)], axis=2)
 
 
-def _angles(matrices: NDArray) -> NDArray:
+def _angles(matrices: Array) -> Array:
     """Angles y, x, z of rotation matrices, shape (n, 3), without jumps."""
     return np.unwrap(Rotation.from_matrix(matrices).as_euler("YXZ"), axis=0)
 

@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from third_lab.arrays import Array
 from third_lab.skeleton import PARENTS, SIDES
 
 # Shares of body mass, %: head and neck, thorax and abdomen, pelvis, upper arm, forearm, hand, thigh, shank, foot.
 # Dempster 1955 (WADC-TR-55-159, as in Winter 2009, table 4.1); Clauser et al. 1969 (AMRL-TR-69-70; its trunk less
-# Dempster's pelvis); Zatsiorsky and Seluyanov 1983; McConville et al. 1980 and Young et al. 1983 as adjusted by Dumas et
-# al. 2007 (J Biomech 40:543); Plagenhoef et al. 1983 (RQES 54:169).
+# Dempster's pelvis); Zatsiorsky and Seluyanov 1983; McConville et al. 1980 and Young et al. 1983 as adjusted by Dumas
+# et al. 2007 (J Biomech 40:543); Plagenhoef et al. 1983 (RQES 54:169).
 STUDIES = {
     "dempster": {"M": (8.1, 35.5, 14.2, 2.8, 1.6, 0.6, 10.0, 4.65, 1.45)},
     "clauser": {"M": (7.3, 36.5, 14.2, 2.6, 1.6, 0.7, 10.3, 4.3, 1.5)},
@@ -56,17 +56,17 @@ class Person:
     inertias : dict of str to array, shape (3, 3)
         About the centre of mass, axes of the segment, kg m².
     sizes : dict of str to float
-        ankle (height of the ankle joint), foot (length), asis (breadth), cut (height of the lowest spinal joint over the
-        hips), neck, depth, breadth: m.
+        ankle (height of the ankle joint), foot (length), asis (breadth), cut (height of the lowest spinal joint over
+        the hips), neck, depth, breadth: m.
     """
 
     sex: str
     mass: float
     height: float
-    offsets: dict[str, NDArray]
+    offsets: dict[str, Array]
     masses: dict[str, float]
-    coms: dict[str, NDArray]
-    inertias: dict[str, NDArray]
+    coms: dict[str, Array]
+    inertias: dict[str, Array]
     sizes: dict[str, float]
 
 
@@ -74,7 +74,8 @@ def draw_person(rng: np.random.Generator) -> Person:
     """Draw a person of 1.52 to 1.95 m, body mass index 18 to 29, with a pelvis of 11 to 20 % of the body.
 
     The studies' shares are mixed at random; what the pelvis gains or loses is taken from thighs (60 %) and lower trunk.
-    Lengths after Drillis and Contini 1966 with 2.5 % of spread; right and left differ by 0.4 % in length, 1.5 % in mass.
+    Lengths after Drillis and Contini 1966 with 2.5 % of spread; right and left differ by 0.4 % in length, 1.5 % in
+    mass.
     """
     sex = str(rng.choice(["M", "F"]))
     height = float(np.clip(rng.normal(1.77, 0.07) if sex == "M" else rng.normal(1.65, 0.065), 1.52, 1.95))
@@ -88,7 +89,9 @@ def draw_person(rng: np.random.Generator) -> Person:
     return Person(sex, mass, height, offsets, masses, coms, inertias, sizes)
 
 
-def _draw_lengths(rng: np.random.Generator, height: float, pelvis_share: float) -> tuple[dict, dict]:
+def _draw_lengths(
+    rng: np.random.Generator, height: float, pelvis_share: float
+) -> tuple[dict[str, float], dict[str, Array]]:
     """Return sizes (m) and joint offsets in the parents' frames (m)."""
 
     def share(mean: float, spread: float = 0.025) -> float:
@@ -116,7 +119,7 @@ def _draw_lengths(rng: np.random.Generator, height: float, pelvis_share: float) 
     }
     rest = sizes["spine"] - cut
     ahead = rng.normal(-0.008, 0.006, 5)  # the spine is no straight line over the hips
-    offsets: dict[str, NDArray] = {
+    offsets: dict[str, Array] = {
         "pelvis": np.zeros(3),
         "lumbar": np.array([-0.02 + ahead[0], 0, cut]),
         "waist": np.array([ahead[1], 0, 0.26 * rest]),
@@ -170,8 +173,8 @@ def _draw_masses(rng: np.random.Generator, sex: str, mass: float, pelvis_share: 
 
 
 def _draw_distribution(
-    rng: np.random.Generator, name: str, mass: float, offsets: dict[str, NDArray], sizes: dict[str, float]
-) -> tuple[NDArray, NDArray]:
+    rng: np.random.Generator, name: str, mass: float, offsets: dict[str, Array], sizes: dict[str, float]
+) -> tuple[Array, Array]:
     """Draw centre of mass (m) and inertia about it (kg m²) of one segment, axes of the segment."""
     side, kind = name.split("_", 1) if name.startswith(("right_", "left_")) else ("", name)
     sign = SIDES.get(side, 0)
@@ -196,7 +199,7 @@ def _draw_distribution(
     return com, turned @ np.diag(moments) @ turned.T
 
 
-def _solid(kind: str, sign: int, offsets: dict[str, NDArray], sizes: dict[str, float]) -> tuple[NDArray, NDArray]:
+def _solid(kind: str, sign: int, offsets: dict[str, Array], sizes: dict[str, float]) -> tuple[Array, Array]:
     """Return centre and half axes (m) of the ellipsoid that stands for a segment of the trunk, a hand or a foot."""
     wide, deep, foot = sizes["breadth"], sizes["depth"], sizes["foot"]
     up = {name: float(offsets[name][2]) for name in ("lumbar", "waist", "thorax", "neck")}

@@ -3,12 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
+from third_lab.arrays import Array
 from third_lab.faults import Fault
 
+Pair = tuple["Plate", "Plate"]
 DOWN = np.diag([1.0, -1.0, -1.0])  # axes of a plate that is not turned: x as the world's, z down
 
 
@@ -26,8 +27,8 @@ class Plate:
     size : tuple of float
         Along its x and y, m.
     deep : array, shape (3,)
-        AMTI: from the sensor's origin to the middle of the surface, plate axes, m. Kistler: half distances of the sensors
-        (a, b) and -depth of their plane.
+        AMTI: from the sensor's origin to the middle of the surface, plate axes, m. Kistler: half distances of the
+        sensors (a, b) and -depth of their plane.
     shift : array, shape (3,)
         True place less surveyed place, m, world.
     yaw : float
@@ -45,20 +46,20 @@ class Plate:
     """
 
     make: str
-    centre: NDArray
-    turn: NDArray
+    centre: Array
+    turn: Array
     size: tuple[float, float]
-    deep: NDArray
-    shift: NDArray
+    deep: Array
+    shift: Array
     yaw: float
-    response: NDArray
-    offset: NDArray
+    response: Array
+    offset: Array
     noise: float
     delay: float
     lowpass: float = 0.0
 
 
-def draw_plates(rng: np.random.Generator, make: str) -> tuple[Plate, Plate]:
+def draw_plates(rng: np.random.Generator, make: str) -> Pair:
     """Two plates of one make in a row along the walkway, with the tolerances of a laboratory that is looked after.
 
     Place 1.5 mm, level 1 mm, yaw 0.25 degrees, gains 0.6 %, cross-talk 0.3 %, offset 0.7 N, noise 0.15 to 0.9 N, delay
@@ -85,7 +86,13 @@ _SCALES = np.block(
 )  # N per N·m and back
 
 
-def spoil_plates(plates: tuple[Plate, Plate], fault: Fault) -> tuple[Plate, Plate]:
+def still(plate: Plate) -> Plate:
+    """Return the plate without noise and tolerances."""
+    zero = np.zeros(6)
+    return replace(plate, shift=zero[:3], yaw=0.0, response=np.eye(6), offset=zero, noise=0.0, delay=0.0)
+
+
+def spoil_plates(plates: Pair, fault: Fault) -> Pair:
     """Put a fault of the plates into them; other faults leave them as they are."""
     out = []
     for number, plate in enumerate(plates, 1):
@@ -107,8 +114,8 @@ def spoil_plates(plates: tuple[Plate, Plate], fault: Fault) -> tuple[Plate, Plat
     return out[0], out[1]
 
 
-def measure(rng: np.random.Generator, plate: Plate, forces: NDArray, moments: NDArray, rate: float) -> NDArray:
-    """What the plate's six outputs read.
+def measure(rng: np.random.Generator, plate: Plate, forces: Array, moments: Array, rate: float) -> Array:
+    """Read the plate's six outputs.
 
     Parameters
     ----------
@@ -120,8 +127,8 @@ def measure(rng: np.random.Generator, plate: Plate, forces: NDArray, moments: ND
     Returns
     -------
     wrench : array, shape (n, 6)
-        N and N·m, about the surveyed origin's true place, in the plate's true axes. AMTI: origin of the sensor; Kistler:
-        middle of the sensors' plane.
+        N and N·m, about the surveyed origin's true place, in the plate's true axes. AMTI: origin of the sensor;
+        Kistler: middle of the sensors' plane.
     """
     turn = Rotation.from_euler("z", plate.yaw).as_matrix() @ plate.turn
     origin = plate.centre + plate.shift - turn @ find_lever(plate)
@@ -136,12 +143,12 @@ def measure(rng: np.random.Generator, plate: Plate, forces: NDArray, moments: ND
     return wrench
 
 
-def find_lever(plate: Plate) -> NDArray:
+def find_lever(plate: Plate) -> Array:
     """From the origin of the outputs to the middle of the surface, plate axes, m."""
     return plate.deep if plate.make == "amti" else np.array([0.0, 0.0, plate.deep[2]])
 
 
-def split_kistler(plate: Plate, wrench: NDArray) -> NDArray:
+def split_kistler(plate: Plate, wrench: Array) -> Array:
     """Eight outputs fx12, fx34, fy14, fy23, fz1 to fz4 for six components, shape (n, 8); moments must be in N·m.
 
     The inverse of the manufacturer's sums: Mx = b (fz1 + fz2 - fz3 - fz4), My = a (-fz1 + fz2 + fz3 - fz4),
@@ -155,7 +162,7 @@ def split_kistler(plate: Plate, wrench: NDArray) -> NDArray:
     return np.stack(sums + corners, axis=1)
 
 
-def find_corners(plate: Plate) -> NDArray:
+def find_corners(plate: Plate) -> Array:
     """Surveyed corners, world, m, shape (3, 4), in the order of C3D: +x+y, -x+y, -x-y, +x-y of the plate."""
     signs = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
     return (plate.centre + 0.5 * (signs * [*plate.size, 0]) @ plate.turn.T).T

@@ -1,13 +1,14 @@
-"""The skeleton: 22 segments, each on three hinges (flexion y, abduction x, rotation z), and its mechanics by pinocchio."""
+"""The skeleton: 22 segments, each on three hinges (flexion y, abduction x, rotation z); mechanics by pinocchio."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
+
+from third_lab.arrays import Array
 
 if TYPE_CHECKING:
     from third_lab.people import Person
@@ -29,7 +30,7 @@ COLUMNS = {name: slice(3 + 3 * i, 6 + 3 * i) for i, name in enumerate(NAMES)}
 WIDTH = 3 + 3 * len(NAMES)
 
 
-def pose_segments(person: "Person", q: NDArray) -> tuple[dict[str, NDArray], dict[str, NDArray]]:
+def pose_segments(person: "Person", q: Array) -> tuple[dict[str, Array], dict[str, Array]]:
     """Place all segments.
 
     Parameters
@@ -73,7 +74,7 @@ def build_model(person: "Person") -> pin.Model:
     return model
 
 
-def order_columns(model: pin.Model) -> NDArray:
+def order_columns(model: pin.Model) -> Array:
     """Columns of q in the order in which pinocchio numbers its joints (it numbers by depth of the call)."""
     order = np.empty(WIDTH, int)
     order[model.idx_qs[model.getJointId("place")] :][:3] = [0, 1, 2]
@@ -83,7 +84,7 @@ def order_columns(model: pin.Model) -> NDArray:
     return order
 
 
-def find_wrench(person: "Person", path: BSpline, times: NDArray) -> tuple[NDArray, NDArray]:
+def find_wrench(person: "Person", path: BSpline, times: Array) -> tuple[Array, Array]:
     """Force and moment that the ground must give for this movement.
 
     Parameters
@@ -109,7 +110,7 @@ def find_wrench(person: "Person", path: BSpline, times: NDArray) -> tuple[NDArra
     return forces, moments + np.cross(path(times)[:, :3], forces)
 
 
-def add_mass(person: "Person", name: str, mass: float, place: NDArray, radius: float = 0.04) -> "Person":
+def add_mass(person: "Person", name: str, mass: float, place: Array, radius: float = 0.04) -> "Person":
     """Fix a ball (kg, place in the segment's frame in m, radius in m) to a segment; a new person."""
     old = pin.Inertia(person.masses[name], person.coms[name], person.inertias[name])
     new = old + pin.Inertia(mass, place, 0.4 * mass * radius**2 * np.eye(3))

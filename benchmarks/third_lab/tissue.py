@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import bilinear, lfilter
 
+from third_lab.arrays import Array
 from third_lab.people import Person
 from third_lab.skeleton import COLUMNS, GRAVITY, PARENTS, SIDES, pose_segments
 
@@ -36,7 +36,7 @@ def draw_tissue(rng: np.random.Generator) -> Tissue:
                   float(np.exp(rng.normal(0, 0.3))))  # fmt: skip
 
 
-def swing(acceleration: NDArray, rate: float, frequency: float, damping: float) -> NDArray:
+def swing(acceleration: Array, rate: float, frequency: float, damping: float) -> Array:
     """Displacement of a mass on spring and damper whose foot is accelerated.
 
     Parameters
@@ -61,7 +61,7 @@ def swing(acceleration: NDArray, rate: float, frequency: float, damping: float) 
     return lfilter(b, a, acceleration - first, axis=0) - first / natural**2
 
 
-def shake(person: Person, tissue: Tissue, path: BSpline, times: NDArray) -> tuple[NDArray, NDArray]:
+def shake(person: Person, tissue: Tissue, path: BSpline, times: Array) -> tuple[Array, Array]:
     """Force and moment that wobbling and sagging add to what the ground must give.
 
     A share of the segment's mass sits at the segment's centre of mass when the person stands; gravity that turns in the
@@ -89,18 +89,18 @@ def shake(person: Person, tissue: Tissue, path: BSpline, times: NDArray) -> tupl
     return forces, moments
 
 
-def differentiate(values: NDArray, rate: float) -> NDArray:
+def differentiate(values: Array, rate: float) -> Array:
     """Central differences along time, per second."""
     return np.gradient(values, 1 / rate, axis=0, edge_order=2)
 
 
 def slide_skin(
-    seed: int, person: Person, tissue: Tissue, path: BSpline, times: NDArray, where: dict[str, tuple[str, NDArray]]
-) -> dict[str, NDArray]:
+    seed: int, person: Person, tissue: Tissue, path: BSpline, times: Array, where: dict[str, tuple[str, Array]]
+) -> dict[str, Array]:
     """Displacement of each marker in its segment's frame.
 
-    Skin follows the angles of the joints at both ends of the segment (a fixed matrix for each marker, part of it common to
-    the segment: Bonci et al. 2014) and rings at 8 to 14 Hz after accelerations.
+    Skin follows the angles of the joints at both ends of the segment (a fixed matrix for each marker, part of it common
+    to the segment: Bonci et al. 2014) and rings at 8 to 14 Hz after accelerations.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def slide_skin(
     rng, rate = np.random.default_rng(seed), 1 / (times[1] - times[0])
     q = path(times)
     rotations, places = pose_segments(person, q)
-    common: dict[str, NDArray] = {}
+    common: dict[str, Array] = {}
     slid = {}
     for marker, (segment, _) in where.items():
         size = 1e-3 * tissue.skin * SKIN_MM[kind_of(segment)]

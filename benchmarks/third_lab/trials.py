@@ -1,22 +1,37 @@
 """What is performed: static, quiet standing, six dances, squats. All stand with one foot on each plate."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from third_lab.arrays import Array
 from third_lab.movement import KNOTS, Plan, ease
 from third_lab.people import Person
 from third_lab.skeleton import NAMES, SIDES
 
 # joint: lowest and highest of flexion, abduction, rotation in degrees (abduction and rotation outwards)
-ARMS = {"clavicle": ((0, 0), (-4, 16), (-8, 8)), "upper_arm": ((-125, 25), (10, 95), (-8, 50)),
-        "forearm": ((-120, -8), (0, 0), (-70, 60)), "hand": ((-30, 30), (-12, 12), (0, 0))}  # fmt: skip
-TRUNK = {"lumbar": ((-6, 22), (-9, 9), (-4, 4)), "waist": ((-6, 20), (-9, 9), (-8, 8)),
-         "thorax": ((-5, 16), (-8, 8), (-14, 14)), "neck": ((-10, 18), (-10, 10), (-22, 22)),
-         "head": ((-10, 14), (-8, 8), (-22, 22))}  # fmt: skip
+ARMS = {
+    "clavicle": ((0, 0), (-4, 16), (-8, 8)),
+    "upper_arm": ((-125, 25), (10, 95), (-8, 50)),
+    "forearm": ((-120, -8), (0, 0), (-70, 60)),
+    "hand": ((-30, 30), (-12, 12), (0, 0)),
+}
+TRUNK = {
+    "lumbar": ((-6, 22), (-9, 9), (-4, 4)),
+    "waist": ((-6, 20), (-9, 9), (-8, 8)),
+    "thorax": ((-5, 16), (-8, 8), (-14, 14)),
+    "neck": ((-10, 18), (-10, 10), (-22, 22)),
+    "head": ((-10, 14), (-8, 8), (-22, 22)),
+}
 DANCES = ("arms", "bend", "twist", "half_squat", "right_knee", "left_knee")
-MORE = {"arms": {"arms": 1.0, "trunk": 0.25}, "bend": {"arms": 0.6, "trunk": 1.0}, "twist": {"arms": 0.8, "trunk": 0.9},
-        "half_squat": {"arms": 0.8, "trunk": 0.5}, "right_knee": {"arms": 0.6, "trunk": 0.35},
-        "left_knee": {"arms": 0.6, "trunk": 0.35}, "squat": {"arms": 0.15, "trunk": 0.2}, "stand": {}}  # fmt: skip
+MORE = {
+    "arms": {"arms": 1.0, "trunk": 0.25},
+    "bend": {"arms": 0.6, "trunk": 1.0},
+    "twist": {"arms": 0.8, "trunk": 0.9},
+    "half_squat": {"arms": 0.8, "trunk": 0.5},
+    "right_knee": {"arms": 0.6, "trunk": 0.35},
+    "left_knee": {"arms": 0.6, "trunk": 0.35},
+    "squat": {"arms": 0.15, "trunk": 0.2},
+    "stand": {},
+}
 
 
 def plan_trial(rng: np.random.Generator, person: Person, kind: str, seconds: float, width: float) -> Plan:
@@ -57,24 +72,27 @@ def plan_trial(rng: np.random.Generator, person: Person, kind: str, seconds: flo
     return plan
 
 
-def _targets(rng: np.random.Generator, ranges: tuple, knots: NDArray, sign: int) -> NDArray:
+def _targets(rng: np.random.Generator, ranges: tuple[tuple[float, float], ...], knots: Array, sign: int) -> Array:
     """Draw angles for each knot, rad, shape (k, 3); zero at the first two and last two knots."""
     low, high = np.radians(np.array(ranges, float)).T
     return _ends(rng.uniform(low, high, (len(knots), 3))) * [1, sign, sign]
 
 
-def _ends(values: NDArray) -> NDArray:
+def _ends(values: Array) -> Array:
     """Values with nothing at the two first and the two last knots."""
     values = values.copy()
     values[[0, 1, -2, -1]] = 0.0
     return values
 
 
-def _stand(rng: np.random.Generator, person: Person, times: NDArray, width: float) -> Plan:
+def _stand(rng: np.random.Generator, person: Person, times: Array, width: float) -> Plan:
     """Upright on both feet, arms a little away from the body, with the small unrest of a living person."""
     n, ankle = len(times), person.sizes["ankle"]
-    angles = {name: _unrest(rng, times, 0.003) for name in NAMES
-              if not name.endswith(("pelvis", "thigh", "shank", "foot", "toes"))}  # fmt: skip
+    angles = {
+        name: _unrest(rng, times, 0.003)
+        for name in NAMES
+        if not name.endswith(("pelvis", "thigh", "shank", "foot", "toes"))
+    }
     for side, sign in SIDES.items():
         angles[f"{side}_upper_arm"] += [-0.06, sign * 0.17, 0]
         angles[f"{side}_forearm"] += [-0.2, 0, 0]
@@ -92,11 +110,20 @@ def _stand(rng: np.random.Generator, person: Person, times: NDArray, width: floa
         feet[side] = np.tile([np.pi / 2 + out, 0.0, 0.0], (n, 1))
         ahead = 0.22 * person.sizes["foot"]
         centres[side] = np.tile(place[:2] + ahead * np.array([-np.sin(out), np.cos(out)]), (n, 1))
-    return Plan(times, angles, pelvis, ankles, feet, {side: np.zeros(n) for side in SIDES}, 0.5 + 3 * _unrest(rng, times, 0.008, 1)[:, 0],
-                centres, 2 * _unrest(rng, times, 0.002, 2))  # fmt: skip
+    return Plan(
+        times,
+        angles,
+        pelvis,
+        ankles,
+        feet,
+        {side: np.zeros(n) for side in SIDES},
+        0.5 + 3 * _unrest(rng, times, 0.008, 1)[:, 0],
+        centres,
+        2 * _unrest(rng, times, 0.002, 2),
+    )
 
 
-def _unrest(rng: np.random.Generator, times: NDArray, size: float, columns: int = 3) -> NDArray:
+def _unrest(rng: np.random.Generator, times: Array, size: float, columns: int = 3) -> Array:
     """Smooth random drifts of about 0.15 to 1 Hz; none at the ends. Shape (n, columns)."""
     knots = np.linspace(times[0], times[-1], max(4, int(2.2 * (times[-1] - times[0]))))
     return ease(times, knots, _ends(rng.normal(0, size, (len(knots), columns))))

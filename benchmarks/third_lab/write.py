@@ -1,14 +1,15 @@
 """C3D files through ezc3d, session.toml, and the truth beside the folder."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import ezc3d
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from third_lab.arrays import Array
 from third_lab.faults import Fault
 from third_lab.people import Person
 from third_lab.plates import Plate, find_corners, split_kistler
@@ -18,8 +19,16 @@ UP_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # world (z up) to a labor
 UP_Z = np.eye(3)
 AMTI = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 KISTLER = ("fx12", "fx34", "fy14", "fy23", "fz1", "fz2", "fz3", "fz4")
-KINDS = {"pelvis": "pelvis", "thigh": "thigh", "shank": "shank", "foot": "foot", "toes": "foot", "upper_arm": "upper_arm",
-         "forearm": "forearm_hand", "hand": "forearm_hand"}  # fmt: skip
+KINDS = {
+    "pelvis": "pelvis",
+    "thigh": "thigh",
+    "shank": "shank",
+    "foot": "foot",
+    "toes": "foot",
+    "upper_arm": "upper_arm",
+    "forearm": "forearm_hand",
+    "hand": "forearm_hand",
+}
 
 
 @dataclass(frozen=True)
@@ -27,7 +36,7 @@ class Room:
     """A laboratory: make of its plates, axes, rates (Hz), noise of its cameras (m), gaps a marker and marker set."""
 
     make: str
-    axes: NDArray
+    axes: Array
     up: str
     camera_rate: float
     analog_rate: float
@@ -37,7 +46,7 @@ class Room:
 
 
 def write_c3d(
-    path: Path, room: Room, markers: dict[str, NDArray], plates: tuple[Plate, Plate], wrenches: tuple[NDArray, NDArray]
+    path: Path, room: Room, markers: dict[str, Array], plates: Sequence[Plate], wrenches: Sequence[Array]
 ) -> None:
     """Write one trial.
 
@@ -47,9 +56,9 @@ def write_c3d(
     room : Room
     markers : dict of str to array, shape (n, 3)
         By label, world, m; nan where unseen.
-    plates : tuple of Plate
+    plates : sequence of Plate
         Only what was surveyed of them is written.
-    wrenches : tuple of array, shape (n * analog_rate / camera_rate, 6)
+    wrenches : sequence of array, shape (n * analog_rate / camera_rate, 6)
         Six components of each plate, N and N·m.
     """
     c3d = ezc3d.c3d()
@@ -79,9 +88,11 @@ def write_c3d(
     c3d.add_parameter("FORCE_PLATFORM", "CORNERS", corners)
     c3d.add_parameter("FORCE_PLATFORM", "ORIGIN", np.stack([1e3 * plate.deep for plate in plates], axis=1))
     for name, numbers in {
-        "USED": [2], "TYPE": [3 if room.make == "kistler" else 2] * 2, "ZERO": [1, 0],
+        "USED": [2],
+        "TYPE": [3 if room.make == "kistler" else 2] * 2,
+        "ZERO": [1, 0],
         "CHANNEL": np.arange(1.0, 2 * per + 1).reshape(2, per).T,
-    }.items():  # fmt: skip
+    }.items():
         c3d.add_parameter("FORCE_PLATFORM", name, numbers)
         c3d["parameters"]["FORCE_PLATFORM"][name]["type"] = ezc3d.ezc3d.INT
     c3d.write(str(path))
@@ -94,7 +105,7 @@ def write_session_file(folder: Path, person: Person, declared: float) -> None:
 
 
 def write_truth(
-    path: Path, person: Person, loaded: Person, room: Room, plates: tuple[Plate, Plate], fault: Fault, **more: object
+    path: Path, person: Person, loaded: Person, room: Room, plates: Sequence[Plate], fault: Fault, **more: object
 ) -> None:
     """Write what is true: person, lumps, room, plates, fault; SI, segment frames in upright standing."""
 
@@ -108,15 +119,26 @@ def write_truth(
         )
 
     truth = {
-        "mass_kg": person.mass, "height_m": person.height, "sex": person.sex,
+        "mass_kg": person.mass,
+        "height_m": person.height,
+        "sex": person.sex,
         "segments": {
-            name: {"mass_kg": person.masses[name], "com_m": person.coms[name], "inertia_kgm2": person.inertias[name],
-                   "parent": PARENTS[name], "joint_in_parent_m": person.offsets[name]}
+            name: {
+                "mass_kg": person.masses[name],
+                "com_m": person.coms[name],
+                "inertia_kgm2": person.inertias[name],
+                "parent": PARENTS[name],
+                "joint_in_parent_m": person.offsets[name],
+            }
             for name in NAMES
         },
-        "lumps": lump(person), "lumps_as_recorded": lump(loaded), "room": asdict(room), "plates": [asdict(plate) for plate in plates],
-        "fault": asdict(fault), **more,
-    }  # fmt: skip
+        "lumps": lump(person),
+        "lumps_as_recorded": lump(loaded),
+        "room": asdict(room),
+        "plates": [asdict(plate) for plate in plates],
+        "fault": asdict(fault),
+        **more,
+    }
     path.write_text(json.dumps(truth, default=plain, indent=1))
 
 
@@ -135,7 +157,7 @@ def lump(person: Person) -> dict[str, dict[str, object]]:
         if parent:
             places[name] = places[parent] + person.offsets[name]
     sums: dict[str, pin.Inertia] = {}
-    origins: dict[str, NDArray] = {}
+    origins: dict[str, Array] = {}
     for name in NAMES:
         side, _, rest = name.partition("_")
         kind = KINDS.get(rest if side in SIDES else name, "trunk_head")
