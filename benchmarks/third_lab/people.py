@@ -200,14 +200,17 @@ def _draw_distribution(
 
 
 def _solid(kind: str, sign: int, offsets: dict[str, Array], sizes: dict[str, float]) -> tuple[Array, Array]:
-    """Return centre and half axes (m) of the ellipsoid that stands for a segment of the trunk, a hand or a foot."""
+    """Return centre and half axes (m) of the ellipsoid that stands for a segment of the trunk, a hand or a foot.
+
+    Centres of pelvis and trunk as in Dumas et al. 2007: 0.6 to 0.7 of the pelvis' height, 0.58 of the trunk's.
+    """
     wide, deep, foot = sizes["breadth"], sizes["depth"], sizes["foot"]
     up = {name: float(offsets[name][2]) for name in ("lumbar", "waist", "thorax", "neck")}
     solids = {
-        "pelvis": ((-0.01, 0, 0.30 * up["lumbar"]), (deep, wide, 0.5 * up["lumbar"] + 0.05)),
+        "pelvis": ((-0.01, 0, 0.58 * up["lumbar"]), (deep, wide, 0.5 * up["lumbar"] + 0.05)),
         "lumbar": ((0.025, 0, 0.5 * up["waist"]), (0.95 * deep, 0.9 * wide, 0.75 * up["waist"])),
         "waist": ((0.022, 0, 0.5 * up["thorax"]), (0.95 * deep, 0.9 * wide, 0.75 * up["thorax"])),
-        "thorax": ((0.015, 0, 0.45 * up["neck"]), (deep, 0.95 * wide, 0.62 * up["neck"])),
+        "thorax": ((0.015, 0, 0.52 * up["neck"]), (deep, 0.95 * wide, 0.62 * up["neck"])),
         "neck": ((0.005, 0, 0.5 * sizes["neck"]), (0.055, 0.055, 0.8 * sizes["neck"])),
         "head": ((0.018, 0, 0.42 * sizes["head"]), (0.095, 0.075, 0.62 * sizes["head"])),
         "clavicle": ((-0.045, sign * 0.55 * sizes["shoulder"], -0.02), (0.045, 0.09, 0.05)),

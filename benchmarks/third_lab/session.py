@@ -17,7 +17,7 @@ from third_lab.skeleton import add_mass
 from third_lab.tissue import Tissue, draw_tissue, slide_skin
 from third_lab.trials import DANCES, plan_trial
 from third_lab.weigh import weigh_trial
-from third_lab.write import UP_Y, UP_Z, Room, write_c3d, write_session_file, write_truth
+from third_lab.write import UP_Y, UP_Z, Room, stand_true, write_c3d, write_session_file, write_truth
 
 TRIALS = (
     ("static01", "stand"),
@@ -77,6 +77,7 @@ def make_session(
     loaded = _load(person, fault)
     leaning = fault.size * np.eye(3)["xyz".index(fault.axis)] if fault.kind == "lab_tilt" else np.zeros(3)
     tilt = Rotation.from_rotvec(leaning).as_matrix()
+    standing: dict[str, object] = {}
     for number, (name, movement) in enumerate(TRIALS):
         if only and name not in only:
             continue
@@ -88,17 +89,14 @@ def make_session(
         wrenches = weigh_trial(own, loaded, tissue, path, plan, room, fault, name)
         read = [measure(own, plate, *wrench, room.analog_rate) for plate, wrench in zip(spoiled, wrenches, strict=True)]
         labels = _exchange(name_markers(room.marker_set), fault, name)
-        write_c3d(
-            folder / f"{name}.c3d",
-            room,
-            {label: markers[place] @ tilt.T for place, label in labels.items()},
-            plates,
-            read,
-        )
+        seen = {label: markers[place] @ tilt.T for place, label in labels.items()}
+        write_c3d(folder / f"{name}.c3d", room, seen, plates, read)
+        if name == "static01":
+            standing = stand_true(loaded, path, plan.times, seen)
     write_session_file(folder, person, person.mass + (fault.size if fault.kind == "wrong_mass" else 0.0))
     markers_m = {label: where[place] for place, label in name_markers(room.marker_set).items()}
     beside = folder.with_name(folder.name + ".truth.json")
-    more = {"seed": seed, "tissue_hz": tissue.frequency, "markers_m": markers_m}
+    more = {"seed": seed, "tissue_hz": tissue.frequency, "static": standing, "markers_m": markers_m}
     write_truth(beside, person, loaded, room, spoiled, fault, **more)
     return fault
 

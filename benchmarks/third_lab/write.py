@@ -8,12 +8,13 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import BSpline
 
 from third_lab.arrays import Array
 from third_lab.faults import Fault
 from third_lab.people import Person
 from third_lab.plates import Plate, find_corners, split_kistler
-from third_lab.skeleton import NAMES, PARENTS, SIDES
+from third_lab.skeleton import NAMES, PARENTS, SIDES, pose_segments
 
 UP_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # world (z up) to a laboratory with y up
 UP_Z = np.eye(3)
@@ -159,9 +160,7 @@ def lump(person: Person) -> dict[str, dict[str, object]]:
     sums: dict[str, pin.Inertia] = {}
     origins: dict[str, Array] = {}
     for name in NAMES:
-        side, _, rest = name.partition("_")
-        kind = KINDS.get(rest if side in SIDES else name, "trunk_head")
-        key = kind if kind in ("pelvis", "trunk_head") else f"{side}_{kind}"
+        key = lump_of(name)
         origins.setdefault(key, places[name])
         part = pin.Inertia(person.masses[name], places[name] + person.coms[name] - origins[key], person.inertias[name])
         sums[key] = sums[key] + part if key in sums else part
@@ -184,4 +183,45 @@ def lump(person: Person) -> dict[str, dict[str, object]]:
             "distal_m": distal[key] - origins[key],
         }
         for key, total in sums.items()
+    }
+
+
+def lump_of(name: str) -> str:
+    """Name of the coarser segment that a segment belongs to."""
+    side, _, rest = name.partition("_")
+    kind = KINDS.get(rest if side in SIDES else name, "trunk_head")
+    return kind if kind in ("pelvis", "trunk_head") else f"{side}_{kind}"
+
+
+def stand_true(person: Person, path: BSpline, times: Array, seen: dict[str, Array]) -> dict[str, object]:
+    """Say where things are in the static trial, means over time, world, m.
+
+    Parameters
+    ----------
+    person : Person
+    path : BSpline
+    times : array, shape (n,)
+        s.
+    seen : dict of str to array, shape (n, 3)
+        Markers by label, without the cameras' noise or with it.
+
+    Returns
+    -------
+    standing : dict
+        markers_m; com_m and joint_m of the lumps (of the pelvis the middle of the hips, of trunk_head the lowest spinal
+        joint).
+    """
+    rotations, places = pose_segments(person, path(times))
+    com: dict[str, Array] = {}
+    weight: dict[str, float] = {}
+    joint: dict[str, Array] = {}
+    for name in NAMES:
+        key, mass = lump_of(name), person.masses[name]
+        joint.setdefault(key, places[name].mean(axis=0))
+        com[key] = com.get(key, 0.0) + mass * (places[name] + rotations[name] @ person.coms[name]).mean(axis=0)
+        weight[key] = weight.get(key, 0.0) + mass
+    return {
+        "markers_m": {label: np.nanmean(places, axis=0) for label, places in seen.items()},
+        "com_m": {key: value / weight[key] for key, value in com.items()},
+        "joint_m": joint,
     }
