@@ -100,9 +100,7 @@ def truth(body: Body, static: Motion, true: Row, turn: Array, shift: Array) -> t
         lab = turn @ standing["com_m"][name] + shift
         joint = pose.position[:, i] if i == 0 else turn @ standing["joint_m"][name] + shift
         com[i], own[i] = (
-            np.einsum("tji,tj->ti", pose.rotation[:, i], np.broadcast_to(lab - origin, pose.position[:, i].shape)).mean(
-                0
-            )
+            np.einsum("tji,tj->ti", pose.rotation[:, i], lab - origin + np.zeros_like(pose.position[:, i])).mean(axis=0)
             for origin in (pose.position[:, i], joint)
         )
     return mass, com, own

@@ -45,7 +45,7 @@ def expected(true: Row, turn: Array) -> tuple[dict[str, float | None], set[str]]
         "plate_gain": ({f"plate_gain {target}:Fz": size}, set()),
         "force_delay": ({"time_delay": size}, set()),
         "knee_moved": ({f"marker_misplaced {knee}": abs(size)}, set()),
-        "knee_misplaced": ({f"joint_centre {side}_knee": None}, {f"joint_centre {side}_hip", f"segment_length {side}_thigh"}),
+        "knee_misplaced": ({f"joint_centre {side}_knee": None}, {f"segment_length {side}_thigh"}),
         "labels_exchanged": ({f"labels_swapped {wrist}": None}, set()),
         "wrong_mass": ({"body_mass": -size}, set()),
         "force_filter": ({"filter_mismatch": size}, set()),
@@ -64,7 +64,7 @@ def answer(found: Any, true: Row, turn: Array) -> Row:
         aliases = {f"{alias.effect} {alias.target}".strip() for alias in finding.set}
         in_set = in_set or bool(aliases & set(right))
         if right.get(name) is not None and finding.parameters:
-            value, sd = _size(finding, right[name])
+            value, sd = _size(finding)
             sizes.append((name, value, sd, right[name], bool(abs(value - right[name]) < 1.96 * sd)))
     named = [name for name, _ in findings]
     head = next((said.text for said in one.attention if said.about == "diagnosis"), one.told)
@@ -85,8 +85,8 @@ def answer(found: Any, true: Row, turn: Array) -> Row:
     }
 
 
-def _size(finding: Any, wanted: float) -> tuple[float, float]:
-    """Return size and standard deviation of a finding; of a vector its length, as long as the wanted one is a length."""
+def _size(finding: Any) -> tuple[float, float]:
+    """Return size and standard deviation of a finding; of a vector its length."""
     parts = [one for one in finding.parameters if one.name.startswith(finding.parameters[0].name.split("_")[0])]
     if len(parts) == 1:
         value, sd = parts[0].value, parts[0].sd
@@ -109,17 +109,20 @@ def diagnosis_table(rows: list[Row]) -> list[str]:
     def alarm(one: Row) -> bool:
         return bool(not one["named"] and one["verdict"] != "nothing wrong" and not one["cannot_tell"])
 
+    def unsure(one: Row) -> bool:
+        return bool(one["cannot_tell"] and not one["named"])
+
     lines = [
         "| | sessions |",
         "|---|---|",
         f"| without fault: a false name | {count(clean, lambda one: one['named'])} |",
         f"| ... an alarm without a name | {count(clean, alarm)} |",
-        f'| ... "cannot tell", with its reason | {count(clean, lambda one: one["cannot_tell"] and not one["named"])} |',
+        f'| ... "cannot tell", with its reason | {count(clean, unsure)} |',
         f'| with a fault: not "nothing wrong" | {count(faulty, lambda one: one["verdict"] != "nothing wrong")} |',
         f"| ... named, first or in a set | {count(faulty, lambda one: one['in_set'])} |",
-        f"| ... named exactly, and nothing false beside | {count(faulty, lambda one: one['exact'] and not one['false'])} |",
+        f"| ... exactly, and nothing else | {count(faulty, lambda one: one['exact'] and not one['false'])} |",
         f"| ... an innocent named | {count(faulty, lambda one: one['false'])} |",
-        f'| ... "cannot tell" | {count(faulty, lambda one: one["cannot_tell"] and not one["named"])} |',
+        f'| ... "cannot tell" | {count(faulty, unsure)} |',
         f"| 95 % interval of the size holds the truth | {sum(size[4] for size in sizes)} of {len(sizes)} |",
         "",
         "| seed, fault | room | verdict | named (false ones marked) | size, truth | worst of what is left |",
