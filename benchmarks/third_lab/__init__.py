@@ -1,0 +1,24 @@
+"""A third gait laboratory: people, movements, plates and cameras that share no line with what they test.
+
+A clean room. Whoever wrote it had not read the package that it tests, nor the other laboratories: person, mechanics,
+soft tissue, plates and files come from published studies, pinocchio and ezc3d. One command makes a session with its
+truth beside it, the same for the same seed:
+
+    PYTHONPATH=benchmarks python -m third_lab OUT --seed 3 [--fault plate_place] [--set pig|isb|cgm2]
+
+OUT is a session folder (static, stand, six dances, two squats), OUT.truth.json
+holds what is true: masses, centres of mass and inertia per segment, and lumped to the seven kinds of segments that a
+coarser body has; the laboratory; the fault and its size. `third_lab.make_session` does the same from Python.
+
+What is unlike usual practice: 22 segments with a spine of three joints, clavicles and toes; a pelvis that has 11 to
+20 % of the body by person; knees that screw home; masses drawn between five studies; soft tissue that wobbles and sags;
+skin that follows joint angles and rings; balance by the zero-moment point; C3D by ezc3d, lab frames with y or z up.
+
+Frames: the world of this laboratory is z up, x along the walkway, SI. A segment's frame lies at its proximal joint,
+with the axes of upright standing: x ahead, y left, z up.
+"""
+
+from third_lab.faults import FAULTS, Fault
+from third_lab.session import make_session
+
+__all__ = ["FAULTS", "Fault", "make_session"]
