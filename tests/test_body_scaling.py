@@ -151,7 +151,7 @@ def test_one_lateral_marker_places_the_axis_of_an_elbow_however_the_arm_is_bent(
     outward, down = np.array([0.0, -side, 0.0]), np.array([0.0, 0.0, -1.0])
     for turned, bend, most in ((0, 0, 1), (0, 15, 1), (0, 90, 1), (20, 0, 21), (20, 30, 12), (20, 90, 4)):
         axis = Rotation.from_rotvec([0, 0, side * np.radians(turned)]).apply(outward)
-        forearm = Rotation.from_rotvec(-side * np.radians(bend) * axis).apply(down)
+        forearm = Rotation.from_rotvec(side * np.radians(bend) * axis).apply(down)
         assert bend == 0 or forearm[0] > 0, "the hand comes forward"
         centre, sd = lateral_elbow(-0.3 * down, 0.045 * axis, 0.25 * forearm, 0.045, outward)
         found = unit(0.045 * axis - centre)

@@ -72,7 +72,8 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
     middle = (hips["right"] + hips["left"]) / 2
     shoulders = shoulder_centres(mark, sizes, middle)
     place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
-    right, axis_sd, lateral, across, sole = {}, {}, {}, {}, {}
+    right, lateral, across, sole = {}, {}, {}, {}
+    axis_sd: dict[str, float] = {}
     notes: list[str] = []
     for side, sign in SIGN.items():
         knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
