@@ -53,6 +53,15 @@ def card(title: str, table: "pd.DataFrame | None" = None, notes: Iterable[str] =
     return "".join([*parts, *(f"<p>{escape(note)}</p>" for note in notes)])
 
 
+SHOWN_UNITS = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
+"""Unit of a parameter: factor, unit and digits that are shown."""
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Return by what a number in ``unit`` is multiplied to be shown, and the unit that people say it in: mm for m."""
+    return SHOWN_UNITS.get(unit, (1.0, unit, 2))[:2]
+
+
 def digits(value: float, count: int) -> str:
     """Return a number with so many digits that say something, without an exponent where people write none: ``20`` for
     2e+01.

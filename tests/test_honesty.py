@@ -19,7 +19,8 @@ from biodance.diagnosis.naming import built, held, needed, settle, stands
 from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Gate, effects
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.attention import EXPLAINS, headline, is_well, session_attention, told
+from biodance.pipeline.attention import headline, is_well, session_attention, told
+from biodance.pipeline.finding_words import EXPLAINS
 from biodance.pipeline.trial_result import Check
 from biodance.records import Motion, Wrench
 from biodance.records.attention import Attention, Judged, strongest_first

@@ -106,7 +106,7 @@ def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> N
     ):
         first = told(one, replace(FULL, checks=()), (STATIC,)).attention[0]
         assert (first.level, first.text[: len(begins)]) == (level, begins)
-        assert "It resembles plate gain Fz (gain 0.06 ± 0.002), which is not enough." in first.text
+        assert "It resembles plate gain Fz (gain 6 ± 0.2 %), which is not enough." in first.text
 
 
 @pytest.mark.parametrize(("verdict", "code"), [(WHOLE, DONE), (VERDICTS[1], NEEDS_A_PERSON), (None, DONE)])

@@ -83,7 +83,11 @@ def test_a_load_is_drawn_where_it_sits(result):
         result.body.segment_index("left_forearm_hand"),
     )
     np.testing.assert_allclose(still.load, pose.points([segment], place[None])[0, 0], atol=1e-12)
-    assert still.about == "The load that was found: 2.00 kg ± 0.10 kg on the left forearm hand (yellow)."
+    low, high = best.interval
+    assert still.about == (
+        "The load that was found (yellow): 2.00 kg on the left forearm hand "
+        f"(95 % interval {low:.2f} to {high:.2f} kg; probability of no load below 0.001)."
+    )
     unplaced = replace(best, place=np.full(3, np.nan))
     assert load_still(result.body, result.trials, replace(search, suspects=(unplaced, *search.suspects[1:]))) is None
 

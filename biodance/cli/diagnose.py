@@ -85,6 +85,7 @@ def diagnose_command(
     from biodance.pipeline.attention import is_well
     from biodance.pipeline.carry import read_lab, write_mended
     from biodance.pipeline.front_movement import describe_movement
+    from biodance.pipeline.load import with_weighed_load
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 
@@ -95,6 +96,7 @@ def diagnose_command(
         if found.mended is not None:
             write_mended(result.session, found.mended.session, folder)
             result = found.mended
+        result = with_weighed_load(result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tabled(result, place, found.diagnosis, movement=moved)

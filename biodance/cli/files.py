@@ -159,7 +159,7 @@ def export_command(
         Parameter(help="osim, urdf, mjcf, biomod, glb, csv; of one trial trc, mot, c3d, rerun; folders opensim, bids."),
     ],
     out: Annotated[Path, Parameter(help="The file to write.")],
-    trial: Annotated[str | None, Parameter(help="Name of the trial for trc, mot and c3d.")] = None,
+    trial: Annotated[str | None, Parameter(help="Name of the trial, for formats of recordings.")] = None,
     subject: SubjectOption = None,
     meshes: Annotated[
         Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")

@@ -41,17 +41,20 @@ class Alias:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter of a cause: ``value`` with its standard deviation ``sd`` in ``unit``."""
+    """One parameter of a cause: ``value`` with its standard deviation ``sd`` in ``unit``; ``skewed`` its 95 % interval
+    where that is not 1.96 standard deviations to either side.
+    """
 
     name: str
     value: float
     sd: float
     unit: str
+    skewed: tuple[float, float] | None = None
 
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval."""
-        return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
+        return self.skewed or (self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd)
 
 
 @dataclass(frozen=True, eq=False)

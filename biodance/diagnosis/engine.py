@@ -34,7 +34,7 @@ from biodance.diagnosis.problem import Look, Problem, problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
-from biodance.records import Plate, Sip
+from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
@@ -154,11 +154,10 @@ def judged(examined: Examined) -> Examined:
     """
     naming, one = examined.naming, examined.diagnosis
     left, put, known = adequacy(naming.found), naming.found.problem, naming.found.tolerances
-    plates = put.cases[0].trial.plates
     named = tuple(_measured(cause, naming.found) for cause in naming.found.named)
     hung = {names: one.over for names, one in hanging(naming.found).items()}
     every = [
-        (cause, replace(_finding(cause, r, known, plates), hangs_on=hung.get(named_of(cause), "")))
+        (cause, replace(_finding(cause, r, known, put.cases[0]), hangs_on=hung.get(named_of(cause), "")))
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
     large = [pair for pair in every if _counts(naming.found, *pair)]
@@ -263,7 +262,7 @@ def _measured(one: NamedCause, found: Model) -> NamedCause:
     return replace(one, theta=theta, covariance=covariance)
 
 
-def _finding(one: NamedCause, found: Round, known: Tolerances, plates: tuple[Plate, ...]) -> Finding:
+def _finding(one: NamedCause, found: Round, known: Tolerances, case: Case) -> Finding:
     """Return a named cause as a finding; no size is surer than sessions without fault are alike, nor than faults are
     like their models.
     """
@@ -271,7 +270,7 @@ def _finding(one: NamedCause, found: Round, known: Tolerances, plates: tuple[Pla
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
-    reported = one.effect.reported(one.theta, sd)
+    reported = one.effect.reported(one.theta + one.effect.origin(case), sd)
     parameters = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
-    advice = f"{one.effect.advice} {in_plate_axes(one.effect.target, plates)}".strip()
+    advice = f"{one.effect.advice} {in_plate_axes(one.effect.target, case.trial.plates)}".strip()
     return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=advice)

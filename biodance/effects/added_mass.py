@@ -18,8 +18,8 @@ _BESIDE = 0.2
 
 
 class AddedMass(Effect):
-    """A point ``mass`` (kg) at ``place`` (x, y, z: m from the CoM of the segment in the table, segment axes) on
-    segment ``target``.
+    """A point ``mass`` (kg) at ``place`` (x, y, z: m from the CoM of the segment in the table, segment axes; a
+    report counts it from the segment's proximal joint) on segment ``target``.
     """
 
     name = "added_mass"
@@ -29,8 +29,8 @@ class AddedMass(Effect):
     )
     separated_by = "Move the loaded segment alone, the rest standing still; repeat the session without the load."
     advice = (
-        "Weigh the load; its size is surest beside a reference session without it. Its place counts from where the "
-        "table has the segment's centre of mass (x forward, y up, z right)."
+        "Weigh the load; its size is surest beside a reference session without it. Its place counts from the segment's "
+        "proximal joint centre (x forward, y up, z right)."
     )
 
     @classmethod
@@ -44,10 +44,14 @@ class AddedMass(Effect):
 
     def added(self, case: Case, theta: Array) -> Array:
         """Return (T, 6) the wrench that the load needs."""
+        load = point_mass(theta[0], self.origin(case)[1:] + np.asarray(theta[1:4]))
+        return case.needed_by(load, case.body.segment_index(self.target))
+
+    def origin(self, case: Case) -> Array:
+        """Return (4,) no mass, and the CoM that its place is counted from, in the segment's joint frame."""
         index = case.body.segment_index(self.target)
-        table = case.phi[10 * index : 10 * index + 10]
-        load = point_mass(theta[0], table[1:4] / table[0] + np.asarray(theta[1:4]))
-        return case.needed_by(load, index)
+        table = case.phi[10 * index : 10 * index + 4]
+        return np.append(0.0, table[1:] / table[0])
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: a load weighs something."""
@@ -56,7 +60,7 @@ class AddedMass(Effect):
     def possible_in(self, case: Case, theta: Array) -> bool:
         """Return whether the load weighs something and lies at the segment, `_BESIDE` outside its box at most."""
         index = case.body.segment_index(self.target)
-        place = case.phi[10 * index + 1 : 10 * index + 4] / case.phi[10 * index] + np.asarray(theta[1:4])
+        place = self.origin(case)[1:] + np.asarray(theta[1:4])
         low, high = case.body.boxes[index]
         return self.possible(theta) and bool(np.all((place > low - _BESIDE) & (place < high + _BESIDE)))
 

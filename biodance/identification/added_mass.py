@@ -70,13 +70,15 @@ class LoadCandidate:
 @dataclass(frozen=True, eq=False)
 class LoadSearch:
     """All hypotheses, most probable first; ``p_no_load`` probability that nothing was added; ``reference`` in words;
-    ``doubts`` why no load may be stated from this session whatever its data say, () if it may.
+    ``doubts`` why no load may be stated from this session whatever its data say, () if it may; ``lies_on`` the segment
+    on which the place of the most probable one lies, "" where nobody looked (`nearest_segment`).
     """
 
     suspects: tuple[LoadCandidate, ...]
     p_no_load: float
     reference: str
     doubts: tuple[str, ...] = ()
+    lies_on: str = ""
 
     @property
     def status(self) -> LoadStatus:
@@ -106,6 +108,11 @@ class LoadSearch:
         """Segments, most probable first, that hold 95 % of the probability of a load."""
         share = np.cumsum([s.probability for s in self.suspects]) / sum(s.probability for s in self.suspects)
         return tuple(s.segment for s in self.suspects[: int(np.searchsorted(share, 0.95)) + 1])
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Segments that may carry the load: the `set`, and the one on which the load's place lies, if it is another."""
+        return self.set if self.lies_on in ("", *self.set) else (*self.set, self.lies_on)
 
 
 @one_thread()

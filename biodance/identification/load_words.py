@@ -13,17 +13,40 @@ def say_load(search: LoadSearch) -> str:
 
 
 def _found(search: LoadSearch) -> str:
-    x, y, z = (f"{1000 * value:.0f}" for value in search.best.place)
-    also = (
-        f" It may also sit on: {', '.join(map(_words, search.set[1:]))}. They are known together, not apart: what "
-        f"the plates measured fits a load on each."
-        if search.set[1:]
-        else ""
-    )
+    best = search.best
+    x, y, z = (f"{1000 * value:.0f}" for value in best.place)
+    several = len(search.segments) > 1
+    if_there = f" if it is on the {_words(best.segment)}" if several else ""
+    other = f" (there the {_words(search.lies_on)} is nearer)" if search.lies_on not in ("", best.segment) else ""
+    apart = " The segments are known together, not apart: what the plates measured fits a load on each." * several
     return (
-        f"Beyond {search.reference} the subject carries {_size(search)}; its centre is {x}, {y}, {z} mm "
-        f"from the segment's proximal joint centre, along its x (forward), y (up) and z (right).{also}"
+        f"Beyond {search.reference} the subject carries {size_and_segments(search)}. Its centre{if_there} is {x}, "
+        f"{y}, {z} mm from that segment's proximal joint centre, along its x (forward), y (up) and z "
+        f"(right){other}.{apart}"
     )
+
+
+def size_and_segments(search: LoadSearch) -> str:
+    """Return how heavy the load is, which segments may carry it and how sure that is, the same words wherever it is
+    told.
+    """
+    low, high = search.best.interval
+    none = f"{search.p_no_load:.3f}" if search.p_no_load >= 0.001 else "below 0.001"
+    return (
+        f"{search.best.mass:.2f} kg on the {_segments(search)} (95 % interval {low:.2f} to {high:.2f} kg; probability "
+        f"of no load {none})"
+    )
+
+
+def _segments(search: LoadSearch) -> str:
+    """Return the segments that may carry the load, most probable first; beyond three the others are counted."""
+    first, *others = map(_words, search.segments)
+    if not others:
+        return first
+    if len(others) > 2:
+        others = [*others[:2], f"one of {len(others) - 2} more"]
+    share = search.best.probability / max(1.0 - search.p_no_load, search.best.probability)
+    return " or ".join([", ".join([f"{first} ({100 * share:.0f} % probable)", *others[:-1]]), others[-1]])
 
 
 def _none(search: LoadSearch) -> str:
@@ -40,16 +63,8 @@ def _unclear(search: LoadSearch) -> str:
     advice = "" if search.reference != "the table" else f" {_ADVICE}"
     return (
         f"Whether the subject carries a load beyond {search.reference} cannot be told. If so, it would be "
-        f"{_size(search)}; this session finds {search.best.smallest:.1f} kg there in half of the cases.{advice}"
-    )
-
-
-def _size(search: LoadSearch) -> str:
-    best, none = search.best, search.p_no_load
-    low, high = best.interval
-    return (
-        f"{best.mass:.2f} kg on the {_words(best.segment)} (95 % interval {low:.2f} to {high:.2f} kg; probability of "
-        f"no load {f'{none:.3f}' if none >= 0.001 else 'below 0.001'})"
+        f"{size_and_segments(search)}; this session finds {search.best.smallest:.1f} kg there in half of the "
+        f"cases.{advice}"
     )
 
 

@@ -10,8 +10,8 @@ from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
 from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.spectrum import SHORTEST_RUN
-from biodance.display import digits
-from biodance.identification.added_mass import LoadSearch
+from biodance.identification.load_words import size_and_segments
+from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or_else
 from biodance.pipeline.looked_at import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
@@ -26,25 +26,6 @@ _EMPTY = "empty_plate"
 _WEIGHED = "kg are declared: check the mass"
 """What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
 _ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
-EXPLAINS: dict[str, tuple[str, ...]] = {
-    "mass on the plates": (
-        "plate_gain", "plate_offset", "body_mass", "added_mass", "body_weight_support", "external_contact",
-        "sloshing_load", "unit_error", "clipping",
-    ),
-    "centre of mass off the centre of pressure": (
-        "plate_position", "plate_rotation", "plate_crosstalk", "plate_offset", "lab_tilt", "marker_misplaced",
-        "labels_swapped", "joint_centre",
-    ),
-    "marker distance": (
-        "labels_swapped", "marker_misplaced", "segment_length", "joint_centre", "trunk_joint", "head_joint",
-        "shoulder_girdle", "frame_rate", "unit_error",
-    ),
-    "force difference": (
-        "plate_gain", "plate_offset", "plate_drift", "plate_rotation", "plate_crosstalk", "time_delay", "clock_drift",
-        "filter_mismatch", "axis_error", "unit_error", "clipping", "added_mass", "body_mass", "external_contact",
-    ),
-}  # fmt: skip
-"""Causes that a check outside its limit may come from, by the beginning of the check's name."""
 
 
 def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
@@ -88,14 +69,15 @@ def amount(result: SessionResult, judged: tuple[Judged, ...]) -> str:
         rows = [row for row in judged if (row.trial in static) is quiet and row.seconds > 0]
         total = sum(row.seconds for row in rows)
         if rows:
-            parts.append(f"{total:.{0 if total >= 9.5 else 1}f} s of {what} ({_listed([row.trial for row in rows])})")
+            parts.append(f"{total:.{0 if total >= 9.5 else 1}f} s of {what} ({listed([row.trial for row in rows])})")
     return " and ".join(parts)
 
 
 def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> Attention:
     """Return the one sentence that says the verdict, what it rests on, and what it does not know."""
-    beside = _beside(judged, outside)
-    names = " and ".join(in_words(finding) for finding in one.findings)
+    its_own = tuple(check for check in outside if cause_of(check.what, one.findings))
+    beside = _beside(judged, tuple(check for check in outside if check not in its_own))
+    names = " and ".join(f"{in_words(finding)}{or_else(finding)}" for finding in one.findings)
     like = f" It resembles {' and '.join(map(in_words, one.resembles))}, which is not enough." if one.resembles else ""
     level: Level = "fail"
     if one.findings:
@@ -104,7 +86,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
             "named, complete": f"{rest or 'With it accepted, '}nothing more is wrong.",
             "named, incomplete": _incomplete(one, rests_on),
         }.get(one.verdict, "")
-        text = f"Found: {names}. {_checks(one)}{more}{_sentence(beside)}"
+        text = f"Found: {names}. {_checks(one)}{more}{_explained(its_own)}{_sentence(beside)}"
     elif one.verdict == "nothing wrong":
         level = "warn" if beside else "note"
         text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
@@ -139,22 +121,7 @@ def _checks(one: Diagnosis) -> str:
 
 def _doubtful(doubts: Sequence[str]) -> str:
     """Return what is doubtful of a body, without advice."""
-    return _listed([_short(text.removeprefix("Warning: ").partition(": check")[0]) for text in doubts])
-
-
-def in_words(finding: Finding) -> str:
-    """Return a cause with its place and size: ``plate gain Fz (gain 0.06 ± 0.002)``; a size less than two standard
-    deviations from none is not known.
-    """
-    name = f"{finding.effect} {finding.target}".replace("_", " ").replace("->", " into ").strip()
-    sizes = [
-        f"{p.name.replace('_', ' ')} {digits(p.value, 2)} ± {digits(p.sd, 1)} {p.unit}".removesuffix(" 1")
-        for p in finding.parameters
-    ]
-    known = [abs(p.value) >= 2 * p.sd for p in finding.parameters if p.sd == p.sd]
-    if not known:
-        return name
-    return f"{name} ({', '.join(sizes)}{'' if any(known) else '; its size is hardly known'})"
+    return listed([_short(text.removeprefix("Warning: ").partition(": check")[0]) for text in doubts])
 
 
 def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
@@ -171,39 +138,27 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [Attention("warn", text.removeprefix("Warning: "), "", "body") for text in result.doubts]
     for trial in result.trials:
         level: Level = "fail" if trial.status == "refused" else "warn"
-        said = [text for text in trial.reasons if not (_WEIGHED in text and _cause_of("mass on the plates", findings))]
+        said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of("mass on the plates", findings))]
         found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
     found += [_checked(check, findings) for check in result.all_checks if not check.inside]
-    load = result.identification.search if result.identification else None
-    return strongest_first([*found, *_load(load)])
+    return strongest_first([*found, *_load(result, findings)])
 
 
 def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
     """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
-    cause = _cause_of(check.what, findings)
+    cause = cause_of(check.what, findings)
     then = f"{cause}, which was found, may explain it." if cause else check.advice
     text = f"{check.value}, should be {check.limit}. {then[:1].upper()}{then[1:]}".strip()
     return Attention("note" if cause else "warn", text, check.where, check.what)
 
 
-def _cause_of(checked: str, findings: Sequence[Finding]) -> str:
-    """Return the first finding that may explain a check of that name, in words; "" for none."""
-    mine = next((causes for what, causes in EXPLAINS.items() if checked.startswith(what)), ())
-    return next((in_words(finding) for finding in findings if finding.effect in mine), "")
-
-
-def _load(search: LoadSearch | None) -> list[Attention]:
-    if search is None or not search.found:
+def _load(result: SessionResult, findings: Sequence[Finding]) -> list[Attention]:
+    """Return the load that was found where no finding names it already."""
+    search = result.identification.search if result.identification else None
+    if search is None or not search.found or any(LOAD in (a.effect for a in one.set) for one in findings):
         return []
-    best = search.best
-    return [
-        Attention(
-            "warn",
-            f"A load of {best.mass:.2f} ± {best.sd:.2f} kg was found on the {best.segment.replace('_', ' ')}, beyond "
-            f"{search.reference}.",
-            about="added_mass",
-        )
-    ]
+    text = f"Beyond {search.reference} the subject carries {size_and_segments(search)}."
+    return [Attention("warn", text, about=LOAD)]
 
 
 def _level(status: str) -> Level:
@@ -217,15 +172,18 @@ def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     for row in judged:
         if row.missed and not row.seconds > 0:
             missed.setdefault(_short(row.why_not).removeprefix(f"Trial {row.trial}: "), []).append(row.trial)
-    parts = [f"; not judged: {_listed(names)}, because: {why}" for why, names in missed.items()]
-    parts += [f"; judged only by steps on plates: {_listed(stepped_only)}"] if stepped_only else []
-    checks = [f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in outside]
-    return "".join(parts) + (f"; outside the limit: {_listed(checks)}" if checks else "")
+    parts = [f"; not judged: {listed(names)}, because: {why}" for why, names in missed.items()]
+    parts += [f"; judged only by steps on plates: {listed(stepped_only)}"] if stepped_only else []
+    return "".join(parts) + (f"; outside the limit: {_named_checks(outside)}" if outside else "")
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Return names as a list in words, the fourth and later ones counted only."""
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+def _explained(checks: tuple[Check, ...]) -> str:
+    """Return the checks outside their limit that a finding may explain as a sentence."""
+    return f" Outside the limit, which this may explain: {_named_checks(checks)}." if checks else ""
+
+
+def _named_checks(checks: tuple[Check, ...]) -> str:
+    return listed([f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in checks])
 
 
 def _short(reason: str) -> str:

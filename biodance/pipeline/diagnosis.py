@@ -24,6 +24,7 @@ from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import told
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
+from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.looked_at import all_looks, cases_of, judged_trials, left_out, looked_at, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
@@ -139,6 +140,8 @@ def diagnose_session(
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
     used = looked_at(result.trials) if found.examined else ()
+    result = with_weighed_load(result, whole)
+    whole = with_load(whole, result.identification.search if result.identification else None)
     return replace(found, diagnosis=told(whole, result, judged_trials(result, used)))
 
 

@@ -10,7 +10,7 @@ from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.solids import segment_solids
-from biodance.errors import SessionRefused, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
@@ -25,6 +25,10 @@ from biodance.records import Motion, Session, Trial
 
 _SHIPPED = {"hoap3": hoap3}
 """Robots whose bodies are built from our own tables."""
+_NO_TRIAL = (
+    "--trial: a {} file holds one body, which belongs to the whole session and to no trial. Leave --trial away, or "
+    "set the roles in session.toml to identify from that trial alone."
+)
 MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids", "rerun")
 """Formats that need a recording beside the body."""
 
@@ -62,8 +66,8 @@ def export(
         ``bids``: a BIDS motion dataset of the session, with its derivatives; ``rerun``: a trial with solids, forces and
         residual for the viewer Rerun (needs rerun-sdk).
     trial : str, optional
-        Name of the trial for ``trc``, ``mot`` and ``c3d``, by default the only one that moves; for ``opensim`` by
-        default all.
+        Name of the trial for ``trc``, ``mot``, ``c3d`` and ``rerun``, by default the only one that moves; for
+        ``opensim`` and ``bids`` by default all. The formats of a body have none.
     subject : str, optional
         The person where files hold several.
     meshes : pathlib.Path, optional
@@ -85,7 +89,8 @@ def export(
     UnknownName
         No such format or trial; the legal names are listed.
     BiodanceError
-        The body's inertia cannot exist, the session gives no body or motion, or the file exists.
+        The body's inertia cannot exist, the session gives no body or motion, the file exists, or a ``trial`` is named
+        for a body.
 
     Examples
     --------
@@ -95,6 +100,8 @@ def export(
     """
     if format not in legal_formats():
         raise UnknownName.of("format", format, legal_formats())
+    if trial is not None and format not in MOTION_FORMATS:
+        raise BiodanceError(_NO_TRIAL.format(format))
     out = Path(out)
     if isinstance(source, str | Path) and str(source) in _SHIPPED and not Path(str(source)).exists():
         return _robot(str(source), out, format, meshes)
@@ -157,12 +164,13 @@ def _of_result(
             raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason or result.body_source}")
         return _coordinates(result.body, one.motion, one.name, out)
     body, words = body_of_result(result)
+    chosen = result.trials if trial is None else (result[trial],)
     if format == "bids":
-        return _bids(result.session, result.trials, body, out)
+        return _bids(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, out)
     if format == "rerun":
         return _rerun(result[_chosen(result.session, trial).name], body, out, meshes)
     if format == "opensim":
-        return _opensim(result.trials if trial is None else (result[trial],), body, out, words, meshes)
+        return _opensim(chosen, body, out, words, meshes)
     if format == "c3d":
         name = _chosen(result.session, trial).name
         one = next(found for found in result.trials if found.trial.name == name)

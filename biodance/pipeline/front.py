@@ -210,9 +210,10 @@ def diagnose(
     """
     asked = causes(effects)
     before = None if reference is None else _earlier(reference, tell)
-    result = examined_visit(session, body=body, lab=lab, tell=tell)
+    result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
     known = tolerances or read_lab(lab).tolerances
     result, checks = with_right_labels(result, tell=tell) if accept else (result, ())
+    result = result if before is None else _beside(result, before)
     return diagnose_session(result, reference=before, tolerances=known, effects=asked, mended=checks, tell=tell)
 
 
@@ -261,7 +262,7 @@ def examined_visit(
     """
     carried, known = read_lab(lab), known_body(body)
     if isinstance(session, SessionResult) and known is None and not carried.corrections:
-        return session if reference is None else _against(session, reference)
+        return session if reference is None else _beside(session, reference)
     read = session.session if isinstance(session, SessionResult) else session
     read = read if isinstance(read, Session) else read_session(read, tell=tell)
     return examine(carried.corrected(read), reference=reference, known=known, tell=tell)
@@ -274,9 +275,10 @@ def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:
     return identification_of(examined_visit(session, tell=tell))
 
 
-def _against(result: SessionResult, before: SessionIdentification) -> SessionResult:
+def _beside(result: SessionResult, before: SessionIdentification) -> SessionResult:
     """Return an examined visit with its load looked for against an earlier one."""
-    if result.body is None:
+    found = result.identification
+    if result.body is None or found is None or found.search.reference == f"session {before.name}":
         return result
     name = result.session.folder.name
     again = identify_trials(

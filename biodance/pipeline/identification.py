@@ -17,6 +17,7 @@ from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
+from biodance.identification.load_place import nearest_segment
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import TorqueBands
@@ -181,6 +182,7 @@ def identify_trials(
         reference = None
     doubts = _doubts(results, checks, reference)
     search = added_mass(found, reference=reference.identification if reference else None, doubts=doubts)
+    lies_on = nearest_segment(body, tuple(fit.motion for fit in fits), search.best.segment, search.best.place)
     one = SessionIdentification(
         name,
         found,
@@ -188,7 +190,7 @@ def identify_trials(
         (),
         {},
         None,
-        replace(search, reference=f"session {reference.name}") if reference else search,
+        replace(search, lies_on=lies_on, reference=f"session {reference.name}" if reference else search.reference),
         changes=_changes(reference, found, failures),
         notes=found.notes,
         failures=failures,

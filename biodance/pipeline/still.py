@@ -11,6 +11,7 @@ from biodance.body.changes import parts_as_segments
 from biodance.body.solids import shape_parts
 from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
+from biodance.identification.load_words import size_and_segments
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still
@@ -174,8 +175,5 @@ def load_still(body: Body, results: tuple[TrialResult, ...], search: LoadSearch)
     assert one.motion is not None
     pose, segment = poses(body, one.motion.q[one.motion.time.size // 2]), body.segment_index(best.segment)
     place = pose.position[0, segment] + pose.rotation[0, segment] @ best.place
-    about = (
-        f"The load that was found: {best.mass:.2f} kg ± {best.sd:.2f} kg on the {best.segment.replace('_', ' ')} "
-        f"(yellow)."
-    )
+    about = f"The load that was found (yellow): {size_and_segments(search)}."
     return replace(still, load=place, about=about)

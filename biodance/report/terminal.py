@@ -7,11 +7,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, without_path
-from biodance.report.wording import format_number, millimetres, size_seen, trial_and_subject
+from biodance.report.wording import format_number, millimetres, named, size_seen, told_sizes, trial_and_subject
 
 
 def _line(console: Console, text: str) -> None:
@@ -211,16 +212,10 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
     _print_failures(found["failures"], console)
     beside = " beside the others" if len(found["findings"]) > 1 else ""
     for finding in found["findings"]:
-        sizes = ", ".join(
-            f"{name} {p['value']:.4g} {p['unit']}" + (f" ± {p['sd']:.2g}" if p["sd"] is not None else "")
-            for name, p in finding["parameters"].items()
-        )
-        others = ", ".join(f"{a['effect']} {a['target']}".strip() for a in finding["set"][1:])
+        others = ", ".join(named(a["effect"], a["target"]) for a in finding["set"][1:])
         told = f"; it could also be: {others}" if others else ""
-        console.print(
-            f"found: [bold]{escape(finding['effect'])} {escape(finding['target'])}[/]: {escape(sizes + told)}",
-            soft_wrap=True,
-        )
+        name, sizes = named(finding["effect"], finding["target"]), told_sizes(finding["parameters"])
+        console.print(f"found: [bold]{escape(name)}[/]{escape(f': {sizes}' * bool(sizes) + told)}", soft_wrap=True)
         if finding["gain"]:
             low, high = (100 * x for x in finding["gain"]["ci95"])
             console.print(
@@ -228,8 +223,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
                 soft_wrap=True,
             )
         _line(console, f"  {finding['advice']}")
-    if found["verdict"] in ("unexplained", "named, incomplete") and found["adequacy"]:
-        worst = found["adequacy"][0]
+    for worst in [row for row in found["adequacy"] if row["matters"] and row["z"] > LIMIT][:1]:
         low, high = worst["band_hz"]
         where = f"{worst['channel']}, {low:g} to {high:g} Hz, trial {worst['trial']}"
         console.print(f"left unexplained: {escape(where)} ({worst['z']:.0f} times what sessions without fault vary)")

@@ -3,10 +3,9 @@
 import math
 from typing import Any
 
+from biodance.display import SHOWN_UNITS
 from biodance.records.attention import Attention
 
-_SHOWN = {"m": (1000.0, "mm", 0), "rad": (57.29578, "°", 1), "s": (1000.0, "ms", 1), "1": (100.0, "%", 1)}
-"""Unit of a parameter: factor, unit and digits that are shown."""
 _ABSURD = 1000.0
 """Typical sizes above which a size from which something is seen means never."""
 
@@ -26,10 +25,31 @@ def millimetres(value: float | None, digits: int = 1) -> str:
 
 def sized(value: float, unit: str) -> str:
     """Return a number with its unit as a person says it: 0.02 m is 20 mm."""
-    factor, name, digits = _SHOWN.get(unit, (1.0, unit, 2))
+    factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 2))
     if value == float("inf"):
         return "no size"
     return f"{format_number(factor * value, digits)} {name}".strip()
+
+
+def named(effect: str, target: str) -> str:
+    """Return a cause with its place as words: ``added mass, left forearm hand``."""
+    plain = effect.replace("_", " ")
+    return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
+
+
+def told_sizes(parameters: dict[str, dict[str, Any]]) -> str:
+    """Return the parameters of a finding (its JSON) with their standard deviations; three axes as one vector."""
+    vectors = {name: row for name, row in parameters.items() if isinstance(row["value"], list)}
+    rows = {name: row for name, row in parameters.items() if name.rpartition("_")[0] not in vectors}
+    return ", ".join(f"{name.replace('_', ' ')} {_told(row)}" for name, row in rows.items())
+
+
+def _told(row: dict[str, Any]) -> str:
+    """Return a value, or three, with their standard deviations and unit: ``−19, −186, −28 ± 41, 75, 40 mm``."""
+    parts = [row[key] if isinstance(row[key], list) else [row[key]] for key in ("value", "sd")]
+    factor, unit, digits = SHOWN_UNITS.get(row["unit"], (1.0, row["unit"], 2))
+    said = [", ".join(format_number(factor * x, digits) for x in part if x is not None) for part in parts]
+    return f"{' ± '.join(filter(None, said))} {unit}".strip()
 
 
 def size_seen(row: dict[str, Any], key: str) -> str:

@@ -176,6 +176,12 @@ class Effect:
         """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
 
+    def origin(self, case: Case) -> Array:
+        """Return (p,) what a report adds to the parameters, so that they count from where everything else counts: a
+        place from the joint of its segment; by default nothing.
+        """
+        return np.zeros(len(self.parameters))
+
     def size_told(self, size: float) -> float:
         """Return what a limit says for a ``size`` of the first parameter: by default the same."""
         return size

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Alias, Finding, Gain, Unobservable
+from biodance.diagnosis.diagnosis import Alias, Estimate, Finding, Gain, Unobservable
 from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.heard import Testimony, sights
 from biodance.identification.identification import Identification
@@ -49,15 +49,27 @@ def _finding(one: Finding) -> dict[str, Any]:
     return {
         "effect": one.effect,
         "target": one.target,
-        "parameters": {
-            p.name: {"value": p.value, "sd": p.sd, "unit": p.unit, "ci95": p.interval} for p in one.parameters
-        },
+        "parameters": _parameters(one.parameters),
         "set": [_alias(a) for a in one.set],
         "visible_fraction": one.visible_fraction,
         "gain": _gain(one.gain),
         "changes": one.changes,
         "advice": one.advice,
     }
+
+
+def _parameters(found: Sequence[Estimate]) -> dict[str, Any]:
+    """Return every parameter by its name, and what has three axes (``shift_x`` ...) as a vector under the name without
+    axis, too.
+    """
+    rows = {p.name: {"value": p.value, "sd": p.sd, "unit": p.unit, "ci95": p.interval} for p in found}
+    stems = [name.removesuffix("_x") for name in rows if name.endswith("_x")]
+    for stem in stems:
+        axes = [rows.get(f"{stem}_{axis}") for axis in "xyz"]
+        if all(axes):
+            rows[stem] = {key: [one[key] for one in axes if one] for key in ("value", "sd", "ci95")}
+            rows[stem]["unit"] = rows[f"{stem}_x"]["unit"]
+    return rows
 
 
 def _limit(row: Unobservable) -> dict[str, Any]:

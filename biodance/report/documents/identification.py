@@ -103,7 +103,10 @@ def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
         "p_none": search.p_no_load,
         "smallest_detectable_kg": best.smallest,
         "reference": search.reference,
-        "set": search.set,
+        "probability": best.probability,
+        "set": search.segments,
+        "place_on": search.lies_on or best.segment,
+        "place_frame": "segment: from its proximal joint centre, x forward, y up, z right",
     }
 
 

@@ -23,7 +23,7 @@ from biodance.records import CHANNEL_TITLES, CHANNELS
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.wording import format_number, sized, trial_and_subject
+from biodance.report.wording import format_number, named, sized, trial_and_subject
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -124,12 +124,6 @@ def words_of(effect: str) -> Words:
 def first_upper(text: str) -> str:
     """Return ``text`` with a capital first letter and nothing else changed."""
     return text[:1].upper() + text[1:]
-
-
-def named(effect: str, target: str) -> str:
-    """Return a cause with its place as words: ``added mass, left forearm hand``."""
-    plain = effect.replace("_", " ")
-    return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
 
 
 def estimated(one: Estimate) -> str:

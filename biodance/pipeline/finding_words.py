@@ -1,0 +1,80 @@
+"""A finding in words, the same wherever it is told: its place or places, its size, what it cannot be told from, which
+checks it may explain.
+"""
+
+from collections.abc import Sequence
+
+from biodance.diagnosis.diagnosis import Estimate, Finding
+from biodance.display import digits, shown_unit
+from biodance.effects.added_mass import AddedMass
+
+LOAD = AddedMass.name
+CAUSES_OF_WEIGHT = (
+    "plate_gain", "plate_offset", "body_mass", LOAD, "body_weight_support", "external_contact", "sloshing_load",
+    "unit_error", "clipping",
+)  # fmt: skip
+"""Causes that add or take weight, so that one of them and a load are two words for what the plates carry."""
+EXPLAINS: dict[str, tuple[str, ...]] = {
+    "mass on the plates": CAUSES_OF_WEIGHT,
+    "centre of mass off the centre of pressure": (
+        "plate_position", "plate_rotation", "plate_crosstalk", "plate_offset", "lab_tilt", "marker_misplaced",
+        "labels_swapped", "joint_centre",
+    ),
+    "marker distance": (
+        "labels_swapped", "marker_misplaced", "segment_length", "joint_centre", "trunk_joint", "head_joint",
+        "shoulder_girdle", "frame_rate", "unit_error",
+    ),
+    "force difference": (
+        "plate_gain", "plate_offset", "plate_drift", "plate_rotation", "plate_crosstalk", "time_delay", "clock_drift",
+        "filter_mismatch", "axis_error", "unit_error", "clipping", "added_mass", "body_mass", "external_contact",
+    ),
+}  # fmt: skip
+"""Causes that a check outside its limit may come from, by the beginning of the check's name."""
+
+
+def in_words(finding: Finding) -> str:
+    """Return a cause with its place, or all places that it may be at, and its size: ``plate gain Fz (gain 6 ± 0.2 %)``;
+    a size less than two standard deviations from none is not known. A load is told by its mass; where its centre lies
+    is said beside its segment.
+    """
+    name = f"{cause_in_words(finding.effect, finding.target)}{_elsewhere(finding)}"
+    told = finding.parameters[:1] if finding.effect == LOAD else finding.parameters
+    known = [abs(p.value) >= 2 * p.sd for p in finding.parameters if p.sd == p.sd]
+    if not known:
+        return name
+    return f"{name} ({', '.join(map(_size, told))}{'' if any(known) else '; its size is hardly known'})"
+
+
+def _elsewhere(finding: Finding) -> str:
+    """Return where else the same cause may be, to go on its place with."""
+    places = [cause_in_words("", alias.target) for alias in finding.set[1:] if alias.effect == finding.effect]
+    return f" or {listed(places)}" if any(places) else ""
+
+
+def cause_in_words(effect: str, target: str) -> str:
+    """Return a cause with its place: ``plate crosstalk Fz into My``."""
+    return f"{effect} {target}".replace("_", " ").replace("->", " into ").strip()
+
+
+def _size(one: Estimate) -> str:
+    """Return a parameter with its standard deviation as people say it: ``gain 6 ± 0.2 %``."""
+    factor, unit = shown_unit(one.unit)
+    return f"{one.name.replace('_', ' ')} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
+
+
+def or_else(finding: Finding) -> str:
+    """Return the other causes that a finding cannot be told from, to go on its name with."""
+    others = [cause_in_words(a.effect, a.target) for a in finding.set[1:] if a.effect != finding.effect]
+    return f", not told from {listed(others)}" if others else ""
+
+
+def cause_of(checked: str, findings: Sequence[Finding]) -> str:
+    """Return the first finding that may explain a check of that name; "" for none."""
+    mine = next((causes for what, causes in EXPLAINS.items() if checked.startswith(what)), ())
+    found = next((one for one in findings if one.effect in mine), None)
+    return f"{cause_in_words(found.effect, found.target)}{_elsewhere(found)}" if found else ""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in words, the fourth and later ones counted only."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -1,0 +1,123 @@
+"""One load, one record: page, terminal and JSON name the same segments, kilograms, interval and place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from human_cases import human_case
+from identified_sessions import session_result
+
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.effects.added_mass import AddedMass
+from biodance.identification.added_mass import LoadCandidate, LoadSearch
+from biodance.identification.load_place import nearest_segment
+from biodance.identification.load_posterior import MASSES, LoadPosterior
+from biodance.identification.load_words import say_load
+from biodance.motion.kinematics import poses
+from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.finding_words import in_words, or_else
+from biodance.pipeline.load import with_load, with_weighed_load
+from biodance.pipeline.trial_result import Check
+from biodance.report.documents.diagnosis import diagnosis_document
+from biodance.report.documents.identification import added_mass_document
+from biodance.report.wording import told_sizes
+
+PLACE = np.array([0.01, -0.12, 0.02])
+NOTHING = Diagnosis("nothing wrong", ())
+GAIN = Finding("plate_gain", "Fz", (Estimate("gain", 0.04, 0.01, "1"),), (Alias("plate_gain", "Fz", 9.0),), 0.2)
+OWN = Finding(
+    "added_mass", "left_thigh", (Estimate("mass", 1.9, 0.2, "kg"),), (Alias("added_mass", "left_thigh", 30.0),), 0.1
+)
+
+
+def found(*shares: tuple[str, float], lies_on: str = "", doubts: tuple[str, ...] = ()) -> LoadSearch:
+    """Return the search that found 2.4 kg on segments with these probabilities."""
+    weight = np.exp(-0.5 * ((MASSES - 2.4) / 0.3) ** 2) * np.gradient(MASSES)
+    posterior = LoadPosterior(0.0, weight / weight.sum())
+    suspects = tuple(LoadCandidate(name, posterior, PLACE, 0.1 * PLACE, 20.0, p, 0.8) for name, p in shares)
+    return LoadSearch(suspects, 1e-6, "session before", doubts, lies_on)
+
+
+FOREARM = (("left_forearm_hand", 0.8), ("left_upper_arm", 0.2))
+
+
+@pytest.mark.parametrize("named", [(), (OWN,)])
+def test_the_finding_is_the_record_of_the_search(named: tuple[Finding, ...]) -> None:
+    search = found(*FOREARM)
+    told = with_load(replace(NOTHING, findings=named), search)
+    record, (one,) = added_mass_document(search), told.findings
+    numbers = diagnosis_document(SessionDiagnosis(told))["findings"][0]
+    assert one.target == numbers["target"] == record["segment"] == "left_forearm_hand"
+    assert numbers["parameters"]["mass"]["value"] == record["kg"]
+    assert tuple(numbers["parameters"]["mass"]["ci95"]) == tuple(record["ci95_kg"])
+    np.testing.assert_array_equal(numbers["parameters"]["place"]["value"], record["place_m"])
+    assert [a["target"] for a in numbers["set"]] == list(record["set"]) == [name for name, _ in FOREARM]
+    assert in_words(one) == "added mass left forearm hand or left upper arm (mass 2.4 ± 0.3 kg)"
+    assert told_sizes(numbers["parameters"]) == "mass 2.40 ± 0.30 kg, place 10, −120, 20 ± 1, −12, 2 mm"
+    assert "2.40 kg on the left forearm hand (80 % probable) or left upper arm" in say_load(search)
+
+
+def test_a_load_is_never_beside_nothing_wrong() -> None:
+    assert with_load(NOTHING, found(*FOREARM)).verdict == "named, complete"
+    assert with_load(replace(NOTHING, verdict="unexplained"), found(*FOREARM)).verdict == "named, incomplete"
+    assert with_load(NOTHING, None) is NOTHING
+    assert with_load(NOTHING, replace(found(*FOREARM), p_no_load=0.9)) is NOTHING
+
+
+def test_weight_that_a_gain_explains_is_no_second_cause() -> None:
+    told = with_load(replace(NOTHING, verdict="named, complete", findings=(GAIN,)), found(*FOREARM))
+    (one,) = told.findings
+    assert (one.effect, [a.effect for a in one.set]) == ("plate_gain", ["plate_gain", "added_mass", "added_mass"])
+    assert or_else(one) == ", not told from added mass left forearm hand, added mass left upper arm"
+    assert in_words(one) == "plate gain Fz (gain 4 ± 1 %)"
+
+
+def test_a_place_on_another_segment_widens_the_set() -> None:
+    sure = found(("trunk_head", 0.99), ("pelvis", 0.01))
+    assert sure.segments == ("trunk_head",)
+    other = replace(sure, lies_on="pelvis")
+    assert other.segments == ("trunk_head", "pelvis")
+    text = say_load(other)
+    assert "on the trunk head (99 % probable) or pelvis" in text
+    assert "there the pelvis is nearer" in text
+    record = added_mass_document(other)
+    assert (record["segment"], record["place_on"], record["set"]) == ("trunk_head", "pelvis", ("trunk_head", "pelvis"))
+
+
+def test_the_nearest_segment_is_the_one_whose_box_holds_the_place_while_the_person_moves() -> None:
+    result = session_result()
+    body, motion = result.body, next(one.motion for one in result.trials if one.motion is not None)
+    for name in body.segments:
+        middle = body.boxes[body.segment_index(name)].mean(axis=0)
+        assert nearest_segment(body, (motion,), name, middle) == name
+    pose, shank, thigh = poses(body, motion.q[:1]), *(body.segment_index(f"left_{n}") for n in ("shank", "thigh"))
+    lab = pose.points([thigh], body.boxes[thigh].mean(axis=0)[None])[0, 0]
+    place = pose.rotation[0, shank].T @ (lab - pose.position[0, shank])  # on the thigh, in the shank's frame
+    assert nearest_segment(body, (motion,), "left_shank", place) == "left_thigh"
+    assert nearest_segment(body, (motion,), "left_shank", np.full(3, np.nan)) == ""
+
+
+def test_the_weight_of_a_load_that_is_named_is_no_doubt_about_it() -> None:
+    result = session_result()
+    weighed = Check("mass on the plates against declared", "static", "3.9 %", "at most 2 %", False, "Weigh again.")
+    doubt = "mass on the plates against declared, static: 3.9 % (at most 2 %). Weigh again."
+    search = found(*FOREARM, doubts=(doubt,))
+    session = replace(result, checks=(weighed,), identification=replace(result.identification, search=search))
+    assert with_weighed_load(session, NOTHING) is session
+    named = with_weighed_load(session, replace(NOTHING, findings=(OWN,)))
+    assert named.identification.search.found
+    far = replace(session, identification=replace(session.identification, search=replace(search, doubts=("Far.",))))
+    assert with_weighed_load(far, replace(NOTHING, findings=(OWN,))) is far
+
+
+def test_the_place_that_a_finding_tells_is_where_its_load_pulls() -> None:
+    case = human_case()
+    effect = AddedMass("left_shank")
+    theta = np.array([2.0, 0.03, -0.1, 0.05])
+    told = dict(zip("mxyz", theta + effect.origin(case), strict=True))
+    segment = case.body.segment_index("left_shank")
+    place = np.array([told[axis] for axis in "xyz"])
+    wrench = effect.added(case, theta)
+    point = case.poses.points([segment], place[None])[:, 0]
+    moment = np.cross(point, wrench[:, :3])
+    assert np.abs(wrench[:, 3:] - moment).max() < 0.02 * np.abs(moment).max()  # what is left turns a ball of 40 mm
