@@ -90,10 +90,11 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
         for one, label in named.items()
         if one in LANDMARKS and not confirmed[label]
     ]
+    _take_ends(places, stand, confirmed)
     _sort_pairs(places, stand, doubts)
     usual = [label for place, label in named.items() if said[label][0].rank < _USUAL]
     believed, total = sum(bool(confirmed[label]) for label in usual), len(usual)
-    doubts += fill_absent(places, stand, confirmed)
+    doubts += fill_absent(places, stand, confirmed) + _medial_alone(places)
     absent = absent_landmarks(places)
     map_ = _map(places, confirmed)
     if believed < _BELIEVED * total:
@@ -138,6 +139,43 @@ def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, st
             places[place] = label
             used.add(label)
     return places
+
+
+def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, tuple[Meaning, ...]]) -> None:
+    """Of several labels for one end of a joint take the marker at that end: the lateral one is farthest from the medial
+    one (Knee beside KneeLat and KneeMed is its middle); two that are called medial are the outer and the inner one.
+    """
+    for side in SIDES:
+        out = stand.right if side == "right" else -stand.right
+        for joint in ("knee", "ankle", "elbow"):
+            lateral, medial = f"{side}_{joint}_lateral", f"{side}_{joint}_medial"
+            outer, inner = (_called(place, confirmed) for place in (lateral, medial))
+            if len(outer) > 1 and places.get(lateral) in outer and medial in places:
+                other = stand.at[places[medial]]
+                places[lateral] = max(outer, key=lambda label, other=other: np.linalg.norm(stand.at[label] - other))
+            elif lateral not in places and len(inner) > 1 and places.get(medial) in inner:
+                inner.sort(key=lambda label, out=out: float(stand.at[label] @ out))
+                places[medial], places[lateral] = inner[0], inner[-1]
+
+
+def _called(place: str, confirmed: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Return the labels that say a landmark by a common word."""
+    return [label for label, said in confirmed.items() if said and said[0].place == place]
+
+
+def _medial_alone(places: dict[str, str]) -> list[str]:
+    """Take the only marker of a knee or ankle for its lateral one where its label says medial on both sides: nobody
+    puts the medial marker alone; return it in sentences.
+    """
+    said = []
+    for joint in ("knee", "ankle"):
+        ends = [(f"{side}_{joint}_medial", f"{side}_{joint}_lateral") for side in SIDES]
+        if all(medial in places and lateral not in places for medial, lateral in ends):
+            for medial, lateral in ends:
+                places[lateral] = places.pop(medial)
+                words = lateral.replace("_", " ")
+                said.append(f"{places[lateral]} is the only marker there: taken for the {words}, against its name.")
+    return said
 
 
 def _sort_pairs(places: dict[str, str], stand: Standing, doubts: list[str]) -> None:
