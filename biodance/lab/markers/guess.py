@@ -29,6 +29,8 @@ _WEIGHT = 20.0
 """Ranks of spelling by which a marker at the limit of where it is believed counts less than one at the usual place."""
 _AS_USUAL = 0.5
 """Share of the way to that limit within which all places are equally usual."""
+_HALFWAY = 0.3
+"""Share of the width of a joint within which of its half a marker is the middle of it."""
 _APART = 0.005
 """m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
 
@@ -142,20 +144,23 @@ def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, st
 
 
 def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, tuple[Meaning, ...]]) -> None:
-    """Of several labels for one end of a joint take the marker at that end: the lateral one is farthest from the medial
-    one (Knee beside KneeLat and KneeMed is its middle); two that are called medial are the outer and the inner one.
+    """Of several labels for one end of a joint take the marker at that end: Knee half way between KneeLat and KneeMed is
+    its middle, not its lateral marker; two that are called medial are the outer and the inner one.
     """
     for side in SIDES:
         out = stand.right if side == "right" else -stand.right
         for joint in ("knee", "ankle", "elbow"):
             lateral, medial = f"{side}_{joint}_lateral", f"{side}_{joint}_medial"
             outer, inner = (_called(place, confirmed) for place in (lateral, medial))
-            if len(outer) > 1 and places.get(lateral) in outer and medial in places:
-                other = stand.at[places[medial]]
-                places[lateral] = max(outer, key=lambda label, other=other: np.linalg.norm(stand.at[label] - other))
+            if lateral in places and medial in places:
+                now, inside = stand.at[places[lateral]], stand.at[places[medial]]
+                for label in outer:
+                    across = stand.at[label] - inside
+                    if np.linalg.norm(now - inside - across / 2) < _HALFWAY * np.linalg.norm(across):
+                        places[lateral] = label
             elif lateral not in places and len(inner) > 1 and places.get(medial) in inner:
-                inner.sort(key=lambda label, out=out: float(stand.at[label] @ out))
-                places[medial], places[lateral] = inner[0], inner[-1]
+                outward = [float(stand.at[label] @ out) for label in inner]
+                places[medial], places[lateral] = inner[int(np.argmin(outward))], inner[int(np.argmax(outward))]
 
 
 def _called(place: str, confirmed: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
