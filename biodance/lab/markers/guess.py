@@ -144,8 +144,8 @@ def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, st
 
 
 def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, tuple[Meaning, ...]]) -> None:
-    """Of several labels for one end of a joint take the marker at that end: Knee half way between KneeLat and KneeMed is
-    its middle, not its lateral marker; two that are called medial are the outer and the inner one.
+    """Of several labels for one end of a joint take the marker at that end: Knee half way between KneeLat and KneeMed
+    is its middle, not its lateral marker; two that are called medial are the outer and the inner one.
     """
     for side in SIDES:
         out = stand.right if side == "right" else -stand.right
