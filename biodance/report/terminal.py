@@ -1,6 +1,7 @@
 """What the commands print for a person: short tables on the terminal."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -25,8 +26,9 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
     lines = []
     if record.get("markers"):
         known = record.get("marker_set") or "no known set"
+        worn = f"the map of {Path(known).name}" if known.endswith(".toml") else known
         lines.append(
-            f"{len(record['markers'])} markers ({known}), {format_number(record.get('gaps_percent'))} % not seen"
+            f"{len(record['markers'])} markers ({worn}), {format_number(record.get('gaps_percent'))} % not seen"
         )
     for plate in record.get("plates") or ():
         lines.append(
@@ -35,11 +37,10 @@ def _inspected_lines(record: dict[str, Any]) -> list[str]:
         )
         lines += [f"  {decision}" for decision in plate.get("decisions", ())]
     if record.get("plates"):
-        on_plates, declared = (
-            format_number(record.get("mass_on_plates_kg"), 2),
-            format_number(record.get("declared_mass_kg"), 2),
-        )
-        lines.append(f"mass on the plates {on_plates} kg, declared {declared} kg")
+        on_plates, declared = (record.get("mass_on_plates_kg"), record.get("declared_mass_kg"))
+        weighed = "not known, nobody stands still" if on_plates is None else f"{format_number(on_plates, 2)} kg"
+        told = "none" if declared is None else f"{format_number(declared, 2)} kg"
+        lines.append(f"mass on the plates {weighed}; declared {told}")
     return lines + [f"look: {warning}" for warning in record.get("warnings") or ()]
 
 
@@ -64,14 +65,17 @@ def print_inspected(records: Sequence[dict[str, Any]], console: Console) -> None
 def print_initialised(found: dict[str, Any], console: Console) -> None:
     """Print what `biodance init` wrote: the subject, the roles and the map of the markers, guesses marked as such."""
     subject = found["subject"]
+    names = {"mass_kg": "mass", "height_m": "stature", "sex": "sex", "age": "age"}
     said = ", ".join(
-        f"{key} {subject[key]}" for key in ("mass_kg", "height_m", "sex", "age") if subject[key] is not None
+        f"{key} {'not known' if subject[key] is None else subject[key]}"
+        + (" (guessed)" if subject[key] is not None and name in subject["guessed"] else "")
+        for key, name in names.items()
     )
-    guessed = f" (guessed: {', '.join(subject['guessed'])})" if subject["guessed"] else ""
-    _line(console, f"subject: {said or 'not known'}{guessed}")
+    _line(console, f"subject: {said}")
     for trial in found["trials"]:
         _line(console, f"{trial['name']}: {trial['role']}, {trial['why']}")
-    _line(console, f"markers: {found['marker_set'] or 'no known set, and none could be guessed'}")
+    none = "no known set, and none could be guessed: complete the map in the file" if found["markers"] else "none"
+    _line(console, f"markers: {found['marker_set'] or none}")
     if found["marker_map"]:
         table = Table("label", "landmark or segment", box=None)
         for label, place in found["marker_map"].items():
@@ -80,7 +84,7 @@ def print_initialised(found: dict[str, Any], console: Console) -> None:
         console.print("Confirm or correct this map: a wrong one is worse than none.")
     for file, reason in found["refused"].items():
         _line(console, f"look: {file}: {reason}")
-    _line(console, found["file"])
+    _line(console, f"written: {found['file']}")
 
 
 def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:

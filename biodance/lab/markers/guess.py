@@ -29,6 +29,8 @@ _WEIGHT = 20.0
 """Ranks of spelling by which a marker at the limit of where it is believed counts less than one at the usual place."""
 _AS_USUAL = 0.5
 """Share of the way to that limit within which all places are equally usual."""
+_HALFWAY = 0.3
+"""Share of the width of a joint within which of its half a marker is the middle of it."""
 _APART = 0.005
 """m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
 
@@ -90,10 +92,11 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
         for one, label in named.items()
         if one in LANDMARKS and not confirmed[label]
     ]
+    _take_ends(places, stand, confirmed)
     _sort_pairs(places, stand, doubts)
     usual = [label for place, label in named.items() if said[label][0].rank < _USUAL]
     believed, total = sum(bool(confirmed[label]) for label in usual), len(usual)
-    doubts += fill_absent(places, stand, confirmed)
+    doubts += fill_absent(places, stand, confirmed) + _medial_alone(places)
     absent = absent_landmarks(places)
     map_ = _map(places, confirmed)
     if believed < _BELIEVED * total:
@@ -138,6 +141,46 @@ def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, st
             places[place] = label
             used.add(label)
     return places
+
+
+def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, tuple[Meaning, ...]]) -> None:
+    """Of several labels for one end of a joint take the marker at that end: Knee half way between KneeLat and KneeMed
+    is its middle, not its lateral marker; two that are called medial are the outer and the inner one.
+    """
+    for side in SIDES:
+        out = stand.right if side == "right" else -stand.right
+        for joint in ("knee", "ankle", "elbow"):
+            lateral, medial = f"{side}_{joint}_lateral", f"{side}_{joint}_medial"
+            outer, inner = (_called(place, confirmed) for place in (lateral, medial))
+            if lateral in places and medial in places:
+                now, inside = stand.at[places[lateral]], stand.at[places[medial]]
+                for label in outer:
+                    across = stand.at[label] - inside
+                    if np.linalg.norm(now - inside - across / 2) < _HALFWAY * np.linalg.norm(across):
+                        places[lateral] = label
+            elif lateral not in places and len(inner) > 1 and places.get(medial) in inner:
+                outward = [float(stand.at[label] @ out) for label in inner]
+                places[medial], places[lateral] = inner[int(np.argmin(outward))], inner[int(np.argmax(outward))]
+
+
+def _called(place: str, confirmed: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
+    """Return the labels that say a landmark by a common word."""
+    return [label for label, said in confirmed.items() if said and said[0].place == place]
+
+
+def _medial_alone(places: dict[str, str]) -> list[str]:
+    """Take the only marker of a knee or ankle for its lateral one where its label says medial on both sides: nobody
+    puts the medial marker alone; return it in sentences.
+    """
+    said = []
+    for joint in ("knee", "ankle"):
+        ends = [(f"{side}_{joint}_medial", f"{side}_{joint}_lateral") for side in SIDES]
+        if all(medial in places and lateral not in places for medial, lateral in ends):
+            for medial, lateral in ends:
+                places[lateral] = places.pop(medial)
+                words = lateral.replace("_", " ")
+                said.append(f"{places[lateral]} is the only marker there: taken for the {words}, against its name.")
+    return said
 
 
 def _sort_pairs(places: dict[str, str], stand: Standing, doubts: list[str]) -> None:

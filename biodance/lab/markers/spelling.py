@@ -39,7 +39,7 @@ class Spelled:
 
 def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     """Return label -> label without the subject's name: without what stands before a colon, and without a beginning
-    that nearly all labels share. Labels of unlabelled and of computed points are left out.
+    and an ending that nearly all labels share. Labels of unlabelled and of computed points are left out.
     """
     given = {label: label.rpartition(":")[2].strip() for label in labels}
     bones = {
@@ -49,7 +49,9 @@ def plain_labels(labels: Iterable[str]) -> dict[str, str]:
     }
     given = {label: name for label, name in given.items() if name and not _is_no_marker(name, bones)}
     shared = _beginning(list(given.values()))
-    return {label: name.removeprefix(shared) or name for label, name in given.items()}
+    given = {label: name.removeprefix(shared) or name for label, name in given.items()}
+    ending = _ending(list(given.values()))
+    return {label: name.removesuffix(ending) or name for label, name in given.items()}
 
 
 def _is_no_marker(name: str, bones: set[str]) -> bool:
@@ -72,6 +74,13 @@ def _beginning(names: Sequence[str]) -> str:
         or (re.fullmatch("[a-z]", start) and capital)
     ]
     return max(ends, key=len, default="")
+
+
+def _ending(names: Sequence[str]) -> str:
+    """Return the last word after a separator (_study, _pt) that nearly all names end with."""
+    ends = Counter(found[0] for name in names if (found := re.search(r"(?<=.)[\W_][^\W\d_]+$", name)))
+    often = [end for end, times in ends.items() if times >= max(_SHARED * len(names), 4)]
+    return often[0] if often else ""
 
 
 def tokens_of(label: str) -> tuple[str, ...]:

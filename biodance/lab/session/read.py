@@ -199,7 +199,7 @@ def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNote
         return role, "guessed from its name"
     if file.parent != folder and (role := role_by_name(file.parent.name)):
         return role, f"guessed from its folder {file.parent.name}"
-    return "fit", "its name says nothing else"
+    return "fit", "a movement: its name says no other role"
 
 
 def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:

@@ -40,7 +40,8 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     dict
         ``file`` that was written; ``subject`` {name, mass_kg, height_m, sex, age, guessed: [names]}; ``trials``
         [{name, role, why}]; ``marker_set`` name, "guessed" or None; ``marker_map`` label -> landmark or segment where
-        it was guessed, else None; ``plates`` [{trial, name, type, decisions}]; ``refused`` file -> reason; ``notes``.
+        it was guessed, else None; ``markers`` whether there are any; ``plates`` [{trial, name, type, decisions}];
+        ``refused`` file -> reason; ``notes``.
 
     Raises
     ------
@@ -88,6 +89,7 @@ def _found(session: Session, target: Path) -> dict[str, Any]:
             {"name": trial.source.path.stem, "role": trial.role, "why": _why(session, trial)}
             for trial in session.trials
         ],
+        "markers": any(trial.markers is not None for trial in session.trials),
         "marker_set": worn.partition(" {")[0] or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
         "plates": plates,
