@@ -18,7 +18,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
@@ -185,17 +185,7 @@ class Dance(Sendable):
         >>> dance.state(dance.phases[0], np.array([0.0, 0.5])).x.shape
         (2, 29)
         """
-        return close_legs(self.chain, phase.stance, *self.path(phase, time))
-
-    def path(self, phase: Phase, time: Array) -> tuple[Array, Array, Array]:
-        """Return coordinates (T, n) of a phase and their derivatives, planted legs not yet holding their feet."""
-        if phase.kind == "hold":
-            x = np.repeat(self.postures[None, phase.posture], len(time), axis=0)
-            return x, np.zeros_like(x), np.zeros_like(x)
-        move = phase.posture - 1
-        points = np.stack([self.postures[move], *self.via[move], self.postures[move + 1]])
-        basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
-        return basis.position @ points, basis.velocity @ points, basis.acceleration @ points
+        return close_legs(self.chain, phase.stance, *path_in(phase, self.postures, self.via, time))
 
     def motion(self, rate: float) -> Motion:
         """Return the whole dance, holds included, from 0 to its end.

@@ -19,6 +19,7 @@ from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Copied
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at
 from biodance.records import Array
 
@@ -123,7 +124,9 @@ class PlannedDance:
 
     def _coordinates(self, rows: NDArray[np.intp], when: Array) -> Array:
         """Return the coordinates (T, n) of the dance, planted legs holding their feet."""
-        x = np.concatenate([self.dance.path(self.dance.phases[p], when[rows == p])[0] for p in np.unique(rows)])
+        dance = self.dance
+        parts = [path_in(dance.phases[p], dance.postures, dance.via, when[rows == p]) for p in np.unique(rows)]
+        x = np.concatenate([part[0] for part in parts])
         turn = self.chain.root_rotation(x)
         for side, columns in enumerate(self.chain.leg_columns):
             down = np.flatnonzero(np.array([side in stance.planted for stance in self.stances])[rows])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
+from biodance.dance.problem.stance import Phase
 from biodance.errors import BiodanceError
 from biodance.records import Array, frozen_array
 
@@ -64,3 +65,16 @@ def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
     conditions = np.concatenate([spline(through), spline(stops, nu=1), spline(stops, nu=2)])
     coefficients = np.linalg.inv(conditions)[:, : via + 2]
     return Basis(time, *(spline(time, nu=nu) @ coefficients for nu in range(3)))
+
+
+def path_in(phase: Phase, postures: Array, via: Array, time: Array) -> tuple[Array, Array, Array]:
+    """Return coordinates (T, n) and their derivatives at instants ``time`` s of a ``phase`` of a dance through
+    ``postures`` (P, n) and, between them, the points ``via`` (P - 1, 2, n); planted legs do not hold their feet yet.
+    """
+    if phase.kind == "hold":
+        x = np.repeat(postures[None, phase.posture], len(time), axis=0)
+        return x, np.zeros_like(x), np.zeros_like(x)
+    move = phase.posture - 1
+    points = np.stack([postures[move], *via[move], postures[move + 1]])
+    basis = basis_at(np.clip(time - phase.start, 0.0, phase.end - phase.start), phase.end - phase.start)
+    return basis.position @ points, basis.velocity @ points, basis.acceleration @ points
