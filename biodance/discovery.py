@@ -17,7 +17,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -259,13 +259,15 @@ def _of_entry_points(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[
 
 def _offered(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Return the entry points of a group, by name."""
-    return tuple(sorted(_entry_points(path).select(group=group), key=lambda entry: (entry.name, entry.value)))
+    found = (entry for entry in _entry_points(path) if entry.group == group)
+    return tuple(sorted(found, key=lambda entry: (entry.name, entry.value)))
 
 
 @cache
-def _entry_points(_path: tuple[str, ...]) -> EntryPoints:
+def _entry_points(_path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Return what all installed packages offer; ``_path`` is sys.path, whose change makes the answer stale."""
-    return entry_points()
+    every = entry_points()
+    return tuple(entry for group in every.groups for entry in every.select(group=group))
 
 
 def _loaded(entry: EntryPoint, kind: str) -> Any:
