@@ -78,13 +78,9 @@ class Family(Generic[Member]):
             A file or an entry point cannot be imported or is no member, or two members have one name; the sentence says
             which, where, and what to do.
         """
-        package = importlib.import_module(self.package)
-        found = (
-            *_of_folder(self, tuple(package.__path__)),
-            *_of_entry_points(self, tuple(sys.path)),
-            *((m, _where(m)) for m in given),
-        )
-        return self._by_name(found)
+        places = tuple(importlib.import_module(self.package).__path__), tuple(sys.path)
+        own = tuple((member, _where(member)) for member in given)
+        return self._by_name((*_found(self, *places), *own)) if own else _known(self, *places)
 
     def choose(self, chosen: "Chosen[Member]" = None) -> Mapping[str, Member]:
         """Return a selection: names choose from the family, objects join what is chosen (the whole family where no name
@@ -214,6 +210,17 @@ def _files_in(place: Path, suffix: str, _stamp: int) -> Mapping[str, Path]:
 
 
 @cache
+def _known(family: Family[Any], path: tuple[str, ...], packages: tuple[str, ...]) -> Mapping[str, Any]:
+    """Return the members of a family by name; another folder or sys.path makes the answer stale."""
+    return family._by_name(_found(family, path, packages))
+
+
+def _found(family: Family[Any], path: tuple[str, ...], packages: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
+    """Return the members in a folder and those of the entry points, each with where it is written."""
+    return (*_of_folder(family, path), *_of_entry_points(family, packages))
+
+
+@cache
 def _of_folder(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
     """Return the members in a family's folder ``path``, each with its file; BiodanceError for a file that is none."""
     return tuple(_of_module(family, info.name) for info in pkgutil.iter_modules(path) if not info.name.startswith("_"))
@@ -250,10 +257,17 @@ def _of_entry_points(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[
     return tuple(found)
 
 
-@cache
 def _offered(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group, by name; ``path`` is sys.path, whose change makes the answer stale."""
-    return tuple(sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value)))
+    """Return the entry points of a group, by name."""
+    found = (entry for entry in _entry_points(path) if entry.group == group)
+    return tuple(sorted(found, key=lambda entry: (entry.name, entry.value)))
+
+
+@cache
+def _entry_points(_path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return what all installed packages offer; ``_path`` is sys.path, whose change makes the answer stale."""
+    every = entry_points()
+    return tuple(entry for group in every.groups for entry in every.select(group=group))
 
 
 def _loaded(entry: EntryPoint, kind: str) -> Any:

@@ -38,7 +38,7 @@ def spatial_cross(a: _Array, b: _Array) -> _Array:
 def skew(vector: _Array) -> _Array:
     """Return the matrices S (..., 3, 3) of vectors (..., 3): ``S @ b`` is the vector product with b."""
     out = np.zeros((*vector.shape, 3))
-    x, y, z = np.moveaxis(vector, -1, 0)
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
     return out
@@ -88,7 +88,8 @@ def unit_quaternion(a: _Array) -> _Array:
 
 def quaternion_matrix(a: _Array) -> _Array:
     """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), normalised here."""
-    x, y, z, w = np.moveaxis(unit_quaternion(a), -1, 0)
+    unit = unit_quaternion(a)
+    x, y, z, w = unit[..., 0], unit[..., 1], unit[..., 2], unit[..., 3]
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -145,7 +146,8 @@ def point_mass(mass: float, place: _Array, *, radius: float = 0.0) -> _Array:
     """Return the ten parameters (..., 10) [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of compact loads of ``mass`` kg at
     ``place`` (..., 3) m with the radius of gyration ``radius`` m about their own centre.
     """
-    x, y, z = np.moveaxis(np.asarray(place), -1, 0)
+    place = np.asarray(place)
+    x, y, z = place[..., 0], place[..., 1], place[..., 2]
     own = radius**2
     about = [y * y + z * z + own, -x * y, x * x + z * z + own, -x * z, -y * z, x * x + y * y + own]
     return mass * np.stack([np.ones_like(x), x, y, z, *about], axis=-1)

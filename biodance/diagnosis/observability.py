@@ -59,7 +59,7 @@ class Visibility:
         """
         way, cut = unit_directions(self.causes[index])[0], self.cuts[index]
         pull = (self.G[:, cut] @ way)[self._places]
-        growth = 0.5 * np.einsum("ci,cij,cj->c", pull, self._padded, pull, optimize=True)
+        growth = 0.5 * np.sum((pull[:, None] @ self._padded)[:, 0] * pull, axis=1)
         return self._fixed[index] - self._fixed, growth[index] - growth
 
     @cached_property

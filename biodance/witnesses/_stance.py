@@ -38,7 +38,7 @@ class StepCourse:
 
     def mean(self, values: Array, start: float, stop: float) -> float:
         """Return the mean of ``values`` (n,) over a part of the stance; NaN where too little of it is known."""
-        here = values[(self.phase >= start) & (self.phase <= stop)]
+        here = values[np.searchsorted(self.phase, start) : np.searchsorted(self.phase, stop, side="right")]
         known = np.isfinite(here)
         return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
 

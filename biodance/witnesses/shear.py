@@ -85,10 +85,10 @@ def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> tuple[Array, Array
     known, middle = seen.trial.markers.time, float(np.mean(part.time[[0, -1]]))
     here = (known >= part.time[0]) & (known <= part.time[-1])
     path = seen.pelvis[here, :2] if seen.pelvis is not None else np.empty((0, 2))
-    if np.isfinite(path).all(axis=1).sum() < _FRAMES:
+    told = np.isfinite(path).all(axis=1)
+    if told.sum() < _FRAMES:
         return None
-    at, path = known[here][np.isfinite(path).all(axis=1)] - middle, path[np.isfinite(path).all(axis=1)]
-    bend, speed, _ = np.polyfit(at, path, 2)
+    bend, speed, _ = np.linalg.lstsq(np.vander(known[here][told] - middle, 3), path[told], rcond=None)[0]
     belt = seen.belt(step)
     velocity = speed - (np.zeros(2) if belt is None else belt) + 2 * bend * (part.time - middle)[:, None]
     return (velocity, 2 * bend) if np.linalg.norm(velocity, axis=1).min() > _GOES else None

@@ -148,6 +148,11 @@ def trunk_joint(table: str) -> str:
     return str(found.get("trunk_joint") or trunk_joint(found.get("completed_by", BASE)))
 
 
+def _known(table: str, sex: str) -> bool:
+    """Return whether a whole table of that name speaks of a sex."""
+    return table in FAMILY.files() and table not in NO_TABLES and sex in read_segment_table(table).sexes
+
+
 def reference(table: str, subject: Subject) -> Reference:
     """Return the reference person of one table: ``de_leva_1996``, ``dumas_2018``, ``winter_2009``, ``zatsiorsky_2002``
     (men), a study of segment masses, for example ``pavol_2002`` (older adults) or ``jensen_1986_12y``, or a user's own
@@ -163,7 +168,7 @@ def reference(table: str, subject: Subject) -> Reference:
     table = str(table)
     if table in studies(subject.sex):
         return study(table, subject)
-    if not table.endswith(FAMILY.suffix) and table not in table_names(subject.sex) and table != "zatsiorsky_2002":
+    if not table.endswith(FAMILY.suffix) and not _known(table, subject.sex) and table != "zatsiorsky_2002":
         raise UnknownName.of(
             f"table of segment inertial parameters for sex {subject.sex}", table, table_names(subject.sex)
         )

@@ -92,10 +92,11 @@ class MarkerSet:
             folded.setdefault(label.casefold(), []).append(label)
         found, known = {}, set(given)
         for label, spellings in self._spellings.items():
-            exact = [spelling for spelling in spellings if spelling in known]
-            similar = [folded[s.casefold()][0] for s in spellings if len(folded.get(s.casefold(), ())) == 1]
-            if exact or similar:
-                found[label] = (exact or similar)[0]
+            alike = [spelling for spelling in spellings if spelling in known] or [
+                folded[s.casefold()][0] for s in spellings if len(folded.get(s.casefold(), ())) == 1
+            ]
+            if alike:
+                found[label] = alike[0]
         return found
 
     @cached_property

@@ -27,18 +27,23 @@ class Balls:
         return np.stack([angles[self.first + k] for k in range(3)])
 
 
+_SAME = 1e-8
+"""m, and of the entries of rotation matrices: what differs by less is equal."""
+
+
 def balls(body: Body) -> Balls:
     """Return the ball joints of ``body``."""
     first, sign = [], []
     parents = [joint.parent for joint in body.joints]
     for i in range(len(body.joints) - 2):
         one, two, three = body.joints[i : i + 3]
-        axes = np.array([joint.axis for joint in (one, two, three)])
         in_a_row = two.parent == i and three.parent == i + 1 and parents.count(i) == parents.count(i + 1) == 1
         if not (in_a_row and one.segment == two.segment == NO_SEGMENT):
             continue
-        one_point = all(np.allclose(j.translation, 0) and np.allclose(j.rotation, np.eye(3)) for j in (two, three))
-        if one_point and np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
+        axes = np.array([joint.axis for joint in (one, two, three)])
+        turns = np.array([two.rotation, three.rotation, axes @ axes.T])
+        apart = np.abs([two.translation, three.translation]).max(), np.abs(turns - np.eye(3)).max()
+        if max(apart) < _SAME:
             first.append(i)
             sign.append(np.linalg.det(axes))
     return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))

@@ -64,9 +64,9 @@ class Axis:
 
     def marked(self, count: int) -> list[tuple[int, str]]:
         """Return step and text of its ticks: those given, else about ``count`` round numbers."""
-        if self.ticks is not None:
-            return [(int(self.steps(value)), text) for value, text in self.ticks]
-        return [(int(self.steps(value)), text) for value, text in round_ticks(self.low, self.high, count)]
+        ticks = round_ticks(self.low, self.high, count) if self.ticks is None else self.ticks
+        places = self.steps([value for value, _ in ticks]).tolist()
+        return [(place, text) for place, (_, text) in zip(places, ticks, strict=True)]
 
 
 def around(values: NDArray[Any], *, least: float = 0.0, label: str = "") -> Axis:
