@@ -15,35 +15,32 @@ NO_LABEL = "no label"
 def expected(true: Row, turn: Array) -> tuple[dict[str, float | None], set[str]]:
     """Return the names that tell the fault, each with the size it should have, and names that are no false ones beside.
 
-    A size is signed as the package's files in `effects` say; None where a name has none. ``turn`` (3, 3) carries the
-    laboratory's world into the package's.
+    A size is signed as the package's files in `effects` say, and counts the tolerance that the plate has anyway; None
+    where a name has none. ``turn`` (3, 3) carries the laboratory's world into the package's.
     """
     fault = true["fault"]
     kind, target, size = fault["kind"], fault["target"], fault["size"]
     plates = true["plates"]
     labels = name_markers(true["room"]["marker_set"])
 
-    def along(sign: float) -> tuple[str, float]:
-        plate = plates[int(target[-1]) - 1]
-        vector = turn @ (np.array(plate["turn"])[:, "xyz".index(fault["axis"])]) * sign * size
-        i = int(np.abs(vector).argmax())
-        return "xyz"[i], float(vector[i])
-
-    if kind == "plate_place":
-        axis, value = along(-1)
-        return {f"plate_position {target}:{axis}": value}, set()
-    if kind == "plate_offset":
-        axis, value = along(1)
-        return {f"plate_offset {target}:F{axis}": value}, set()
+    if kind.startswith("plate_"):
+        plate = {key: np.array(value) for key, value in plates[int(target[-1]) - 1].items() if key != "make"}
+        places = {"plate_place": -plate["shift"], "plate_offset": plate["turn"] @ plate["offset"][:3]}
+        if kind in places:
+            lab, way = turn @ places[kind], turn @ plate["turn"][:, "xyz".index(fault["axis"])]
+            i = int(np.abs(way).argmax())
+            name = f"plate_position {target}:" if kind == "plate_place" else f"plate_offset {target}:F"
+            return {name + "xyz"[i]: float(lab[i])}, set()
+        if kind == "plate_yaw":
+            return {f"plate_rotation {target}:z": -float(plate["yaw"])}, set()
+        return {f"plate_gain {target}:Fz": float(plate["response"][2, 2] - 1)}, set()
     if kind.startswith("load_"):
         return {f"added_mass {lump_of(target)}": size}, set()
     wrist = "/".join(sorted(labels.get(f"{target}_{end}", NO_LABEL) for end in ("radial", "ulnar")))
     knee, side = labels.get(target, NO_LABEL), target.split("_")[0]
     return {
         "none": ({}, set()),
-        "plate_yaw": ({f"plate_rotation {target}:z": -size}, set()),
-        "plate_gain": ({f"plate_gain {target}:Fz": size}, set()),
-        "force_delay": ({"time_delay": size}, set()),
+        "force_delay": ({"time_delay": plates[0]["delay"]}, set()),
         "knee_moved": ({f"marker_misplaced {knee}": abs(size)}, set()),
         "knee_misplaced": ({f"joint_centre {side}_knee": None}, {f"segment_length {side}_thigh"}),
         "labels_exchanged": ({f"labels_swapped {wrist}": None}, set()),
