@@ -1,11 +1,7 @@
 """The low-pass: gain at the cut-off, no delay, gaps, ends, and refusals."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError
 from biodance.lab.filters import LowPass, left_raw, low_pass
@@ -28,30 +24,6 @@ def middle_gain(frequency: float, rate: float, settings: LowPass) -> float:
 @pytest.mark.parametrize("cutoff", [6.0, 10.0, 20.0])
 def test_both_passes_together_are_3_db_down_at_the_cutoff(order: int, rate: float, cutoff: float) -> None:
     assert middle_gain(cutoff, rate, LowPass(order, cutoff)) == pytest.approx(np.sqrt(0.5), abs=1e-4)
-
-
-@pytest.mark.parametrize("order", [1, 2, 5, 10])
-@pytest.mark.parametrize("rate", [50.0, 1000.0])
-def test_it_is_the_butterworth_filter_of_scipy(order: int, rate: float) -> None:
-    signal = 500 + np.cumsum(np.random.default_rng(order).normal(size=(1300, 3)), axis=0)
-    single = np.arctan(np.tan(np.pi * 10 / rate) * (np.sqrt(2) - 1) ** (-0.5 / order)) * rate / np.pi
-    expected = sosfiltfilt(butter(order, single, fs=rate, output="sos"), signal, axis=0, padlen=round(rate / 10))
-    assert low_pass(signal, rate, LowPass(order)) == pytest.approx(expected, rel=1e-10)
-
-
-def test_a_critically_damped_filter_is_a_row_of_equal_poles() -> None:
-    signal = np.random.default_rng(3).normal(size=(400, 2))
-    single = np.arctan(np.tan(np.pi * 6 / 100) / np.sqrt(2 ** (1 / 6) - 1)) * 100 / np.pi
-    sections = np.tile(butter(1, single, fs=100, output="sos"), (3, 1))
-    expected = sosfiltfilt(sections, signal, axis=0, padlen=17)
-    assert low_pass(signal, 100.0, LowPass(3, 6.0, "critically_damped")) == pytest.approx(expected, abs=1e-12)
-
-
-def test_the_everyday_way_does_not_wait_for_the_whole_of_scipy() -> None:
-    asked = "import sys, biodance.cli.session, biodance.pipeline.front, biodance.pipeline.carry; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout.split()
-    assert "scipy.linalg" in loaded
-    assert not {"scipy.signal", "scipy.stats", "cvxpy", "pandas", "pyarrow", "matplotlib"} & set(loaded)
 
 
 def test_slow_tones_pass_and_fast_ones_do_not() -> None:

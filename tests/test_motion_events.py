@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.signal import find_peaks
 
-from biodance.cycles.events import _tops, foot_events
+from biodance.cycles.events import foot_events
 from biodance.motion.contact.contact import Contact
 from biodance.records import Wrench
 
@@ -44,17 +43,3 @@ def test_a_flicker_is_no_event():
         pytest.approx(0.392),
         pytest.approx(1.208),
     ]
-
-
-def test_tops_of_a_path_are_the_peaks_of_scipy():
-    rng = np.random.default_rng(4)
-    for _ in range(60):
-        path = np.convolve(np.cumsum(rng.normal(size=600)), np.ones(15) / 150, "valid")
-        apart, prominence = int(rng.integers(1, 80)), rng.uniform(0.01, 0.5)
-        expected, _ = find_peaks(path, prominence=prominence, distance=apart)
-        assert _tops(path, prominence, apart).tolist() == expected.tolist()
-    assert expected.size
-
-
-def test_a_path_that_only_rises_has_no_top():
-    assert _tops(np.arange(50.0), 0.1, 5).size == 0

@@ -13,11 +13,10 @@ from typing import Literal
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.lab.filters import butterworth, run_both_ways
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array, Index, Motion, Wrench, runs
+from biodance.records import SIDES, Array, Motion, Wrench, runs
 
 _THRESHOLD = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
@@ -168,40 +167,18 @@ def _least(body: Body) -> float:
     return _SWING * float(np.sum(legs)) / 2
 
 
-def _tops(path: Array, prominence: float, apart: int) -> Index:
-    """Return the samples where ``path`` (T,) is highest: none within ``apart`` samples of a higher one that counts,
-    and each by ``prominence`` m above the higher one of the two valleys that part it from higher ground.
-    """
-    tops = 1 + np.flatnonzero((path[1:-1] > path[:-2]) & (path[1:-1] >= path[2:]))
-    kept: list[int] = []
-    for top in tops[np.argsort(-path[tops], kind="stable")].tolist():
-        if all(abs(top - other) >= apart for other in kept):
-            kept.append(top)
-    return np.array([top for top in sorted(kept) if _rises(path, top) >= prominence], dtype=np.intp)
-
-
-def _rises(path: Array, top: int) -> float:
-    """Return by how much a top stands above the higher one of the two valleys beside it, each as deep as it is before
-    higher ground comes.
-    """
-    valleys = []
-    for side in (path[top::-1], path[top:]):
-        higher = np.flatnonzero(side > path[top])
-        valleys.append(side[: higher[0] if higher.size else None].min())
-    return float(path[top] - max(valleys))
-
-
 def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: float) -> list[float]:
     """Return the times s at which a foot begins (``down``) or ends to go with the ground, from its ``path`` (T,) m
     ahead of the pelvis.
     """
+    from scipy.signal import butter, find_peaks, sosfiltfilt
+
     rate = motion.rate
     if rate > 2.5 * _EVENT_CUTOFF:
-        sections = butterworth(2, np.tan(np.pi * _EVENT_CUTOFF / rate))
-        path = run_both_ways(sections, path[:, None], min(20, path.size - 1))[:, 0]
+        path = sosfiltfilt(butter(2, _EVENT_CUTOFF, fs=rate, output="sos"), path, padlen=min(20, path.size - 1))
     speed = np.gradient(path, motion.time)
     ground = float(np.median(speed[speed < 0]))
-    tops = _tops(path if down else -path, prominence, max(1, round(_APART * rate)))
+    tops, _ = find_peaks(path if down else -path, prominence=prominence, distance=max(1, round(_APART * rate)))
     step, level = (1, _STRIKES * ground) if down else (-1, _LEAVES * ground)
     found = []
     for top in tops[motion.determined[tops]]:

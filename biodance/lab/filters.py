@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtbtrs
+from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError
 from biodance.records import Array, runs
@@ -75,51 +75,12 @@ def design_low_pass(settings: LowPass, rate: float) -> Array:
             f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off "
             f"below {rate / 2:g} Hz."
         )
-    wanted, order = np.tan(np.pi * settings.cutoff / rate), settings.order
+    wanted = np.tan(np.pi * settings.cutoff / rate)
     if settings.kind == "critically_damped":
-        return _sections(wanted / np.sqrt(2 ** (0.5 / order) - 1), np.zeros(0), order)
-    return butterworth(order, wanted * (np.sqrt(2) - 1) ** (-0.5 / order))
-
-
-def butterworth(order: int, k: float) -> Array:
-    """Return second-order sections (S, 6) of a Butterworth low-pass, ``k`` = tan(pi cut-off / rate)."""
-    angles = np.pi * (2 * np.arange(order // 2) + 1) / (2 * order)
-    return _sections(k, 2 * np.sin(angles), order % 2)
-
-
-def _sections(k: float, pairs: Array, single: int) -> Array:
-    """Return second-order sections (S, 6) of a low-pass by the bilinear map: of every pair of poles s² + ``pairs`` k s
-    + k² and of ``single`` real poles s + k, where k is the tangent of half the digital frequency.
-    """
-    size = 1 + pairs * k + k**2
-    fed, held = k**2 / size, np.ones_like(size)
-    double = np.stack([fed, 2 * fed, fed, held, 2 * (k**2 - 1) / size, 2 * (1 + k**2) / size - 1], axis=1)
-    one = np.array([k, k, 0.0, 1 + k, k - 1, 0.0]) / (1 + k)
-    return np.concatenate([double, np.tile(one, (single, 1))])
-
-
-def run_both_ways(sections: Array, values: Array, reach: int) -> Array:
-    """Return ``values`` (T, n) run through ``sections`` (S, 6) of gain 1 at rest, forwards and then backwards, the ends
-    continued by point reflection over ``reach`` < T samples; each pass starts at rest at its first sample.
-    """
-    before, after = 2 * values[:1] - values[reach:0:-1], 2 * values[-1:] - values[-2 : -2 - reach : -1]
-    out = np.concatenate([before, values, after])
-    for _ in range(2):
-        out = _run(sections, out)[::-1]
-    return np.asarray(out[reach : len(out) - reach])
-
-
-def _run(sections: Array, values: Array) -> Array:
-    """Return ``values`` (T, n) run through the sections once: each is a triangular system with two bands."""
-    rest = values[0]
-    out = np.asfortranarray(values - rest)
-    for b0, b1, b2, _, a1, a2 in sections:
-        fed = b0 * out
-        fed[1:] += b1 * out[:-1]
-        fed[2:] += b2 * out[:-2]
-        band = np.repeat([[1.0], [a1], [a2]], len(out), axis=1)
-        out = dtbtrs(band, fed, uplo="L", diag="U", overwrite_b=True)[0]
-    return np.asarray(out + rest)
+        raised = wanted / np.sqrt(2 ** (0.5 / settings.order) - 1)
+        return np.tile(butter(1, np.arctan(raised) * rate / np.pi, fs=rate, output="sos"), (settings.order, 1))
+    raised = wanted * (np.sqrt(2) - 1) ** (-0.5 / settings.order)
+    return butter(settings.order, np.arctan(raised) * rate / np.pi, fs=rate, output="sos")
 
 
 def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
@@ -147,11 +108,11 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     out = columns.copy()
     whole = ~np.isnan(columns).any(axis=0)
     if whole.any():
-        out[:, whole] = run_both_ways(sections, columns[:, whole], need - 1)
+        out[:, whole] = sosfiltfilt(sections, columns[:, whole], axis=0, padlen=need - 1)
     for column in np.flatnonzero(~whole):
         for start, stop in runs(~np.isnan(columns[:, column])):
             if stop - start >= need:
-                out[start:stop, [column]] = run_both_ways(sections, columns[start:stop, [column]], need - 1)
+                out[start:stop, column] = sosfiltfilt(sections, columns[start:stop, column], padlen=need - 1)
     return out.reshape(values.shape)
 
 

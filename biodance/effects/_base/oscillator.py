@@ -5,8 +5,7 @@ only sets the place of rest. The ground then carries m (a + x'') instead of m a,
 """
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.linalg.lapack import dtbtrs
+from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
 from biodance.effects._base.case import Case
 from biodance.records import Array
@@ -21,20 +20,13 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     point.
     """
     w = 2 * np.pi * frequency
-    A = np.array([[0.0, 1.0], [-w * w, -2 * damping * w]])
-    whole = np.zeros((4, 4))  # state, input and its slope over one sample (Van Loan 1978, doi:10.1109/TAC.1978.1101743)
-    whole[:2, :2], whole[:2, 2], whole[2, 3] = A / rate, (0.0, -1.0 / rate), 1.0
-    step = expm(whole)
-    slope = np.diff(acceleration, axis=0)
-    states = np.zeros((len(acceleration), 2, acceleration.shape[1]))
-    states[0, 0] = -acceleration[0] / (w * w)
-    states[1:] = step[:2, 2, None] * acceleration[:-1, None] + step[:2, 3, None] * slope[:, None]
-    band = np.zeros((4, 2 * len(states)))  # state k+1 less step of state k, one row after the other
-    band[0] = 1.0
-    for row, column in np.ndindex(2, 2):
-        band[2 + row - column, column::2] = -step[row, column]
-    solved, _ = dtbtrs(band, states.reshape(len(band[0]), -1), uplo="L")
-    place, speed = np.moveaxis(solved.reshape(states.shape), 1, 0)
+    system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
+    A, B, C, D, _ = cont2discrete(system, 1 / rate, method="foh")
+    numerators, denominator = ss2tf(A, B, C, D)
+    place, speed = (
+        lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0]
+        for b in numerators
+    )
     return place, -acceleration - w * w * place - 2 * damping * w * speed
 
 
