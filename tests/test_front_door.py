@@ -156,6 +156,10 @@ def test_a_visit_is_exported_as_it_is_in_memory(result, tmp_path):
     assert "endheader" in path.read_text()
     with pytest.raises(biodance.UnknownName, match="Did you mean 'squat_1'"):
         biodance.export(result, tmp_path / "no.mot", format="mot", trial="squat1")
+    place, said = biodance.export(result, tmp_path / "bids", format="bids", trial="squat_1")
+    assert {one.name.split("_")[1] for one in place.rglob("*_motion.tsv")} == {"task-squat1"}
+    with pytest.raises(biodance.BiodanceError, match="--trial: a file of format osim holds one body"):
+        biodance.export(result, tmp_path / "no.osim", format="osim", trial="squat_1")
 
 
 def test_the_commit_is_that_of_the_checkout_and_unknown_in_a_wheel(tmp_path):

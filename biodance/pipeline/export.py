@@ -26,8 +26,8 @@ from biodance.records import Motion, Session, Trial
 _SHIPPED = {"hoap3": hoap3}
 """Robots whose bodies are built from our own tables."""
 _NO_TRIAL = (
-    "--trial: a {} file holds one body, which belongs to the whole session and to no trial. Leave --trial away, or "
-    "set the roles in session.toml to identify from that trial alone."
+    "--trial: a file of format {} holds one body, which belongs to the whole session and to no trial. Leave --trial "
+    "away, or set the roles in session.toml to identify from that trial alone."
 )
 MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids", "rerun")
 """Formats that need a recording beside the body."""
