@@ -90,7 +90,7 @@ def _second(values: Array, step: float) -> Array:
 
 
 def _vector(turn: Array) -> Array:
-    """Return the rotation vectors (..., 3) of rotations (..., 3, 3) by less than half a turn."""
-    axis = np.stack([turn[..., k - 1, k - 2] - turn[..., k - 2, k - 1] for k in range(3)], axis=-1) / 2
-    sine, cosine = np.sqrt(np.sum(axis**2, axis=-1)), (np.trace(turn, axis1=-2, axis2=-1) - 1) / 2
-    return np.asarray(axis / np.sinc(np.arctan2(sine, cosine) / np.pi)[..., None])
+    """Return the rotation vectors of small rotations (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
