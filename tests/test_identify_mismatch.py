@@ -25,14 +25,13 @@ from biodance.identification.mismatch import (
 from biodance.identification.posterior import posterior
 from biodance.identification.statistics import layout_for, statistics
 from biodance.motion.kinematics import chains, jacobian, poses
-from biodance.motion.regressor import regressor
 from biodance.records import CHANNELS, Subject
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.joints import joint_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, around_zero, plate_sources
 from biodance.uncertainty.response import neighbours
-from biodance.uncertainty.sources import deviations, forward, of_markers
+from biodance.uncertainty.sources import deviations, of_markers
 
 BANDS = Bands((0.0, 1.0, 10.0), 25.0)
 
@@ -136,31 +135,6 @@ def test_mismatch_is_reproducible_and_scaled_to_the_markers() -> None:
     np.testing.assert_allclose(second[:, :-rigid], 2 * first[:, :-rigid], rtol=1e-9)
     np.testing.assert_array_equal(second[:, -rigid:], first[:, -rigid:])
     np.testing.assert_array_equal(with_residual(1e-6), plain.kinematics)
-
-
-def test_scores_are_what_every_run_says_of_the_errors_sent_forward(monkeypatch: pytest.MonkeyPatch) -> None:
-    body, truth, rng = person(11)
-    fit = noisy_fit(body, smooth_motion(body, rng, frames=600), truth, rng)
-    fit = replace(fit, use=np.abs(np.arange(600) - 300) > 20)
-    factor = rng.normal(size=(2, 6, 6)) + 4 * np.eye(6)
-    noise = Noise(factor @ np.swapaxes(factor, 1, 2), np.array([0.2, 0.1, 0.0]), BANDS)
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    alone = mismatch(body, (fit,), noise)
-    monkeypatch.delenv("OMP_NUM_THREADS")
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1}, raising=False)
-    beside = mismatch(body, (fit,), noise)
-    np.testing.assert_array_equal(alone.kinematics, beside.kinematics)
-    np.testing.assert_array_equal(alone.plates, beside.plates)
-    white, sources, plain = noise.at(fit.motion.rate), of_markers(body), 0.0
-    for pick in noise.bands.runs(fit.use, fit.motion.rate):
-        motion = fit.motion.at(pick)
-        rows, errors = (white.whiten(x) for x in (regressor(body, motion), forward(sources, motion).wrench))
-        plain = plain + np.einsum("tcp,tck->pk", rows, errors)
-    plain = plain * deviations(body, sources)
-    np.testing.assert_allclose(alone.kinematics, plain, rtol=1e-9, atol=1e-9 * np.abs(plain).max())
-    soft = np.array([not joint for source in sources for joint in source.joints])
-    more = mismatch(body, (fit,), noise, skin=1.7).kinematics
-    np.testing.assert_allclose(more, plain * np.where(soft, 1.7, 1.0), rtol=1e-9, atol=1e-9 * np.abs(plain).max())
 
 
 def test_weighted_rows_are_whitened_twice() -> None:

@@ -1,8 +1,6 @@
 """The linear algebra runs on one thread inside the stages and is left as it was; records may be sent at any time."""
 
-import os
 import pickle
-import threading
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +13,7 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.stance import Stance
-from biodance.threads import Sendable, one_thread, side_by_side
+from biodance.threads import Sendable, one_thread
 
 
 def counts() -> set[int]:
@@ -47,33 +45,6 @@ def test_it_comes_back_after_a_failure() -> None:
         fail()
     assert inside == [{1}]
     assert counts() == before
-
-
-def test_two_pieces_at_a_time_and_the_answers_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
-    both = threading.Barrier(2, timeout=60.0)
-
-    def meet(piece: int) -> tuple[int, int]:
-        both.wait()  # never passed by one thread alone
-        return piece, threading.get_ident()
-
-    found = list(side_by_side(meet, iter(range(6))))
-    assert [piece for piece, _ in found] == list(range(6))
-    assert len({thread for _, thread in found}) == 2
-
-
-@pytest.mark.parametrize("why", ["the environment says so", "one core", "another process has started this one"])
-def test_who_has_neighbours_goes_one_by_one(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "1" if "environment" in why else "2")
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0} if why == "one core" else {0, 1}, raising=False)
-    monkeypatch.setattr("multiprocessing.parent_process", lambda: object() if "process" in why else None)
-    assert set(side_by_side(lambda _: threading.get_ident(), range(4))) == {threading.get_ident()}
-
-
-def test_a_failure_beside_others_is_told() -> None:
-    with pytest.raises(ZeroDivisionError):
-        list(side_by_side(lambda piece: 1 // piece, [1, 2, 0, 3]))
 
 
 class Meanwhile:

@@ -8,7 +8,6 @@ under which the session's own b is most probable given the table (evidence). Wha
 for the parameters is H (...)^-1 H in place of H.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +20,11 @@ from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Index, Sip
-from biodance.uncertainty.bands import Bands
+from biodance.records import Array, Sip
 from biodance.uncertainty.caution import shift_slope
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
-from biodance.uncertainty.response import Response
+from biodance.uncertainty.response import ErrorSource, Response
 from biodance.uncertainty.sources import deviations, of_markers, transpose
 
 EVERY = 8
@@ -57,50 +55,33 @@ class Sizes:
     noise: float
 
 
-def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, skin: float | None = None) -> Mismatch:
+def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
     """Return the scores of kinematics and plates over all trials.
 
-    Skin and flesh slide ``skin`` times as much as the table says (as `restless_skin` finds it, if None).
+    Skin and flesh slide as much as the table says, or more where the markers' residuals are larger than that predicts.
     """
     whole, shares = parts_as_segments(body), share_errors(body)
     found, sources, plates = nothing(body), of_markers(whole), plate_sources()
-
-    scores, plate_scores = np.array(found.kinematics), np.array(found.plates)
-    for fit, pick in _long_runs(fits, noise.bands):
-        motion = fit.motion.at(pick)
-        links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
-        W = links if body.sharing is None else links @ body.sharing
-        weight = noise.at(fit.motion.rate).weighted(W)
-        scores += transpose(sources, trial, weight).T
-        wrong = np.concatenate([plate_errors(W @ body.sip.phi, motion.rate, noise, plates), links @ shares], axis=2)
-        plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
-    soft = np.array([not joint for source in sources for joint in source.joints])
-    more = restless_skin(body, fits, noise.bands) if skin is None else skin
-    return Mismatch(scores * np.where(soft, more, 1.0) * deviations(whole, sources), plate_scores)
-
-
-def restless_skin(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
-    """Return how much more than the table says skin and flesh slide, by the markers' residuals; never less than 1.
-
-    It hangs on no noise: who asks for the scores with several noises finds it once.
-    """
-    whole = parts_as_segments(body)
-    sources, predicted, observed = of_markers(whole), 0.0, 0.0
-    sd = deviations(whole, sources)
-    for fit, pick in _long_runs(fits, bands):
-        if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
-            few = pick[:: min(EVERY, max(1, pick.size // 2))]
-            trial = Response.of(whole, fit.motion.at(few))
-            squares = np.concatenate([source.squares(trial) for source in sources])
-            predicted += float(sd**2 @ squares) * pick.size
-            observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
-    return float(np.sqrt(max(1.0, observed / predicted))) if predicted > 0 else 1.0
-
-
-def _long_runs(fits: tuple[Fit, ...], bands: Bands) -> Iterator[tuple[Fit, Index]]:
-    """Yield every run of frames of the trials that is no shorter than `SHORTEST`."""
+    sd, scores, plate_scores = deviations(sources[0].body, sources), np.array(found.kinematics), np.array(found.plates)
+    predicted, observed = 0.0, 0.0
     for fit in fits:
-        yield from ((fit, pick) for pick in bands.runs(fit.use, fit.motion.rate) if pick.size >= SHORTEST)
+        white = noise.at(fit.motion.rate)
+        for pick in noise.bands.runs(fit.use, fit.motion.rate):
+            if pick.size < SHORTEST:
+                continue
+            motion = fit.motion.at(pick)
+            links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
+            W = links if body.sharing is None else links @ body.sharing
+            weight = white.weighted(W)
+            scores += transpose(sources, trial, weight).T
+            wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
+            plate_scores += np.tensordot(weight, np.concatenate([wrong, links @ shares], axis=2), axes=((0, 1), (0, 1)))
+            if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
+                predicted += float(sd**2 @ _marker_squares(trial, sources)) * pick.size
+                observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
+    soft = np.array([not joint for source in sources for joint in source.joints])
+    more = np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0
+    return Mismatch(scores * np.where(soft, more, 1.0) * sd, plate_scores)
 
 
 def nothing(body: Body) -> Mismatch:
@@ -136,6 +117,14 @@ def _part_errors(name: str, phi: Array) -> Array:
     """
     off = error_size("part_com", "head" if name == "head" else "other")
     return np.column_stack([error_size("segment_mass", "floor") * phi, off * shift_slope(phi)])
+
+
+def _marker_squares(trial: Response, sources: tuple[ErrorSource, ...]) -> Array:
+    """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
+    of `EVERY` frames (two at least).
+    """
+    few = trial.at(slice(None, None, min(EVERY, max(1, trial.motion.time.size // 2))))
+    return np.concatenate([source.squares(few) for source in sources])
 
 
 def covariance(H: Array, found: Mismatch, sizes: Sizes) -> Array:

@@ -16,7 +16,6 @@ from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.errors import UnknownName
 from biodance.records import Array, Motion
-from biodance.threads import side_by_side
 from biodance.uncertainty.joints import Centre, Tilt
 from biodance.uncertainty.response import ErrorSource, Response
 from biodance.uncertainty.soft_tissue import Flesh, Sag, Slide
@@ -102,13 +101,8 @@ def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) 
     to the wrench.
     """
     back, sums = trial.back(weight), np.zeros((sum(len(source.groups) for source in sources), weight.shape[2]))
-
-    def summed(piece: tuple[slice, Response]) -> Array:
-        frames, part = piece
-        return np.concatenate([source.transpose(part, back[frames]) for source in sources])
-
-    for some in side_by_side(summed, trial.parts()):
-        sums += some
+    for frames, part in trial.parts():
+        sums += np.concatenate([source.transpose(part, back[frames]) for source in sources])
     return sums
 
 
