@@ -211,12 +211,11 @@ def _files_in(place: Path, suffix: str, _stamp: int) -> Mapping[str, Path]:
 
 @cache
 def _known(family: Family[Any], path: tuple[str, ...], packages: tuple[str, ...]) -> Mapping[str, Any]:
-    """Return the members of a family by name; another folder or sys.path makes the answer stale."""
+    """Return a family by name; another folder or sys.path makes the answer stale."""
     return family._by_name(_found(family, path, packages))
 
 
 def _found(family: Family[Any], path: tuple[str, ...], packages: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
-    """Return the members in a folder and those of the entry points, each with where it is written."""
     return (*_of_folder(family, path), *_of_entry_points(family, packages))
 
 
@@ -238,16 +237,13 @@ def _of_module(family: Family[Any], name: str) -> tuple[Any, str]:
     if family.provides and not hasattr(module, family.provides):
         raise BiodanceError(
             f"{file}: defines no {family.provides}, so it is no {family.kind}. Define it, let the file's name start "
-            f"with '_' if it is a "
-            "helper, or move the file away."
+            "with '_' if it is a helper, or move the file away."
         )
     return (getattr(module, family.provides) if family.provides else module), file
 
 
 def _of_entry_points(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[Any, str], ...]:
-    """Return the members that installed packages offer, each with who offers it; a module stands for what it
-    ``provides``.
-    """
+    """Return what installed packages offer, each with who offers it; a module stands for what it ``provides``."""
     found = []
     for entry in _offered(family.group, path):
         member = _loaded(entry, family.kind)
@@ -258,9 +254,8 @@ def _of_entry_points(family: Family[Any], path: tuple[str, ...]) -> tuple[tuple[
 
 
 def _offered(group: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group, by name."""
-    found = (entry for entry in _entry_points(path) if entry.group == group)
-    return tuple(sorted(found, key=lambda entry: (entry.name, entry.value)))
+    mine = (entry for entry in _entry_points(path) if entry.group == group)
+    return tuple(sorted(mine, key=lambda entry: (entry.name, entry.value)))
 
 
 @cache
