@@ -4,6 +4,8 @@ Relative to the point, x'' + 2 damping w x' + w² x = -a with w = 2 pi frequency
 only sets the place of rest. The ground then carries m (a + x'') instead of m a, at the place c + x instead of c.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, lfilter_zi, ss2tf
 
@@ -19,15 +21,20 @@ def relative_motion(acceleration: Array, rate: float, *, frequency: float, dampi
     ``rate`` Hz; ``frequency`` Hz and ``damping`` (1 = critical) of the free mass, which starts at rest on the moving
     point.
     """
-    w = 2 * np.pi * frequency
-    system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
-    A, B, C, D, _ = cont2discrete(system, 1 / rate, method="foh")
-    numerators, denominator = ss2tf(A, B, C, D)
+    w, (numerators, denominator) = 2 * np.pi * frequency, _filters(rate, frequency, damping)
     place, speed = (
         lfilter(b, denominator, acceleration, axis=0, zi=lfilter_zi(b, denominator)[:, None] * acceleration[:1])[0]
         for b in numerators
     )
     return place, -acceleration - w * w * place - 2 * damping * w * speed
+
+
+@lru_cache(maxsize=64)
+def _filters(rate: float, frequency: float, damping: float) -> tuple[Array, Array]:
+    """Return numerators (2, 3), of place and speed, and their denominator (3,): the free mass, sampled."""
+    w = 2 * np.pi * frequency
+    system = (np.array([[0, 1], [-w * w, -2 * damping * w]]), np.array([[0], [-1]]), np.eye(2), np.zeros((2, 1)))
+    return ss2tf(*cont2discrete(system, 1 / rate, method="foh")[:4])
 
 
 def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
