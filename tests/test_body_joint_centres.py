@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.body.human.measures import chord, davis_hip, harrington_hip, pelvis_frame, shoulder, unit, wrist
+from biodance.body.human.measures import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.lab.c3d.raw import read_raw
 
 DATA = os.environ.get("BIODANCE_DATA")
@@ -93,13 +93,7 @@ def test_knee_ankle_shoulder_elbow_and_wrist_are_vicons_own(folder: str) -> None
             "FEO": chord(at[f"{side}FEP"], at[f"{side}KNE"], reach("KNEE"), at[f"{side}THI"]),
             "TIO": chord(at[f"{side}FEO"], at[f"{side}ANK"], reach("ANKLE"), at[f"{side}TIB"]),
             "CLO": shoulder(at["CLAV"] - radius * forward, forward, at[f"{side}SHO"], offset, side=sign),
-            "HUO": chord(
-                at[f"{side}CLO"],
-                at[f"{side}ELB"],
-                reach("ELBOW"),
-                at[f"{side}ELB"]
-                + sign * unit(np.cross(middle - at[f"{side}ELB"], at[f"{side}CLO"] - at[f"{side}ELB"])),
-            ),
+            "HUO": elbow(at[f"{side}CLO"], at[f"{side}ELB"], middle, reach("ELBOW"), side=sign),
             "RAO": wrist(at[f"{side}HUO"], at[f"{side}WRA"], at[f"{side}WRB"], reach("WRIST"), side=sign),
         }
         for centre, place in found.items():

@@ -9,7 +9,6 @@ import numpy as np
 
 from biodance.body.human.standing import StaticPosture
 from biodance.body.tables.anthropometry import proportion
-from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array, Subject, Trial
 
 _MM = 1e-3
@@ -82,36 +81,14 @@ def shoulder(trunk_origin: Array, forward: Array, acromion: Array, offset: float
     return chord(trunk_origin, acromion, offset, acromion + up)
 
 
-_STEPS = 20
-"""Steps of an elbow's axis and centre in turn."""
+def elbow(shoulder_centre: Array, lateral: Array, mid_wrist: Array, distance: float, *, side: float) -> Array:
+    """Return the elbow centre (3,) m from the lateral epicondyle alone: its axis is square to the plane of shoulder,
+    marker and wrist.
 
-
-def lateral_elbow(
-    shoulder_centre: Array, lateral: Array, mid_wrist: Array, distance: float, outward: Array
-) -> tuple[Array, float]:
-    """Return the elbow centre (3,) m from the lateral epicondyle alone, and the standard deviation (rad) of the turn of
-    its axis about the arm.
-
-    The axis leads from the centre to the marker. A bent arm shows it: it is square to upper arm and forearm, the surer
-    the more the arm is bent. A straight one does not, so there the convention counts: ``outward`` (3,), away from the
-    trunk, square to the line of march. Both are weighed by their precisions. (The plane of shoulder, marker and wrist
-    of plug-in gait is no answer: the marker lies beside the arm, which turns that plane by 40 to 75 degrees.)
+    As in plug-in gait; wrong by centimetres where the arm hangs straight. With a medial marker use the middle instead.
     """
-    straight, bent_sd = (error_size("axis_turn", f"elbow {arm} arm", state="before") for arm in ("straight", "bent"))
-
-    def across(centre: Array) -> tuple[Array, float]:
-        up, down = unit(shoulder_centre - centre), unit(mid_wrist - centre)
-        bent = np.cross(down, up)
-        bent *= np.sign(bent @ outward) or 1.0
-        usual = unit(outward - (outward @ up) * up)
-        sine = float(np.linalg.norm(bent))
-        return unit(bent * sine / bent_sd**2 + usual / straight**2), sine
-
-    centre = lateral - distance * unit(outward)
-    for _ in range(_STEPS):
-        axis, sine = across(centre)
-        centre = chord(shoulder_centre, lateral, distance, lateral + axis)
-    return centre, float((sine**2 / bent_sd**2 + 1 / straight**2) ** -0.5)
+    normal = side * np.cross(mid_wrist - lateral, shoulder_centre - lateral)
+    return chord(shoulder_centre, lateral, distance, lateral + unit(normal))
 
 
 def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, side: float) -> Array:

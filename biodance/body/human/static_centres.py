@@ -9,8 +9,8 @@ from biodance.body.human.measures import (
     Measures,
     chord,
     davis_hip,
+    elbow,
     harrington_hip,
-    lateral_elbow,
     pelvis_frame,
     shoulder,
     unit,
@@ -27,8 +27,6 @@ WRIST_BAR = 0.03
 """m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
 AXIS_TOLERANCE = 30.0
 """deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
-_HARDLY_BENT = 0.35
-"""rad: an elbow's axis less sure than that is mostly the convention's, and is told."""
 Places = Mapping[str, Array]
 
 
@@ -72,8 +70,7 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
     middle = (hips["right"] + hips["left"]) / 2
     shoulders = shoulder_centres(mark, sizes, middle)
     place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
-    right, lateral, across, sole = {}, {}, {}, {}
-    axis_sd: dict[str, float] = {}
+    right, axis_sd, lateral, across, sole = {}, {}, {}, {}, {}
     notes: list[str] = []
     for side, sign in SIGN.items():
         knee, note = knee_centre(mark, sizes, hips[side], pelvis[:, 2], side)
@@ -84,21 +81,13 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
             f"{side}_ankle": ankle_centre(mark, sizes, knee, side),
         }
         place[f"{side}_shoulder"] = shoulders[side]
-        place[f"{side}_elbow"], place[f"{side}_wrist"], elbow_sd = arm_centres(mark, sizes, shoulders, side)
-        if elbow_sd > _HARDLY_BENT:
-            notes.append(
-                f"{side.capitalize()} elbow: no medial marker and an arm that hangs straight, axis taken square to the "
-                f"line of march (± {np.degrees(elbow_sd):.0f} degrees) until a movement that bends it shows more."
-            )
-        knee_way = "line of march" if note else "thigh marker"
-        knee_way = "medial marker" if f"{side}_knee_medial" in mark else knee_way
-        axis_sd |= {
-            f"{side}_knee": error_size("axis_turn", f"knee {knee_way}", state="before"),
-            f"{side}_elbow": elbow_sd,
-        }
-        for name in (f"{side}_knee", f"{side}_elbow"):
+        place[f"{side}_elbow"], place[f"{side}_wrist"] = arm_centres(mark, sizes, shoulders[side], side)
+        for joint, otherwise in (("knee", "line of march" if note else "thigh marker"), ("elbow", "straight arm")):
+            name = f"{side}_{joint}"
             lateral[name] = mark[f"{name}_lateral"]
             right[name] = sign * (lateral[name] - place[name])
+            way = "medial marker" if f"{name}_medial" in mark else otherwise
+            axis_sd[name] = error_size("axis_turn", f"{joint} {way}", state="before")
         along = mark[f"{side}_toe"] - mark[f"{side}_heel"]
         across[side] = np.cross(along, UP)
         sole[side] = UP if flat else np.cross(across[side], along)
@@ -181,9 +170,9 @@ def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Arra
     return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
 
 
-def arm_centres(place: Places, sizes: Measures, shoulders: Places, side: str) -> tuple[Array, Array, float]:
-    """Return elbow and wrist centre, m, and the standard deviation (rad) of the turn of the elbow's axis: the elbow in
-    the middle of its epicondyle markers, or inside the lateral one (`lateral_elbow`).
+def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
+    """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait
+    construction.
 
     The wrist is the middle of its two markers, unless they are so much farther apart than the wrist is wide that they
     sit on a bar behind it; then the plug-in-gait construction. (Mean plug-in-gait static of 9 adults: with a bar, the
@@ -192,14 +181,12 @@ def arm_centres(place: Places, sizes: Measures, shoulders: Places, side: str) ->
     lateral, radial, ulnar = (place[f"{side}_{name}"] for name in ("elbow_lateral", "wrist_radial", "wrist_ulnar"))
     middle = (radial + ulnar) / 2
     if f"{side}_elbow_medial" in place:
-        known = error_size("axis_turn", "elbow medial marker", state="before")
-        return (lateral + place[f"{side}_elbow_medial"]) / 2, middle, known
-    distance, outward = sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, shoulders["right"] - shoulders["left"]
-    at, sd = lateral_elbow(shoulders[side], lateral, middle, distance, SIGN[side] * outward)
+        return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
+    at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
     reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
     if np.linalg.norm(radial - ulnar) < 2 * reach + WRIST_BAR:
-        return at, middle, sd
-    return at, wrist(at, radial, ulnar, reach, side=SIGN[side]), sd
+        return at, middle
+    return at, wrist(at, radial, ulnar, reach, side=SIGN[side])
 
 
 @dataclass(frozen=True, eq=False)
