@@ -98,7 +98,7 @@ class LoadView:
         """Return half the logarithm (n,) of how much better the place of loads of ``masses`` (n,) kg is known after
         the data: what the evidence of each mass pays for places that the data exclude.
         """
-        return 0.5 * _log_wide(1 + masses[:, None] ** 2 * self.strength)
+        return np.asarray(0.5 * np.log(1 + masses[:, None] ** 2 * self.strength).sum(axis=1))
 
     def log_ratio_if(self, true: float, masses: Array) -> Array:
         """Return the same (n,) if the data showed a load of ``true`` kg at the mean place and nothing else."""
@@ -123,21 +123,14 @@ def _at_the_mean(view: LoadView, masses: bytes) -> tuple[Array, Array]:
     might be there.
     """
     wide = 1 + np.frombuffer(masses)[:, None] ** 2 * view.strength
-    return (view.unit**2 / wide).sum(axis=1), _log_wide(wide)
+    return (view.unit**2 / wide).sum(axis=1), np.log(wide).sum(axis=1)
 
 
 def _log_ratio(m: Array, shown: float, squares: float, surprise: Array, unit: Array, strength: Array) -> Array:
     """Return log N(y; m b, 1 + m² D D') - log N(y; 0, 1) for masses ``m`` (n, 1)."""
     wide = 1 + m**2 * strength
-    spread = ((m * (surprise - m * unit)) ** 2 / wide).sum(axis=1) - _log_wide(wide)
-    return np.asarray(m[:, 0] * shown - 0.5 * m[:, 0] ** 2 * squares + 0.5 * spread)
-
-
-def _log_wide(wide: Array) -> Array:
-    """Return the logarithm (n,) of the product of each row of ``wide`` (n, k), all at least 1: of a few directions the
-    product is taken first, one logarithm instead of k.
-    """
-    return np.asarray(np.log(wide.prod(axis=1)))
+    spread = (m * (surprise - m * unit)) ** 2 / wide - np.log(wide)
+    return np.asarray(m[:, 0] * shown - 0.5 * m[:, 0] ** 2 * squares + 0.5 * spread.sum(axis=1))
 
 
 def log_mass_prior(masses: Array) -> Array:
