@@ -75,7 +75,7 @@ def test_hips_that_go_with_the_trunk_are_one_call_and_alone_another() -> None:
     assert calls(BODY, REST, REST, FEET, (HIPS, np.array([0, 0, 40.0]))) == ("bow forward from the hips by about 45°",)
     low = np.array([0.0, 0.0, 60.0])
     assert calls(BODY, REST, posture(trunk_flexion=30), FEET, (HIPS, low)) == (
-        "lean the trunk forward by about 30°, hips too by about 60°",
+        "lean the trunk forward by about 30°, hips too, by about 60°",
     )
     assert calls(BODY, posture(trunk_flexion=30), REST, FEET, (low, HIPS)) == ("bring the trunk upright, hips too",)
 

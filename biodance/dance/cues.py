@@ -173,7 +173,7 @@ def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
 
 def _rest(trunk: float, hips: float) -> str:
     """Return how far the hips go (degrees) where it is not as far as the trunk."""
-    return "" if _rounded(trunk) == _rounded(hips) else f" by about {_rounded(hips):.0f}°"
+    return "" if _rounded(trunk) == _rounded(hips) else f", by about {_rounded(hips):.0f}°"
 
 
 def instructions(body: Body, before: Array, after: Array, was: Stance | None, now: Stance) -> tuple[str, ...]:
