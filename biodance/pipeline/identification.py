@@ -15,12 +15,11 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
-from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.load_place import nearest_segment
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
-from biodance.identification.torques import TorqueBands
+from biodance.identification.torques import Impact, TorqueBands, impacts
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
