@@ -1,0 +1,42 @@
+"""Names beside a body that is more unlike the table than people are."""
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, known, looks
+from scipy.interpolate import make_interp_spline
+
+from biodance.diagnosis.adequacy import STRAINED, strain
+from biodance.diagnosis.engine import STRANGE, diagnose_trials
+from biodance.diagnosis.strange import as_strange
+
+CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
+
+
+def late(wrench, session, moving):
+    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
+
+
+def diagnosed(hidden, *, unlike: float):
+    some = looks(1, hidden=hidden, unlike=unlike)
+    return diagnose_trials(body(), some, tolerances=known(), effects=CAUSES)
+
+
+def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_is_not() -> None:
+    strange = diagnosed(late, unlike=4.0)
+    assert strain(strange.naming.found) > STRAINED
+    assert strange.diagnosis.verdict == "named, incomplete"
+    assert STRANGE in strange.diagnosis.notes
+    (finding,) = strange.diagnosis.findings
+    (size,) = finding.parameters
+    assert finding.effect == "time_delay"
+    assert size.interval[0] < 0.02 < size.interval[1]
+    clean = diagnosed(lambda wrench, session, moving: wrench, unlike=4.0).diagnosis
+    assert clean.verdict == "unexplained"
+    assert not clean.findings
+
+
+def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed() -> None:
+    wide, usual = (diagnosed(lambda w, s, m: w, unlike=size).naming.bare for size in (4.0, 0.7))
+    assert strain(wide) > STRAINED > abs(strain(as_strange(wide)))
+    np.testing.assert_array_equal(as_strange(usual).belief.X, usual.belief.X)
+    assert as_strange(usual).log_likelihood == pytest.approx(usual.log_likelihood)
