@@ -16,8 +16,8 @@ def late(wrench, session, moving):
     return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
 
 
-def diagnosed(hidden, *, unlike: float):
-    some = looks(1, hidden=hidden, unlike=unlike)
+def diagnosed(hidden, *, unlike: float, trials: int = 4):
+    some = looks(1, hidden=hidden, unlike=unlike, trials=trials)
     return diagnose_trials(body(), some, tolerances=known(), effects=CAUSES)
 
 
@@ -30,6 +30,9 @@ def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_i
     (size,) = finding.parameters
     assert finding.effect == "time_delay"
     assert size.interval[0] < 0.02 < size.interval[1]
+    alone = diagnosed(late, unlike=6.0, trials=1)
+    assert strain(alone.naming.found) > STRAINED
+    assert not alone.diagnosis.findings, "one trial does not show that the delay is the same in another one"
     clean = diagnosed(lambda wrench, session, moving: wrench, unlike=4.0).diagnosis
     assert clean.verdict == "unexplained"
     assert not clean.findings

@@ -25,8 +25,11 @@ def as_strange(found: Model) -> Model:
 
 def firm(found: Model, accepted: tuple[Round, ...]) -> set[tuple[str, str]]:
     """Return effect and target of the named causes whose evidence overwhelms (`OVERWHELMING`) beside a body that is as
-    strange as it was found; of one that comes and goes, whose course takes part in the belief, that of its round.
+    strange as it was found; of one that comes and goes, whose course takes part in the belief, that of its round. None
+    in a single trial, which cannot show that a size is the same in another one.
     """
+    if len(found.problem.cases) == 1:
+        return set()
     sure = OVERWHELMING * found.tolerances.threshold
     if any(one.course for one in found.named):
         return {named_of(one) for one, by in zip(found.named, accepted, strict=True) if by.suspects[0].score >= sure}
