@@ -1,5 +1,8 @@
 """Names beside a body that is more unlike the table than people are."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, looks
@@ -7,8 +10,13 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.engine import STRANGE, diagnose_trials
-from biodance.diagnosis.strange import as_strange
+from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.naming import Round
+from biodance.diagnosis.screening import ScoredCandidate
+from biodance.diagnosis.strange import as_strange, firm
+from biodance.effects import effects
 
+family = effects()
 CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
 
 
@@ -43,3 +51,13 @@ def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed()
     assert strain(wide) > STRAINED > abs(strain(as_strange(wide)))
     np.testing.assert_array_equal(as_strange(usual).belief.X, usual.belief.X)
     assert as_strange(usual).log_likelihood == pytest.approx(usual.log_likelihood)
+
+
+@pytest.mark.parametrize(("name", "score", "stands"), [("plate_drift", 31.0, True), ("plate_drift", 29.0, False),
+                                                       ("trunk_joint", 1e4, False)])  # fmt: skip
+def test_a_joint_that_the_model_lacks_is_no_excuse_for_a_strange_body(name: str, score: float, stands: bool) -> None:
+    effect = replace(family[name], target="Fx")
+    touch = NamedCause(effect, np.ones(1), np.eye(1), {"t0": np.ones(3)})
+    by = Round((ScoredCandidate(effect, score, score, np.zeros(0), 1.0),))
+    found = SimpleNamespace(problem=SimpleNamespace(cases=(1, 2)), tolerances=known(), named=(touch,))
+    assert firm(found, (by,)) == ({(name, "Fx")} if stands else set())

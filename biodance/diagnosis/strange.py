@@ -9,6 +9,7 @@ import numpy as np
 from biodance.diagnosis.evidence import believe
 from biodance.diagnosis.model import Model
 from biodance.diagnosis.naming import OVERWHELMING, Round, held, named_of
+from biodance.effects import Effect
 
 
 def as_strange(found: Model) -> Model:
@@ -26,12 +27,15 @@ def as_strange(found: Model) -> Model:
 def firm(found: Model, accepted: tuple[Round, ...]) -> set[tuple[str, str]]:
     """Return effect and target of the named causes whose evidence overwhelms (`OVERWHELMING`) beside a body that is as
     strange as it was found; of one that comes and goes, whose course takes part in the belief, that of its round. None
-    in a single trial, which cannot show that a size is the same in another one.
+    in a single trial, which cannot show that a size is the same in another one, and no joint that the model lacks
+    (`Effect.shown`), which makes a body strange by itself.
     """
     if len(found.problem.cases) == 1:
         return set()
     sure = OVERWHELMING * found.tolerances.threshold
+    lacking = {named_of(one) for one in found.named if type(one.effect).shown is not Effect.shown}
     if any(one.course for one in found.named):
-        return {named_of(one) for one, by in zip(found.named, accepted, strict=True) if by.suspects[0].score >= sure}
+        strong = {named_of(one) for one, by in zip(found.named, accepted, strict=True) if by.suspects[0].score >= sure}
+        return strong - lacking
     stern = replace(as_strange(found), tolerances=replace(found.tolerances, threshold=sure))
-    return {named_of(one) for one in held(stern, accepted)[0].named}
+    return {named_of(one) for one in held(stern, accepted)[0].named} - lacking
