@@ -26,10 +26,13 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, segment_quantities
+from biodance.motion.contact.contact import foot_wrenches, ground_contact
+from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.kinematics import below, in_blocks, poses, segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Motion, Wrench
+from biodance.records import Array, Motion, Trial, Wrench
 from biodance.spatial import cross
+from biodance.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +125,16 @@ def _axes(body: Body, motion: Motion) -> tuple[Array, Array]:
     own = np.array([joint.axis for joint in body.joints]).reshape(-1, 3)
     axis = np.einsum("tjab,jb->tja", pose.joint_rotation, own)
     return axis, cross(axis, pose.joint_position)
+
+
+@one_thread()
+def torques_on_plates(found: Identification, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> TorqueBands:
+    """Return the joint torques of a prepared ``trial`` with the identified body: what each foot carries, and what the
+    segments beyond need; ``use`` (T,) the frames that were compared.
+    """
+    soles = soles_from_body(found.body, motion)
+    ground = foot_wrenches(trial, ground_contact(trial, soles, mass=found.sip.mass.sum()), soles)
+    return torque_bands(found, motion, ground, trial=trial.name, use=use)
 
 
 _JOINTS = ("knee_flexion", "hip_flexion")
