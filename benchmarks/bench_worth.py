@@ -4,10 +4,11 @@
         [--visits 3] [--ways followable,free,random,squats] [--tell]
 
 FOLDER holds the dances of `bench_followable.py` (`small_woman_short.npz`); the free ones are designed into FOLDER/free
-(same feet, no limit on instructions, no price of one). Visit k of a body is another person of its size. ``own``: the
-virtual laboratory of this package, performer "normal"; ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which
-copies our dances (`foreign_dance.py`) and whose own random movement and squats are the rivals. Every way is as long.
-What is removed counts against one table, the mean of what the sessions of all ways say (it is scaled by each session).
+(same feet, no limit on instructions, no price of one); any other way is a folder in FOLDER with dances of it. Visit k
+of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
+``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances (`foreign_dance.py`) and whose own
+random movement and squats are the rivals. Every way is as long. What is removed counts against one table, the mean of
+what the sessions of all ways say (it is scaled by each session).
 Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
 """
 
@@ -47,9 +48,14 @@ HEADING = (
 )
 
 
+def path_of(folder: Path, name: str, way: str) -> Path:
+    """Return where the dance of a body is, or will be."""
+    return folder / ("" if way == "followable" else way) / f"{name}_short.npz"
+
+
 def dance_of(folder: Path, name: str, way: str) -> Dance:
     """Return the dance of a body, from the folder if it is there."""
-    path = folder / f"{name}_short.npz" if way == "followable" else folder / way / f"{name}_short.npz"
+    path = path_of(folder, name, way)
     if not path.exists():
         subject, plan = BODIES[name][0], replace(read_plan("short"), instructions=np.inf, simplicity=0.0)
         like = Dance.load(folder / f"{name}_short.npz")
@@ -81,8 +87,7 @@ def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[s
         first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", *trials, *kinds]
     else:
         dance_of(folder, name, way)
-        path = folder / (way if way == "free" else "") / f"{name}_short.npz"
-        first = [Path(__file__).with_name("foreign_dance.py"), path, SECONDS["foreign"]]
+        first = [Path(__file__).with_name("foreign_dance.py"), path_of(folder, name, way), SECONDS["foreign"]]
     words = [str(text) for key, value in who.items() for text in (f"--{key}", value)]
     subprocess.run([sys.executable, *map(str, first), *words], check=True, stdout=subprocess.DEVNULL)
     result = examine(read_session(place))
