@@ -41,6 +41,8 @@ from biodance.virtual_lab.simulate import simulate_session
 SECONDS = {"own": 136.0, "foreign": 140.0}
 """Of every way; the foreign laboratory records trials of 10 s."""
 _SEEDS = {"own": 1100, "foreign": 1101}
+_TELLING = 0.1
+"""Share of the table's error that the free dance must remove for a share of that to say something."""
 WAYS = ("followable", "free", "random", "squats")
 HEADING = (
     "| laboratory, sessions | way | mass, kg | removed | share of free | CoM, mm | removed | share of free "
@@ -131,7 +133,8 @@ def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
         cells = []
         for k, (factor, digits) in enumerate(((1.0, 3), (1000.0, 1))):
             removed = table[k] - both[k]
-            share = f"{100 * removed / (table[k] - off['free'][k]):.0f} %" if "free" in off else ""
+            free = table[k] - off["free"][k] if "free" in off else 0.0
+            share = f"{100 * removed / free:.0f} %" if free > _TELLING * table[k] else "–"
             cells += [f"{factor * both[k]:.{digits}f}", f"{factor * removed:.{digits}f}", share]
         held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
         out.append(f"| | {way} | {' | '.join(cells)} | {', '.join(f'{share:.0f} %' for share in held)} |")
