@@ -4,10 +4,11 @@
         [--visits 3] [--ways followable,free,random,squats] [--tell]
 
 FOLDER holds the dances of `bench_followable.py` (`small_woman_short.npz`); the free ones are designed into FOLDER/free
-(same feet, no limit on instructions, no price of one). Visit k of a body is another person of its size. ``own``: the
-virtual laboratory of this package, performer "normal"; ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which
-copies our dances (`foreign_dance.py`) and whose own random movement and squats are the rivals. Every way is as long.
-What is removed counts against one table, the mean of what the sessions of all ways say (it is scaled by each session).
+(same feet, no limit on instructions, no price of one); any other way is a folder in FOLDER with dances of it. Visit k
+of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
+``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances (`foreign_dance.py`) and whose own
+random movement and squats are the rivals. Every way is as long. What is removed counts against one table, the mean of
+what the sessions of all ways say (it is scaled by each session).
 Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
 """
 
@@ -40,6 +41,8 @@ from biodance.virtual_lab.simulate import simulate_session
 SECONDS = {"own": 136.0, "foreign": 140.0}
 """Of every way; the foreign laboratory records trials of 10 s."""
 _SEEDS = {"own": 1100, "foreign": 1101}
+_TELLING = 0.1
+"""Share of the table's error that the free dance must remove for a share of that to say something."""
 WAYS = ("followable", "free", "random", "squats")
 HEADING = (
     "| laboratory, sessions | way | mass, kg | removed | share of free | CoM, mm | removed | share of free "
@@ -47,9 +50,14 @@ HEADING = (
 )
 
 
+def path_of(folder: Path, name: str, way: str) -> Path:
+    """Return where the dance of a body is, or will be."""
+    return folder / ("" if way == "followable" else way) / f"{name}_short.npz"
+
+
 def dance_of(folder: Path, name: str, way: str) -> Dance:
     """Return the dance of a body, from the folder if it is there."""
-    path = folder / f"{name}_short.npz" if way == "followable" else folder / way / f"{name}_short.npz"
+    path = path_of(folder, name, way)
     if not path.exists():
         subject, plan = BODIES[name][0], replace(read_plan("short"), instructions=np.inf, simplicity=0.0)
         like = Dance.load(folder / f"{name}_short.npz")
@@ -81,8 +89,7 @@ def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[s
         first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", *trials, *kinds]
     else:
         dance_of(folder, name, way)
-        path = folder / (way if way == "free" else "") / f"{name}_short.npz"
-        first = [Path(__file__).with_name("foreign_dance.py"), path, SECONDS["foreign"]]
+        first = [Path(__file__).with_name("foreign_dance.py"), path_of(folder, name, way), SECONDS["foreign"]]
     words = [str(text) for key, value in who.items() for text in (f"--{key}", value)]
     subprocess.run([sys.executable, *map(str, first), *words], check=True, stdout=subprocess.DEVNULL)
     result = examine(read_session(place))
@@ -126,7 +133,8 @@ def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
         cells = []
         for k, (factor, digits) in enumerate(((1.0, 3), (1000.0, 1))):
             removed = table[k] - both[k]
-            share = f"{100 * removed / (table[k] - off['free'][k]):.0f} %" if "free" in off else ""
+            free = table[k] - off["free"][k] if "free" in off else 0.0
+            share = f"{100 * removed / free:.0f} %" if free > _TELLING * table[k] else "–"
             cells += [f"{factor * both[k]:.{digits}f}", f"{factor * removed:.{digits}f}", share]
         held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
         out.append(f"| | {way} | {' | '.join(cells)} | {', '.join(f'{share:.0f} %' for share in held)} |")
