@@ -27,7 +27,7 @@ from pathlib import Path
 import pandas as pd
 
 import biodance
-from biodance.batch.ledger import LEDGER
+from biodance.batch.run import LEDGER
 from biodance.batch.work import OUTCOME
 
 DATA = Path(os.environ.get("BIODANCE_DATA", "")).resolve()

@@ -97,9 +97,11 @@ def designed(protocol: str) -> Dance:
     return dance
 
 
-def random_dance(like: Dance, plan: Plan) -> Dance:
-    """Return a dance through as many random feasible postures on the same feet, straight ways between them."""
-    body = dancer(SHOWN_TO, plan)
+def random_dance(like: Dance, plan: Plan, subject: Subject = SHOWN_TO) -> Dance:
+    """Return a dance of ``subject`` through as many random feasible postures on the same feet, straight ways between
+    them.
+    """
+    body = dancer(subject, plan)
     chain, rng = Chain(body), np.random.default_rng(7)
     count = {name: sum(s.over is None and s.name == name for s in like.stances) for name, _ in plan.blocks}
     stances = support_sequence(

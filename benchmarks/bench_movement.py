@@ -50,13 +50,12 @@ def moments_beside(result, one):
     contact = contact_of(one.trial, one, body)
     if contact is None:
         return
-    feet = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
-    ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
+    ground = foot_wrenches(one.trial, contact, soles_from_body(body, one.motion))
     torque = joint_torques(body, one.motion, ground).torque / body.sip.mass.sum()
     raw = read_raw(one.trial.source.path)
     labels = [split_label(label)[1] for label in raw.labels]
     for foot, side in enumerate(SIDES):
-        stands = contact.told[:, foot] & (feet[foot].force[:, 2] > 50)
+        stands = contact.told[:, foot] & (ground[f"{side}_foot"].force[:, 2] > 50)
         for joint, (name, axis) in MOMENTS.items():
             if (label := f"{side[0].upper()}{name}") not in labels:
                 continue

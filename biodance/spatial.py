@@ -61,6 +61,32 @@ def _about(*axis: float) -> tuple[_Array, _Array, _Array]:
     return parts
 
 
+def rotation_about_z(angle: float) -> _Array:
+    """Return the rotation matrix (3, 3) about the vertical by ``angle`` rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def zxy_angles(turn: _Array) -> tuple[_Array, _Array, _Array]:
+    """Return (z, x, y) angles (...) rad with ``turn = Rz(z) Rx(x) Ry(y)`` (..., 3, 3)."""
+    x = np.arcsin(np.clip(turn[..., 2, 1], -1.0, 1.0))
+    return np.arctan2(-turn[..., 0, 1], turn[..., 1, 1]), x, np.arctan2(-turn[..., 2, 0], turn[..., 2, 2])
+
+
+def rigid_fit(points: _Array, moved: _Array, weight: _Array | None = None) -> tuple[_Array, _Array]:
+    """Return turn (..., 3, 3) and place (..., 3) m that bring ``points`` (..., K, 3) m nearest to where they ``moved``
+    (..., K, 3), each counted by its ``weight`` (..., K) >= 0 (Kabsch 1976, doi:10.1107/S0567739476001873).
+    """
+    count = np.ones(moved.shape[:-1]) if weight is None else weight
+    share = (count / count.sum(axis=-1, keepdims=True))[..., None]
+    middle, middles = (share * points).sum(axis=-2), (share * moved).sum(axis=-2)
+    shape = share * (points - middle[..., None, :])
+    u, _, vt = np.linalg.svd(np.swapaxes(moved - middles[..., None, :], -1, -2) @ shape)
+    u[..., 2] *= np.linalg.det(u @ vt)[..., None]
+    turn = u @ vt
+    return turn, middles - (turn @ middle[..., None])[..., 0]
+
+
 def quaternion_product(a: _Array, b: _Array) -> _Array:
     """Return the products (..., 4) of quaternions: the rotation b, then a."""
     ax, ay, az, aw = np.moveaxis(a, -1, 0)

@@ -15,9 +15,8 @@ import pandas as pd
 import pytest
 
 import biodance
-from biodance.batch.ledger import LEDGER, Ledger
 from biodance.batch.rows import ROW_TYPES, rows_of
-from biodance.batch.run import run_batch
+from biodance.batch.run import LEDGER, Ledger, run_batch
 from biodance.batch.summary import outliers, summary_table
 from biodance.batch.work import Outcome, SessionStatus, SessionTask, process_session
 from biodance.cli import run

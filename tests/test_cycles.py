@@ -205,7 +205,7 @@ def test_moments_and_powers_are_those_of_recursive_newton_euler_per_kg():
     rng = np.random.default_rng(3)
     moved, _ = walk()
     moved = replace(moved, a=rng.normal(0, 1, moved.a.shape))
-    feet = tuple(Wrench(moved.time, rng.normal(0, 100, (moved.time.size, 6))) for _ in range(2))
+    feet = {foot: Wrench(moved.time, rng.normal(0, 100, (moved.time.size, 6))) for foot in ("right_foot", "left_foot")}
     told = np.ones((moved.time.size, 2), dtype=bool)
     cycle = Cycle("walk", "gait", "left", 0.5, 1.5, np.nan)
     step = rng.normal(0, 1e-2, BODY.sip.phi.size) * np.abs(BODY.sip.phi)
@@ -214,8 +214,7 @@ def test_moments_and_powers_are_those_of_recursive_newton_euler_per_kg():
     mass = BODY.sip.mass.sum()
 
     def torque(phi):
-        ground = {"right_foot": feet[0], "left_foot": feet[1]}
-        return joint_torques(replace(BODY, sip=replace(BODY.sip, phi=phi)), moved, ground).torque
+        return joint_torques(replace(BODY, sip=replace(BODY.sip, phi=phi)), moved, feet).torque
 
     frames, j = np.arange(50, 151), BODY.joint_index("left_hip_flexion")
     now = torque(BODY.sip.phi)

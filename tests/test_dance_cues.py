@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.cues import _MOST, _WORDS, calls, cue_sheet
+from biodance.dance.cues import _MOST, _WORDS, calls, cue_sheet, instructions
+from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
 from biodance.records import Array, Subject
 
@@ -55,6 +57,45 @@ def test_of_a_standing_leg_only_the_knee_is_called() -> None:
 def test_a_planted_leg_is_never_half_of_a_pair() -> None:
     both = posture(right_hip_rotation=-45, left_hip_rotation=-45)
     assert calls(BODY, REST, both, ("right",)) == ("turn the left leg outwards by about 45°",)
+
+
+HIPS = np.zeros(3)
+FEET = ("right", "left")
+
+
+def test_hips_that_go_with_the_trunk_are_one_call_and_alone_another() -> None:
+    twist = posture(trunk_rotation=-30)
+    assert calls(BODY, REST, twist, FEET, (HIPS, np.array([-28.0, 0, 0]))) == (
+        "turn the trunk to the right by about 30°, hips too",
+    )
+    assert calls(BODY, REST, twist, FEET, (HIPS, np.array([28.0, 0, 0]))) == (
+        "turn the trunk to the right by about 30°",
+        "turn the hips to the left by about 30°",
+    )
+    assert calls(BODY, REST, REST, FEET, (HIPS, np.array([0, 0, 40.0]))) == ("bow forward from the hips by about 45°",)
+    low = np.array([0.0, 0.0, 60.0])
+    assert calls(BODY, REST, posture(trunk_flexion=30), FEET, (HIPS, low)) == (
+        "lean the trunk forward by about 30°, hips too, by about 60°",
+    )
+    assert calls(BODY, posture(trunk_flexion=30), REST, FEET, (low, HIPS)) == ("bring the trunk upright, hips too",)
+
+
+def test_hips_that_lean_with_bending_knees_are_not_called() -> None:
+    squat, tilt = posture(right_knee_flexion=50, left_knee_flexion=50), np.array([0.0, 0.0, 25.0])
+    assert calls(BODY, REST, squat, FEET, (HIPS, tilt)) == ("bend both knees by about 45°",)
+    assert len(calls(BODY, REST, squat, FEET, (HIPS, 2 * tilt))) == 2
+    assert len(calls(BODY, REST, squat, (), (HIPS, tilt))) == 2, "legs that hang hold nobody up"
+
+
+def test_the_hips_of_a_dance_are_called_by_their_sides() -> None:
+    upright, bowed, turned = np.zeros((3, ROOT + len(BODY.joints)))
+    bowed[ROOT - 1], turned[ROOT - 3] = np.radians([-40.0, 30.0])  # tilt backward, turn to the left
+    chain = Chain(BODY)
+    assert chain.root_rotation(bowed[None])[0, 2, 0] < -0.5, "what was ahead points down"
+    assert chain.root_rotation(turned[None])[0, 1, 0] > 0.4, "what was ahead points to the left"
+    stance = Stance("parallel", np.array([[0.0, -0.1, 0.07], [0.0, 0.1, 0.07]]), (0, 1), np.zeros((2, 4, 3)))
+    assert instructions(BODY, upright, bowed, stance, stance) == ("bow forward from the hips by about 45°",)
+    assert instructions(BODY, upright, turned, stance, stance) == ("turn the hips to the left by about 30°",)
 
 
 def test_what_is_more_than_a_person_can_begin_at_once_is_said_after() -> None:

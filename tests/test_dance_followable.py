@@ -16,7 +16,7 @@ from biodance.dance.followable.reach import Reach
 from biodance.dance.followable.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
 from biodance.dance.followable.walk import NoWay, Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, PlannedDance, mass_centre
-from biodance.dance.limits._imprecise import _vector
+from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
 from biodance.dance.performers import Rehearsed, Room, perform_with, rehearse_imprecisely
 from biodance.dance.postures.ordering import support_sequence

@@ -8,7 +8,7 @@ from identify_trials import smooth_motion
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.body.human.human import human
-from biodance.identification.dilution import carried_away, undiluted
+from biodance.identification.calibration import carried_away, undiluted
 from biodance.identification.identification import identify_body
 from biodance.identification.loads import compact_load
 from biodance.identification.posterior import posterior

@@ -154,11 +154,23 @@ def test_pelvis_and_thighs_are_known_together_where_one_gains_what_the_others_lo
     trade[[0, 10, 40]] = 2.0, -1.0, -1.0
     covariance += np.outer(trade, trade)
     covariance[0, 0] += 0.01
-    pair = known_together(Sip(body.segments, body.sip.phi, covariance))
+    (pair,) = known_together(Sip(body.segments, body.sip.phi, covariance))
+    assert pair.segments == ("pelvis", "right_thigh", "left_thigh")
     assert pair.sd == pytest.approx(0.1)
     assert pair.first_sd == pytest.approx(np.sqrt(4.01))
     assert "together, not apart" in str(pair)
-    assert known_together(Sip(body.segments, body.sip.phi, np.eye(120))) is None
+    assert known_together(Sip(body.segments, body.sip.phi, np.eye(120))) == ()
+
+
+def test_pelvis_and_trunk_that_trade_more_than_pelvis_and_thighs_are_said_first() -> None:
+    body, covariance = low_joint(), np.eye(120)
+    covariance[0, 10] = covariance[10, 0] = -0.3
+    covariance[0, 70] = covariance[70, 0] = -0.8
+    trunk, thighs = known_together(Sip(body.segments, body.sip.phi, covariance))
+    assert trunk.segments == ("pelvis", "trunk_head")
+    assert trunk.sd == pytest.approx(np.sqrt(0.4))
+    assert trunk.mass == pytest.approx(body.sip.mass[0] + body.sip.mass[TRUNK])
+    assert thighs.segments == ("pelvis", "right_thigh", "left_thigh")
 
 
 def test_one_leg_longer_than_the_other_is_held_against_the_joints() -> None:

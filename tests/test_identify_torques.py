@@ -8,9 +8,8 @@ from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.errors import UnknownName
 from biodance.identification.identification import identify_body
-from biodance.identification.impact import impacts
 from biodance.identification.knowledge import QUANTITIES, segment_quantities
-from biodance.identification.torques import ground_torques, torque_bands, torque_regressor
+from biodance.identification.torques import ground_torques, impacts, torque_bands, torque_regressor
 from biodance.motion.dynamics import joint_torques
 from biodance.records import Sip, Wrench
 

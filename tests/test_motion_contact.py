@@ -230,7 +230,8 @@ def test_what_cannot_be_done_is_refused() -> None:
 def test_the_feet_share_what_the_plates_measure() -> None:
     trial, soles, *_ = walk()
     contact = ground_contact(trial, soles, mass=MASS)
-    right, left = foot_wrenches(trial, contact, soles)
+    feet = foot_wrenches(trial, contact, soles)
+    right, left = feet["right_foot"], feet["left_foot"]
     assert right.value + left.value == pytest.approx(trial.wrench.value, abs=1e-9)
     assert left.value[80:100] == pytest.approx(trial.plates[0].wrench.value[80:100])
     assert right.value[115:124] == pytest.approx(trial.plates[1].wrench.value[115:124])

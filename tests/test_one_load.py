@@ -72,6 +72,38 @@ def test_weight_that_a_gain_explains_is_no_second_cause() -> None:
     assert in_words(one) == "plate gain Fz (gain 4 ± 1 %)"
 
 
+HEAVY = Finding(
+    "body_mass",
+    "",
+    (Estimate("error", 2.3, 0.5, "kg"),),
+    (Alias("body_mass", "", 9.0), Alias("added_mass", "", 9.0)),
+    1.0,
+)
+
+
+def test_a_load_of_which_only_the_weight_is_known_lies_where_the_search_says() -> None:
+    weighed = replace(NOTHING, verdict="named, incomplete", findings=(HEAVY,))
+    (sure,) = with_load(weighed, found(*FOREARM)).findings
+    assert (sure.effect, sure.target, sure.parameters[0].value) == (
+        "added_mass", "left_forearm_hand", found(*FOREARM).best.mass
+    )  # fmt: skip
+    assert [a.effect for a in sure.set] == ["added_mass", "added_mass", "body_mass"]
+    (likely,) = with_load(weighed, replace(found(*FOREARM), p_no_load=0.3)).findings
+    assert likely.effect == "added_mass"
+    for other in (replace(found(*FOREARM), p_no_load=0.8), found(*FOREARM, doubts=("Far.",))):
+        (one,) = with_load(weighed, other).findings
+        assert (one.effect, one.parameters) == ("body_mass", HEAVY.parameters)
+        assert [(a.effect, a.target) for a in one.set[1:]] == [("added_mass", name) for name, _ in FOREARM]
+
+
+def test_a_load_that_was_found_goes_before_a_gain_that_is_not_told_from_it() -> None:
+    same = replace(GAIN, set=(*GAIN.set, Alias("added_mass", "trunk_head", 8.0)))
+    (one,) = with_load(replace(NOTHING, verdict="named, complete", findings=(same,)), found(*FOREARM)).findings
+    assert [a.effect for a in one.set] == ["added_mass", "added_mass", "plate_gain"]
+    unsure = replace(NOTHING, verdict="named, complete", findings=(same,))
+    assert with_load(unsure, replace(found(*FOREARM), p_no_load=0.3)).findings == (same,)
+
+
 def test_a_place_on_another_segment_widens_the_set() -> None:
     sure = found(("trunk_head", 0.99), ("pelvis", 0.01))
     assert sure.segments == ("trunk_head",)

@@ -85,13 +85,14 @@ def test_a_load_is_found_against_the_unloaded_session():
     assert {row["segment"] for row in told} == set(body().segments)
 
 
-def test_page_and_numbers_say_that_pelvis_and_thighs_are_known_together(found, numbers):
+def test_page_and_numbers_say_what_pelvis_and_its_neighbours_are_known_together(found, numbers):
     told, sip = numbers["known_together"], found.identification.sip
-    at = [10 * sip.segments.index(name) for name in told["segments"]]
-    assert told["segments"] == ["pelvis", "right_thigh", "left_thigh"]
-    own = np.sqrt(np.diag(sip.covariance)[at])
-    assert told["mass_sd_kg"] < np.linalg.norm(own)
-    assert told["mass_ci95_kg"][0] < sip.phi[at].sum() < told["mass_ci95_kg"][1]
+    assert ["pelvis", "right_thigh", "left_thigh"] in [one["segments"] for one in told]
+    for one in told:
+        at = [10 * sip.segments.index(name) for name in one["segments"]]
+        own = np.sqrt(np.diag(sip.covariance)[at])
+        assert one["mass_sd_kg"] < np.linalg.norm(own)
+        assert one["mass_ci95_kg"][0] < sip.phi[at].sum() < one["mass_ci95_kg"][1]
     assert "are known together, not apart" in identification_section(found)
 
 

@@ -135,7 +135,7 @@ def test_marker_distances_leave_out_what_was_not_seen():
 
 def test_every_segment_is_drawn_and_left_mirrors_right():
     body = human(SUBJECT)
-    lines, sides = bone_lines(body, poses(body, body.neutral))
+    (lines,), sides = bone_lines(body, poses(body, body.neutral))
     assert {"left", "right", "middle"} == set(sides)
     height = lines[:, :, 2] - lines[:, :, 2].min()
     assert 1.55 < height.max() < 1.85

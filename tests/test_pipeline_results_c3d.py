@@ -65,8 +65,7 @@ def test_angles_are_those_of_the_motion_in_degrees(result, written):
 def test_moments_are_those_of_another_formula(result, written):
     squat, raw = written
     body, soles = result.body, soles_from_body(result.body, squat.motion)
-    feet = foot_wrenches(squat.trial, ground_contact(squat.trial, soles, mass=body.sip.mass.sum()), soles)
-    ground = {"right_foot": feet[0], "left_foot": feet[1]}
+    ground = foot_wrenches(squat.trial, ground_contact(squat.trial, soles, mass=body.sip.mass.sum()), soles)
     torque = torque_regressor(body, squat.motion) @ body.sip.phi - ground_torques(body, squat.motion, ground)
     used, j = squat.comparison.used, body.joint_index("right_knee_flexion")
     knee, power = of(raw, "RightKneeMoments")[:, 0], of(raw, "RightKneePower")[:, 0]

@@ -7,8 +7,9 @@ from biodance.dance.expectation import Expectation
 from biodance.dance.metrics import ZmpPath
 from biodance.dance.problem.stance import stance
 from biodance.motion.kinematics import poses
+from biodance.pipeline.still import bone_lines
 from biodance.records import Subject
-from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, stick_lines, zmp_figure
+from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 
 BODY = human(Subject(65.0, 1.75, "F"))
 
@@ -21,7 +22,7 @@ def postures(count: int) -> np.ndarray:
 
 def test_bones_join_joint_centres_and_keep_their_lengths() -> None:
     q = postures(4)
-    lines, sides = stick_lines(BODY, q)
+    lines, sides = bone_lines(BODY, poses(BODY, q))
     length = np.linalg.norm(lines[:, :, 1] - lines[:, :, 0], axis=2)
     np.testing.assert_allclose(length, np.tile(length[0], (4, 1)), atol=1e-12)
     knee = poses(BODY, q).position[:, BODY.segment_index("right_shank")]

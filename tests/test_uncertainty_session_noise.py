@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from diagnosed_sessions import body, known, looks, motion
 
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.records import Markers, Plate, Wrench
 from biodance.uncertainty.bands import BANDS
@@ -14,6 +15,7 @@ from biodance.uncertainty.session_noise import (
     camera_noise,
     of_cameras,
     of_plates,
+    of_zeros,
     plate_noise,
     white_noise,
     with_own_noise,
@@ -44,6 +46,17 @@ def test_plate_noise_is_a_density_about_the_plates_centre() -> None:
     found = plate_noise([Plate("plate1", 2, corners, Wrench(time, value))])
     np.testing.assert_allclose(found * np.sqrt(500), [0.5, 0.5, 1.0, 0.1, 0.1, 0.05], rtol=0.1)
     np.testing.assert_allclose(np.diag(of_plates(found, 2)), 2 * found**2 * 12.5)
+
+
+def test_the_zero_of_a_run_is_the_same_however_long_it_is() -> None:
+    rng, sd = np.random.default_rng(6), error_size("plate_zero", "force")
+    for seconds in (4.0, 16.0):
+        constant = np.ones(int(seconds * BANDS.rate))[:, None] * rng.normal(0, sd, 4000)
+        spread = np.var(BANDS.coefficients(constant), axis=1)
+        found = of_zeros([seconds, seconds])
+        assert found[0, 1, 1] == pytest.approx(spread[0], rel=0.1)
+        assert found[1:].max() == pytest.approx(spread[1:].max(), abs=1e-12) == 0.0
+    assert not of_zeros([]).any()
 
 
 def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:

@@ -181,6 +181,16 @@ def test_clean_walks_and_standing_name_nothing() -> None:
     assert rows["plate_gain", "plate2:Fx"].witnesses == ()
 
 
+@pytest.mark.parametrize(("heavier", "a_load"), [(0.05, True), (-0.05, False)])
+def test_who_weighs_more_than_declared_may_carry_a_load(heavier: float, a_load: bool) -> None:
+    """A load is weight, too; but nobody carries less than nothing."""
+    weighed = standing(weight=(1 + heavier) * MASS)
+    (one,) = weigh(hear(session(weighed, replace(weighed, name="later")))).findings
+    alike = {(alias.effect, alias.target) for alias in one.set}
+    assert {("plate_gain", "Fz"), ("body_mass", "")} <= alike
+    assert (("added_mass", "") in alike) is a_load
+
+
 @pytest.mark.parametrize(
     ("wrong", "names", "size"),
     [

@@ -1,16 +1,24 @@
-"""What all commands share: the application, its exit codes, how it talks to the person at the terminal, and how it says
-what it is doing: one changing line with the time left on a terminal, a plain line every few seconds elsewhere.
+"""What all commands share: the application, its exit codes and options, how it talks to the person at the terminal, and
+how it says what it is doing: one changing line with the time left on a terminal, a plain line every few seconds
+elsewhere.
 """
 
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import App
+from cyclopts import App, Parameter, Token
 
 from biodance.version import __version__
+
+if TYPE_CHECKING:
+    from biodance.records import Session
+
 
 DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 
@@ -99,3 +107,186 @@ def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Calla
             sys.stderr.write(f"{line}\n")
 
     return tell
+
+
+JsonOption = Annotated[
+    bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")
+]
+ForceOption = Annotated[
+    bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")
+]
+Tables = Annotated[
+    Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")
+]
+OpenOption = Annotated[bool, Parameter(name="--open", negative="", help="Show the page in the browser when done.")]
+OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
+
+ReferenceOption = Annotated[
+    Path | None,
+    Parameter(
+        name="--reference",
+        help="An earlier session of the same person without load: changes and loads are then told against it.",
+    ),
+]
+BodyOption = Annotated[
+    Path | None,
+    Parameter(
+        name="--body",
+        help="body.json of an earlier session of the same person: what is known before, instead of the table.",
+    ),
+]
+LabOption = Annotated[
+    Path | None, Parameter(name="--lab", help="lab.toml: the laboratory's accepted corrections, made first.")
+]
+Set = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--set",
+        negative=(),
+        help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all.",
+    ),
+]
+MarkersFile = Annotated[
+    str | None,
+    Parameter(
+        name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name."
+    ),
+]
+SubjectOption = Annotated[
+    str | None,
+    Parameter(
+        name="--subject",
+        help="The person to look at where C3D files hold several; without it such a file is refused and names them.",
+    ),
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a session's folder is read: the person where files hold several, the marker set that was worn, the settings
+    chosen; and what is known from earlier sessions: a reference, a body, the laboratory's file.
+    """
+
+    reference: ReferenceOption = None
+    body: BodyOption = None
+    lab: LabOption = None
+    subject: SubjectOption = None
+    markers: MarkersFile = None
+    chosen: Set = ()
+
+    def read(self, folder: Path, tell: Callable[[str], None]) -> "Session":
+        """Return the session in ``folder``."""
+        from biodance.lab.session.read import read_session
+        from biodance.settings import assignments
+
+        return read_session(
+            folder, subject_name=self.subject, markers=self.markers, settings=assignments(self.chosen), tell=tell
+        )
+
+    def given(self) -> tuple[str, ...]:
+        """Return the names of the options that were given."""
+        names = {"chosen": "--set"}
+        return tuple(
+            names.get(one.name, f"--{one.name}") for one in fields(self) if getattr(self, one.name) != one.default
+        )
+
+
+USUAL_READING = Reading()
+
+
+def whole(_: object, tokens: Sequence[Token]) -> int:
+    """Return a number of things: the parser itself would round 1.5."""
+    text = tokens[0].value
+    if not text.removeprefix("-").isdecimal():
+        raise ValueError(f"{text!r} is no whole number.")
+    return int(text)
+
+
+def not_negative(_: object, value: float | None) -> None:
+    """Refuse a number below zero."""
+    if value is not None and value < 0:
+        raise ValueError("Legal are 0 and more.")
+
+
+def _lived(_: object, age: float) -> None:
+    if age < 0 or age > 120:
+        raise ValueError("Legal are 0 to 120 years.")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class PersonFacts:
+    """Who moves, where no recording says it."""
+
+    sex: Annotated[Literal["F", "M"] | None, Parameter(help="Of the person.")] = None
+    height: Annotated[float | None, Parameter(help="Stature, m.")] = None
+    mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None
+    age: Annotated[float, Parameter(validator=_lived, help="Age, years; strength falls with it.")] = float("nan")
+
+
+NOBODY = PersonFacts()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RobotFile:
+    """The robot instead of a person: its file, its feet, and what to do about a link that is no possible body."""
+
+    urdf: Annotated[Path | None, Parameter(help="URDF file of a robot instead of a person.")] = None
+    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None
+    mend: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Where a link of the URDF file is no possible body, take a solid box of its mass instead and say so.",
+        ),
+    ] = False
+
+    @property
+    def given(self) -> bool:
+        """Whether any of it was asked for."""
+        return self != NO_ROBOT
+
+    def named(self) -> tuple[Path, str]:
+        """Return file and feet; BiodanceError if one is missing."""
+        from biodance.errors import BiodanceError
+
+        if self.urdf is None or self.feet is None:
+            raise BiodanceError("A robot is told by both --urdf FILE and --feet RIGHT,LEFT; one of them is missing.")
+        return self.urdf, self.feet
+
+
+NO_ROBOT = RobotFile()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """Where results go: a folder, beside it tables where they are wanted; what is printed and opened."""
+
+    out: OutOption
+    tables: Tables = None
+    open_page: OpenOption = False
+    json: JsonOption = False
+    force: ForceOption = False
+
+    def make_tables_folder(self, session: Path) -> Path | None:
+        """Return the folder for tables, made; None where none are wanted."""
+        from biodance.report.tables import tables_folder
+
+        return None if self.tables is None else tables_folder(self.tables, session, force=self.force)
+
+    def show_page(self, folder: Path) -> None:
+        """Show the page of a results folder in the browser, where that is wanted; say where it lies without one."""
+        if not self.open_page:
+            return
+        import webbrowser
+
+        page = folder / "report.html"
+        try:
+            opened = webbrowser.open(page.resolve().as_uri())
+        except webbrowser.Error:
+            opened = False
+        if not opened:
+            say(f"No browser was found here. Open {page} on a machine that has one.")

@@ -6,8 +6,19 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress, say
-from biodance.cli.options import ForceOption, JsonOption, OutOption, Set, whole
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    ForceOption,
+    JsonOption,
+    OutOption,
+    Set,
+    app,
+    print_json,
+    progress,
+    say,
+    whole,
+)
 
 
 @app.command(name="batch")

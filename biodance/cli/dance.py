@@ -9,16 +9,21 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, say
-from biodance.cli.options import (
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
     NO_ROBOT,
     NOBODY,
+    STOPPED,
     ForceOption,
     JsonOption,
     OutOption,
     PersonFacts,
     RobotFile,
+    app,
     not_negative,
+    print_json,
+    say,
     whole,
 )
 from biodance.errors import BiodanceError

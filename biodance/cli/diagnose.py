@@ -6,9 +6,21 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    NO_ROBOT,
+    USUAL_READING,
+    ForceOption,
+    JsonOption,
+    Reading,
+    Results,
+    RobotFile,
+    app,
+    print_json,
+    progress,
+)
 from biodance.cli.identify import diagnose_robot
-from biodance.cli.options import NO_ROBOT, USUAL_READING, ForceOption, JsonOption, Reading, Results, RobotFile
 from biodance.cli.session import examine_with_reference, tabled
 
 

@@ -6,8 +6,20 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE, app, print_json, progress, say
-from biodance.cli.options import ForceOption, JsonOption, MarkersFile, Set, SubjectOption
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    NOT_DONE,
+    ForceOption,
+    JsonOption,
+    MarkersFile,
+    Set,
+    SubjectOption,
+    app,
+    print_json,
+    progress,
+    say,
+)
 
 
 @app.command(name="register")

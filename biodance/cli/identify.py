@@ -7,8 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress
-from biodance.cli.options import NO_ROBOT, USUAL_READING, Reading, Results, RobotFile
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    NO_ROBOT,
+    USUAL_READING,
+    Reading,
+    Results,
+    RobotFile,
+    app,
+    print_json,
+    progress,
+)
 from biodance.cli.session import examine_with_reference, tabled
 
 if TYPE_CHECKING:

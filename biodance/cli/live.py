@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, app, print_json, progress, say
-from biodance.cli.options import JsonOption, MarkersFile, Set
+from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, MarkersFile, Set, app, print_json, progress, say
 
 if TYPE_CHECKING:
     from biodance.diagnosis.watch import LiveWarning

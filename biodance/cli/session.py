@@ -6,8 +6,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, STOPPED, app, print_json, progress, say
-from biodance.cli.options import USUAL_READING, Reading, Results
+from biodance.cli.app import (
+    DONE,
+    NEEDS_A_PERSON,
+    STOPPED,
+    USUAL_READING,
+    Reading,
+    Results,
+    app,
+    print_json,
+    progress,
+    say,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

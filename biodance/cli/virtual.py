@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, app, progress
-from biodance.cli.options import NOBODY, ForceOption, OutOption, PersonFacts, not_negative, whole
+from biodance.cli.app import DONE, NOBODY, ForceOption, OutOption, PersonFacts, app, not_negative, progress, whole
 from biodance.cli.session import print_reported, report_session
 
 

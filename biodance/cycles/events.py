@@ -7,6 +7,7 @@ speed under the pelvis. Ahead is where the pelvis faces in that frame, so that t
 body follows the markers, so that a marker that is lost for a moment costs no event.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,7 +39,7 @@ class FootEvent:
     source: Literal["force", "markers"] = "force"
 
 
-def foot_events(feet: tuple[Wrench, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
+def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
     """Return when each foot came down on a plate or left it, in the order of time.
 
     ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `THRESHOLD`,
@@ -46,7 +47,8 @@ def foot_events(feet: tuple[Wrench, Wrench], contact: Contact) -> tuple[FootEven
     plate: a force that two feet share tells nothing of one.
     """
     found = []
-    for foot, wrench in enumerate(feet):
+    for foot, side in enumerate(SIDES):
+        wrench = feet[f"{side}_foot"]
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
         sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
         shortest = _SHORTEST * wrench.rate
@@ -56,7 +58,7 @@ def foot_events(feet: tuple[Wrench, Wrench], contact: Contact) -> tuple[FootEven
                 continue
             share = (_THRESHOLD - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
-            found.append(FootEvent(float(time), SIDES[foot], bool(loaded[i + 1])))
+            found.append(FootEvent(float(time), side, bool(loaded[i + 1])))
     return tuple(sorted(found, key=lambda event: event.time))
 
 

@@ -18,7 +18,7 @@ _ENOUGH = 0.8
 
 
 def load_curves(
-    cycle: Cycle, body: Body, sip: Sip, motion: Motion, feet: tuple[Wrench, Wrench], told: NDArray[np.bool_]
+    cycle: Cycle, body: Body, sip: Sip, motion: Motion, feet: Mapping[str, Wrench], told: NDArray[np.bool_]
 ) -> Iterator[CycleCurve]:
     """Yield the moments (N·m/kg) and powers (W/kg) of a cycle, those of its own side and of the trunk in a gait cycle.
 
@@ -36,7 +36,7 @@ def load_curves(
     chosen = (motion.time >= cycle.start - 0.05) & (motion.time <= cycle.end + 0.05)
     here = _frames(motion, chosen)
     ground = {
-        f"{side}_foot": Wrench(here.time, np.where(told[chosen, foot, None], feet[foot].value[chosen], 0.0))
+        f"{side}_foot": Wrench(here.time, np.where(told[chosen, foot, None], feet[f"{side}_foot"].value[chosen], 0.0))
         for foot, side in enumerate(SIDES)
     }
     known = {side: here.determined & told[chosen, foot] for foot, side in enumerate(SIDES)}

@@ -1,8 +1,8 @@
 """The cue sheet: a dance in plain words, posture by posture, for the person who calls it and the person who performs
 it.
 
-Only what moves is said, largest first, pairs together, angles rounded to what a person can follow; what goes beyond
-``MOST`` things is said after them, so that nothing is left out.
+Only what moves is said, largest first, pairs together (right and left; trunk and hips that go the same way), angles
+rounded to what a person can follow; what goes beyond ``MOST`` things is said after them, so that nothing is left out.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array
@@ -46,6 +47,21 @@ _WORDS = {
     "trunk_rotation": ("", "turn the trunk to the left", "turn the trunk to the right", "turn the trunk to the front"),
 }
 """Of each movement: the part, and what is called for a positive angle, a negative one and (nearly) none."""
+_HIPS = {
+    "hips_rotation": ("", "turn the hips to the left", "turn the hips to the right", "turn the hips to the front"),
+    "hips_bending": (
+        "",
+        "lean over to the right from the hips",
+        "lean over to the left from the hips",
+        "bring the hips level",
+    ),
+    "hips_flexion": ("", "bow forward from the hips", "lean back from the hips", "bring the hips upright"),
+}
+"""The same of the hips' turn, drop and tilt (`chain`), whoever stands."""
+_FORWARD = np.array([1.0, 1.0, -1.0])
+"""Signs of turn, drop and tilt as they are called."""
+_BENT = 30.0
+"""degrees by which the hips lean of themselves when knees that stand bend."""
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
 PLURAL = {"foot": "feet"}
@@ -108,17 +124,37 @@ def cue_sheet(
     return "\n".join(lines) + "\n"
 
 
-def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return what is called on the way from angles ``before`` to ``after`` (n,) degrees, largest change first."""
+def calls(
+    body: Body,
+    before: Array,
+    after: Array,
+    planted: tuple[str, ...] = (),
+    hips: tuple[Array, Array] = (np.zeros(3), np.zeros(3)),
+) -> tuple[str, ...]:
+    """Return what is called on the way from angles ``before`` to ``after`` (n,) degrees, largest change first; ``hips``
+    their turn to the left, drop to the right and tilt forward (3,) degrees before and after.
+    """
     changes = {
         joint.name: (float(b), float(a))
         for joint, b, a in zip(body.joints, before, after, strict=True)
         if abs(a - b) >= _SMALLEST and _is_called(joint.name, planted)
     }
+    least = dict.fromkeys(_HIPS, _SMALLEST)
+    if any(f"{side}_knee_flexion" in changes for side in planted):
+        least["hips_flexion"] = _BENT
+    changes |= {
+        name: (float(b), float(a)) for name, b, a in zip(_HIPS, *hips, strict=True) if abs(a - b) >= least[name]
+    }
     found: list[_Call] = []
     while changes:
         name = next(iter(changes))
         start, end = changes.pop(name)
+        whole = name.replace("trunk", "hips")
+        if whole != name and whole in changes and _together((start, end), changes[whole]):
+            also = changes.pop(whole)
+            size = max(abs(one[1] - one[0]) for one in ((start, end), also))
+            found.append(_Call(size, f"{_call(name, '', start, end)}, hips too{_rest(end, also[1])}"))
+            continue
         side, movement = _split(name)
         other = f"{'left' if side == 'right' else 'right'}_{movement}"
         pair = side and other in changes and abs(changes[other][1] - end) <= _ALIKE
@@ -129,24 +165,37 @@ def calls(body: Body, before: Array, after: Array, planted: tuple[str, ...] = ()
     return tuple(call.text for call in sorted(found, key=lambda call: -call.size))
 
 
+def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
+    """Return whether trunk and hips go the same way, from angle to angle (degrees), both somewhere or both back."""
+    same = (trunk[1] - trunk[0]) * (hips[1] - hips[0]) > 0
+    return same and (_rounded(trunk[1]) == 0) == (_rounded(hips[1]) == 0)
+
+
+def _rest(trunk: float, hips: float) -> str:
+    """Return how far the hips go (degrees) where it is not as far as the trunk."""
+    return "" if _rounded(trunk) == _rounded(hips) else f", by about {_rounded(hips):.0f}°"
+
+
 def instructions(body: Body, before: Array, after: Array, was: Stance | None, now: Stance) -> tuple[str, ...]:
     """Return everything that is called on the way between two postures: what the feet do, then what moves.
 
-    ``before``, ``after`` (n,) rad angles of the joints; ``was`` the feet before, None at the start, ``now`` after.
+    ``before``, ``after`` (n,) coordinates of the chain; ``was`` the feet before, None at the start, ``now`` after.
     """
+    hips = tuple(np.degrees(_FORWARD * x[ROOT - 3 : ROOT]) for x in (before, after))
+    before, after = before[ROOT:], after[ROOT:]
     planted = tuple(SIDES[side] for side in now.planted)
     if was is None and now.seat:  # whoever sits lets the legs hang
         legs = [j for j, joint in enumerate(body.joints) if _is_leg(_split(joint.name)[1])]
         before = before.copy()
         before[legs] = [_HANGING if "knee" in body.joints[j].name else after[j] for j in legs]
-    moved = calls(body, np.degrees(before), np.degrees(after), planted)
+    moved = calls(body, np.degrees(before), np.degrees(after), planted, (hips[0], hips[1]))
     return (*_feet_calls(was, now), *moved)
 
 
 def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:
     """Return what is called on the way to each posture of a dance, (P); postures are numbered from 1 everywhere."""
     pairs = zip(dance.postures, dance.stances, strict=True)
-    angles = [dance.chain.plant(x[None], s.planted, s.ankle)[0, -len(dance.body.joints) :] for x, s in pairs]
+    angles = [dance.chain.plant(x[None], s.planted, s.ankle)[0] for x, s in pairs]
     out = []
     for p, (after, now) in enumerate(zip(angles, dance.stances, strict=True)):
         before, was = (angles[p - 1], dance.stances[p - 1]) if p else (np.zeros_like(after), None)
@@ -185,14 +234,18 @@ def _is_leg(movement: str) -> bool:
 
 
 def _call(movement: str, side: str, start: float, angle: float) -> str:
-    part, positive, negative, none = _WORDS[movement]
+    part, positive, negative, none = (_WORDS | _HIPS)[movement]
     whole = f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
-    rounded = _STEP * round(abs(angle) / _STEP)
+    rounded = _rounded(angle)
     if rounded == 0:
         return none.format(whole)
     size = "to a right angle" if rounded == 90 else f"by about {rounded:.0f}°"
     only = "only " if start * angle > 0 and abs(start) > abs(angle) else ""  # from a half squat 15° are less, not more
     return f"{(positive if angle > 0 else negative).format(whole)} {only}{size}"
+
+
+def _rounded(angle: float) -> float:
+    return _STEP * round(abs(angle) / _STEP)
 
 
 def _sentence(said: tuple[str, ...]) -> str:

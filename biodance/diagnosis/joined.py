@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.heard import Testimony
-from biodance.diagnosis.testimony import Verdicts, size_by
+from biodance.diagnosis.testimony import SOMEWHERE, Verdicts, size_by
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
@@ -38,10 +38,9 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
     if not said.findings:
         return _checked(one, heard)
     checked = _checked(one, heard) if judged else one
-    same = {(f.effect, f.target): f for f in checked.findings}
     mine, shadows = [], []
     for finding in said.findings:
-        alike = next((same[alias.effect, alias.target] for alias in finding.set if _names(alias) in same), None)
+        alike = next((f for alias in finding.set for f in checked.findings if _covers(alias, f)), None)
         if alike is None and judged and (_explained_without(finding, checked) or _habit(finding, checked, heard)):
             shadows.append(finding)
         else:
@@ -65,6 +64,11 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
 def _names(one: Finding | Alias) -> tuple[str, str]:
     """Return effect and target."""
     return one.effect, one.target
+
+
+def _covers(alias: Alias, one: Finding | Alias) -> bool:
+    """Return whether an alias is a cause, or a load somewhere and that the same on a segment."""
+    return _names(alias) == _names(one) or (_names(alias) == SOMEWHERE and one.effect == alias.effect)
 
 
 def _explained_without(finding: Finding, one: Diagnosis) -> bool:
@@ -108,7 +112,7 @@ def _evidence(finding: Finding, one: Diagnosis) -> float:
 
 def _together(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
     """Return a finding with the size from both, where both named it; what the simulation tells from its look-alikes
-    is named as it does.
+    is named as it does, and so is a load that only weighs the same.
     """
     if by_simulation is not None and _names(by_simulation) != _names(by_witnesses):
         return by_simulation
@@ -119,6 +123,8 @@ def _together(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
         return by_witnesses
     weight = np.array([first.sd**-2, last.sd**-2])
     value = float(weight @ [first.value, last.value] / weight.sum())
+    loads = any(alias.effect == SOMEWHERE[0] for alias in by_simulation.set)
+    alike = (alias for alias in by_witnesses.set[1:] if loads or _names(alias) != SOMEWHERE)
     bayes = by_witnesses.log_bayes_factor + max(0.0, by_simulation.log_bayes_factor)
     return replace(
         by_simulation,
@@ -126,7 +132,7 @@ def _together(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
             Estimate(first.name, value, float(weight.sum() ** -0.5), first.unit),
             *by_simulation.parameters[1:],
         ),
-        set=(Alias(by_witnesses.effect, by_witnesses.target, bayes), *by_witnesses.set[1:]),
+        set=(Alias(by_witnesses.effect, by_witnesses.target, bayes), *alike),
         advice=by_witnesses.advice,
     )
 

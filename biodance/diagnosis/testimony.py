@@ -8,6 +8,7 @@ Signs of channels have no size: they are undone in the recording, and the witnes
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.diagnosis.heard import Testimony, put_right
 from biodance.diagnosis.naming import TOGETHER
 from biodance.effects import Effect, causes
+from biodance.effects.added_mass import AddedMass
+from biodance.effects.body_mass import BodyMass
 from biodance.records import Array
 
 THRESHOLD = 2.0
@@ -32,6 +35,8 @@ _BROAD = 10.0
 """Typical sizes: that large ones are rare counts for a name; the size itself is told as the witnesses show it."""
 _AGAIN = 2
 """Times that the witnesses are asked again about a recording with the named causes put right."""
+SOMEWHERE = (AddedMass.name, "")
+"""Effect and target of a load of which only the weight is known."""
 _ROUNDS = 3
 _STEPS = 30
 _SURE = 2.0
@@ -135,10 +140,19 @@ def weigh(testimony: Testimony) -> Verdicts:
         if best is None:
             break
         near = [o for o in ranking if o is best or best.score - o.score <= TOGETHER]
-        named.append((best, tuple(o.alias for o in sorted(near, key=lambda o: o is not best))))
+        near.sort(key=lambda o: o is not best)
+        named.append((best, (*(o.alias for o in near), *_loads(near))))
         if best.names in heard.turned:
             break  # the traces of other causes hold only once the sign is mended
     return Verdicts(_findings(heard, value, named), heard, first)
+
+
+def _loads(near: Iterable[Hypothesis]) -> tuple[Alias, ...]:
+    """Return a load somewhere, where a body that is heavier than declared is among what cannot be told apart: to
+    witnesses, who only weigh, the two are the same.
+    """
+    heavier = (one for one in near if one.names == (BodyMass.name, "") and one.found.theta[-1] > 0)
+    return tuple(Alias(*SOMEWHERE, one.log_bayes_factor) for one in heavier)
 
 
 def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], *, signs: bool) -> list[Hypothesis]:

@@ -1,11 +1,19 @@
 """Regression calibration of a session: its data discounted by what twins and plates disturb, with what noise in the
-kinematics takes from the parameters given back.
+kinematics takes from the parameters given back (regression dilution).
+
+Fast movement is small movement: beyond 1 Hz skin and a trunk that is no rigid body add accelerations that nobody made.
+They stand in the regressor, not in the wrench, and least squares answers with parameters that are too small (a light
+trunk). What the true regressor is to be expected, given the measured one, is gain times measured (Carroll et al. 2006,
+Measurement Error in Nonlinear Models, doi:10.1201/9781420010138). The gain is measured where it acts: what the plates
+show of the wrench that trunk, legs and arms are predicted to need, band by band and channel by channel.
 """
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from biodance.body.body import Body
-from biodance.identification.dilution import carried_away, undiluted
+from biodance.body.human.skeleton import kind_of
 from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import may_carry
@@ -13,8 +21,67 @@ from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, tem
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Statistics
-from biodance.records import Sip
+from biodance.records import Array, Sip
 from biodance.uncertainty.noise import Noise
+
+_FAST = 1.0
+"""Hz: bands that begin here or higher are calibrated; in slower ones the gain is 1 within 1 % on virtual people."""
+_SPREAD = 0.3
+"""Standard deviation of a gain about 1 before the data."""
+_PARTS = (("pelvis", "trunk_head"), ("thigh", "shank", "foot"), ("upper_arm", "forearm_hand"))
+
+
+def undiluted(total: Statistics, phi: Array, segments: tuple[str, ...]) -> Statistics:
+    """Return the statistics with the regressor as it is to be expected without the noise of its kinematics.
+
+    Parameters
+    ----------
+    total : Statistics
+        As measured, p = 10 parameters of each of N ``segments``.
+    phi : (p,) array
+        SIP under which the gains are measured: those of a fit to ``total``.
+    segments : tuple of str
+        Names, in order.
+
+    Returns
+    -------
+    Statistics
+        The columns of trunk, legs and arms times their gains (0 to 1), in every band from 1 Hz and every channel of
+        the wrench; slower bands and the wrench as they were.
+    """
+    kinds = [kind_of(name) for name in segments]
+    parts = np.repeat([[kind in part for kind in kinds] for part in _PARTS], 10, axis=1)
+    scale = np.ones(total.gram.shape[:3])
+    for band in np.flatnonzero(np.array(total.layout.bands.edges[:-1]) >= _FAST):
+        if total.count[band]:
+            for channel in range(6):
+                gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
+                scale[band, channel, :-1] = np.where(parts.any(axis=0), gain @ parts, 1.0)
+    gram = total.gram * scale[..., None, None]
+    gram *= scale[:, None, None]
+    return Statistics(gram, total.count, total.layout)
+
+
+def carried_away(before: Posterior, after: Posterior) -> bool:
+    """Whether giving back what noise takes moves a mass by more than its standard deviation.
+
+    A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
+    what is fast, each round lowers the one and raises the other.
+    """
+    sd = np.sqrt(np.diag(before.covariance)[::10])
+    return bool(np.any(np.abs(after.mean - before.mean)[::10] > sd))
+
+
+def _gains(gram: Array, parts: Array, count: int) -> Array:
+    """Return the gains (G,) of the wrenches that ``parts`` (G, p) of the body are predicted to need, from the second
+    moments (p + 1, p + 1) of [W y] in one channel.
+    """
+    square, seen = parts @ gram[:-1, :-1] @ parts.T, parts @ gram[:-1, -1]
+    left = gram[-1, -1] - seen @ np.linalg.lstsq(square, seen, rcond=None)[0]
+    noise = max(float(left), 1e-9 * float(gram[-1, -1])) / count + 1e-12
+    precision = square / noise + np.eye(len(parts)) / _SPREAD**2
+    return np.clip(np.linalg.solve(precision, seen / noise + 1.0 / _SPREAD**2), 0.0, 1.0)
+
 
 _ROUNDS, _AGAIN = 2, 4
 """How often the dilution is measured under the parameters of the fit before; rounds of learning the noise anew after

@@ -20,6 +20,8 @@ KNOWN, PARTLY = 0.75, 0.3
 """Share of the prior variance that the data must remove for "known" (standard deviation halved) and for "partly"."""
 SIGMAS = 1.959964
 """Half width of a 95 % interval in standard deviations."""
+_NEIGHBOURS = (("pelvis", "right_thigh", "left_thigh"), ("pelvis", "trunk_head"))
+"""Segments at one joint that can trade mass."""
 
 Knowability = Literal["known", "partly known", "cannot be known"]
 
@@ -139,17 +141,21 @@ class Together:
         )
 
 
-def known_together(sip: Sip) -> Together | None:
-    """Return pelvis and thighs where their masses are less certain than the sum is: what one gains the others lose."""
-    names = ("pelvis", "right_thigh", "left_thigh")
-    if not set(names) <= set(sip.segments):
-        return None
-    at = [10 * sip.segments.index(name) for name in names]
-    cov = np.asarray(sip.covariance)[np.ix_(at, at)]
-    sd, alone = float(np.sqrt(max(cov.sum(), 0.0))), float(np.sqrt(np.trace(cov)))
-    if sd >= alone:
-        return None
-    return Together(names, float(sip.phi[at].sum()), sd, float(sip.phi[at[0]]), float(np.sqrt(cov[0, 0])))
+def known_together(sip: Sip) -> tuple[Together, ...]:
+    """Return the pelvis with what shares a joint with it, thighs or trunk, where their masses are less certain than the
+    sum is: what one gains the others lose; the surest sum for what its parts are comes first.
+    """
+    found = []
+    for names in _NEIGHBOURS:
+        if not set(names) <= set(sip.segments):
+            continue
+        at = [10 * sip.segments.index(name) for name in names]
+        cov = np.asarray(sip.covariance)[np.ix_(at, at)]
+        sd, alone = float(np.sqrt(max(cov.sum(), 0.0))), float(np.sqrt(np.trace(cov)))
+        if sd < alone:
+            together = Together(names, float(sip.phi[at].sum()), sd, float(sip.phi[at[0]]), float(np.sqrt(cov[0, 0])))
+            found.append((sd / alone, together))
+    return tuple(together for _, together in sorted(found, key=lambda one: one[0]))
 
 
 def _deviation(slope: Array, covariance: Array) -> Array:

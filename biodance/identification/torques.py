@@ -8,6 +8,13 @@ The torque about a joint axis a through o is what the segments beyond it need le
 linear in the parameters: torque = Y phi - c, hence the covariance Y C Y'. It holds at the tracked motion and the
 measured wrenches: errors of skin and plates in this very trial are not counted, those that went into the parameters
 are.
+
+How far every uncertain quantity was pulled from what was known before, and what it still means for the joints, is told
+as particle physics ranks its nuisance parameters: pull = (value - prior value) / prior standard deviation; impact =
+what one standard deviation of the quantity after the data does to a joint moment, all other quantities following it as
+far as they hang together with it (their regression on it): for a quantity g' phi of standard deviation s, phi moves by
+C g / s and the moment by Y C g / s. Squared and summed over quantities that do not hang together it is the variance of
+the moment. After ATLAS and CMS, Procedure for the LHC Higgs boson search combination, ATL-PHYS-PUB-2011-11 (2011).
 """
 
 from collections.abc import Iterator, Mapping
@@ -18,11 +25,14 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.identification.identification import Identification
-from biodance.identification.knowledge import SIGMAS
+from biodance.identification.knowledge import QUANTITIES, SIGMAS, segment_quantities
+from biodance.motion.contact.contact import foot_wrenches, ground_contact
+from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.kinematics import below, in_blocks, poses, segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Motion, Wrench
+from biodance.records import Array, Motion, Trial, Wrench
 from biodance.spatial import cross
+from biodance.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,3 +125,79 @@ def _axes(body: Body, motion: Motion) -> tuple[Array, Array]:
     own = np.array([joint.axis for joint in body.joints]).reshape(-1, 3)
     axis = np.einsum("tjab,jb->tja", pose.joint_rotation, own)
     return axis, cross(axis, pose.joint_position)
+
+
+@one_thread()
+def torques_on_plates(found: Identification, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> TorqueBands:
+    """Return the joint torques of a prepared ``trial`` with the identified body: what each foot carries, and what the
+    segments beyond need; ``use`` (T,) the frames that were compared.
+    """
+    soles = soles_from_body(found.body, motion)
+    ground = foot_wrenches(trial, ground_contact(trial, soles, mass=found.sip.mass.sum()), soles)
+    return torque_bands(found, motion, ground, trial=trial.name, use=use)
+
+
+_JOINTS = ("knee_flexion", "hip_flexion")
+_FRAMES = 400
+"""Frames, about, from which a root mean square is taken."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """One quantity of a ``segment``: its ``pull`` and its standard deviation after the data ``left``, both in prior
+    standard deviations; ``knee``, ``hip`` N·m, RMS over the used frames of the flexion moment that one standard
+    deviation of it after the data adds, on the side where that is more.
+    """
+
+    segment: str
+    quantity: str
+    pull: float
+    left: float
+    knee: float
+    hip: float
+
+
+def impacts(found: Identification, motion: Motion, use: NDArray[np.bool_]) -> tuple[Impact, ...]:
+    """Return every quantity of every segment in the frames ``use`` (T,) of ``motion``, the largest impact first; ()
+    where no knee or hip bends or no frame is used.
+    """
+    names = [joint.name for joint in found.body.joints]
+    of = {kind: [i for i, name in enumerate(names) if name.endswith(kind)] for kind in _JOINTS}
+    if not use.any() or not all(of.values()):
+        return ()
+    at = np.flatnonzero(use)
+    at = at[:: max(1, at.size // _FRAMES)]
+    frames = motion.at(at)
+    joints = [i for kind in _JOINTS for i in of[kind]]
+    Y = torque_regressor(found.body, frames)[:, joints]
+    moved, sd = _moved(found)
+    added = np.sqrt(np.mean((Y.reshape(-1, Y.shape[2]) @ moved).reshape(len(Y), len(joints), -1) ** 2, axis=0))
+    knee, hip = added[: len(of["knee_flexion"])].max(axis=0), added[len(of["knee_flexion"]) :].max(axis=0)
+    rows = [
+        Impact(
+            known.segment,
+            known.quantity,
+            (known.value - known.table) / known.table_sd,
+            known.sd / known.table_sd,
+            float(knee[k]),
+            float(hip[k]),
+        )
+        for k, known in enumerate(found.known)
+        if known.table_sd > 0 and sd[k] > 0
+    ]
+    return tuple(sorted(rows, key=lambda row: -max(row.knee, row.hip)))
+
+
+def _moved(found: Identification) -> tuple[Array, Array]:
+    """Return by how much the parameters move (10N, 10N) with one standard deviation of each quantity, and these (10N,).
+
+    Columns in the order of ``found.known``: segment by segment, in each the quantities of `QUANTITIES`.
+    """
+    C, size = found.belief.covariance, len(QUANTITIES)
+    slopes = np.zeros_like(C)
+    for i in range(len(found.sip.segments)):
+        cut = slice(size * i, size * i + size)
+        slopes[cut, cut] = segment_quantities(found.sip.phi[cut])[1].T
+    together = C @ slopes
+    sd = np.sqrt(np.maximum(np.einsum("pk,pk->k", slopes, together), 0.0))
+    return np.divide(together, sd, out=np.zeros_like(together), where=sd > 0), sd

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.records import Array, Markers, Trial, Wrench
+from biodance.records import Array, Markers, Trial, Wrench, longest_run
 from biodance.settings import STANDARD_GRAVITY, StandingRules
 
 _BLOCK = 0.05  # s, the force is averaged over blocks of this length before it is judged
@@ -105,10 +105,5 @@ def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
     middle = float(np.nanmedian(blocks)) if np.isfinite(blocks).any() else 0.0
     if not middle >= rules.force:
         return None
-    steady = np.concatenate([[0], np.abs(blocks - middle) <= rules.sway * middle, [0]]).astype(int)
-    starts, ends = np.flatnonzero(np.diff(steady) == 1), np.flatnonzero(np.diff(steady) == -1)
-    if not starts.size:
-        return None
-    longest = int(np.argmax(ends - starts))
-    run = blocks[starts[longest] : ends[longest]]
-    return run if run.size * _BLOCK >= rules.shortest - 1e-9 else None
+    run = blocks[slice(*longest_run(np.abs(blocks - middle) <= rules.sway * middle))]
+    return run if run.size and run.size * _BLOCK >= rules.shortest - 1e-9 else None

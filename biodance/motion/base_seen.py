@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.records import Array, Markers
-from biodance.spatial import cross
+from biodance.spatial import cross, rigid_fit
 
 _LEAST = 3
 """Markers that fix a posture."""
@@ -65,11 +65,8 @@ def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, floa
     if not whole.any():
         raise TrialRefused(f"{where}: at no time all markers of the base were seen.")
     rotation, position = np.full((len(seen), 3, 3), np.nan), np.full((len(seen), 3), np.nan)
-    middle, centre = seen[whole].mean(axis=1), local.mean(axis=0)
-    u, _, vt = np.linalg.svd(np.einsum("tki,kj->tij", seen[whole] - middle[:, None], local - centre))
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    turn = u @ vt
-    rotation[whole], position[whole] = turn, middle - turn @ centre
+    turn, position[whole] = rigid_fit(local, seen[whole])
+    rotation[whole] = turn
     off = seen[whole] - position[whole][:, None] - np.einsum("tij,kj->tki", turn, local)
     rms = float(np.sqrt(np.mean(np.sum(off**2, axis=2))))
     if rms > _FAR:

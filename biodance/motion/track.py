@@ -13,6 +13,7 @@ from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics
 from biodance.motion.kinematics import poses
 from biodance.motion.smoothing import smooth
 from biodance.records import Array, Markers, Motion, Trial
+from biodance.spatial import zxy_angles
 from biodance.threads import one_thread
 
 _STRIDE = 1.0
@@ -35,12 +36,7 @@ def upright_trunk(body: Body, q: Array, rate: float) -> Array:
     out = np.array(q)
     first = body.nq - len(body.joints)
     signs = [float(body.joints[i].axis.sum()) for i in chain]
-    angles = (
-        np.arctan2(-relative[:, 0, 1], relative[:, 1, 1]),
-        np.arcsin(np.clip(relative[:, 2, 1], -1.0, 1.0)),
-        np.arctan2(-relative[:, 2, 0], relative[:, 2, 2]),
-    )
-    for i, sign, angle in zip(chain, signs, angles, strict=True):
+    for i, sign, angle in zip(chain, signs, zxy_angles(relative), strict=True):
         out[:, first + i] = sign * angle
     return out
 

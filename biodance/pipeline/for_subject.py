@@ -70,8 +70,8 @@ def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None
     masses = tuple(_part(known) for known in one.known if known.quantity == "mass")
     reach = SIGMAS * standing.mass_sd if standing else 0.0
     weight = (standing.mass - reach, standing.mass + reach) if standing else SubjectAccount.weight
-    pair = known_together(one.sip)
-    together = _together(pair) if pair and not masses[0].measured else None
+    sums = known_together(one.sip)
+    together = _together(sums[0]) if sums and not masses[0].measured else None
     return SubjectAccount(result.subject, visit, weight, masses, together, body=result.body)
 
 

@@ -15,16 +15,14 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
-from biodance.identification.impact import Impact, impacts
 from biodance.identification.knowledge import SIGMAS
 from biodance.identification.load_place import nearest_segment
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
-from biodance.identification.torques import TorqueBands
+from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
-from biodance.pipeline.torques import torques_in
 from biodance.pipeline.trial_result import Check, TrialResult, trial_fit
 from biodance.records import ROLES, Role, Sip
 from biodance.threads import Sendable, one_thread
@@ -107,7 +105,10 @@ class SessionIdentification(Sendable):
     @cached_property
     def torques(self) -> TorqueBands | None:
         """Joint torques with bands in the trial ``shown``, computed when asked for; None without one."""
-        return torques_in(self.identification, self.shown) if self.shown else None
+        one = self.shown
+        if one is None or one.motion is None or one.comparison is None:
+            return None
+        return torques_on_plates(self.identification, one.trial, one.motion, one.comparison.used)
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:

@@ -16,7 +16,7 @@ from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Role, Trial, runs
 from biodance.records.attention import Judged
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.session_noise import added_noise, with_own_noise
+from biodance.uncertainty.session_noise import added_noise, of_zeros, with_own_noise
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 
 
@@ -127,10 +127,15 @@ def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
 
 def seconds_of(look: Look) -> float:
     """Return for how many seconds a trial can be compared, in runs that are long enough."""
+    return sum(_runs_of(look))
+
+
+def _runs_of(look: Look) -> tuple[float, ...]:
+    """Return the seconds of every run of a trial that can be compared and is long enough."""
     rate = look.motion.rate
     if not np.isfinite(rate):
-        return 0.0
-    return float(sum(stop - start for start, stop in runs(look.use) if stop - start >= SHORTEST_RUN * rate) / rate)
+        return ()
+    return tuple((stop - start) / rate for start, stop in runs(look.use) if stop - start >= SHORTEST_RUN * rate)
 
 
 def own_tolerances(
@@ -138,8 +143,8 @@ def own_tolerances(
 ) -> Own:
     """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
     recordings: with markers that move more on the body than where they were learned, with the noise of their own
-    cameras and plates as ``recorded`` shows it, and with the unrest of a person who stands still where standing is
-    looked at.
+    cameras and plates as ``recorded`` shows it, with the unrest of a person who stands still where standing is looked
+    at, and with trial means no surer than a plate's zero.
     """
     found, notes = known or shipped(), []
     usable_looks = [look for look in chosen if look.motion.q.size]
@@ -168,7 +173,8 @@ def own_tolerances(
             f"{SWAYING:g} Hz (heart, breath, muscles; root mean square), which no marker shows: a fault must be "
             f"larger to be seen."
         )
-    return Own(found, tuple(notes), believed=factor <= _TOO_FAR)
+    zeros = of_zeros([run for look in chosen for run in _runs_of(look)])
+    return Own(with_own_noise(found, zeros, float(body.sip.mass.sum())), tuple(notes), believed=factor <= _TOO_FAR)
 
 
 def widened_by(known: Tolerances, factor: float) -> Tolerances:

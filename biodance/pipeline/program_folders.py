@@ -12,7 +12,7 @@ from biodance.body.export import write_model
 from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
 from biodance.body.parts import UPRIGHT
 from biodance.body.solids import SegmentSolids, segment_solids
-from biodance.errors import BiodanceError, SessionRefused, TrialRefused
+from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.bids import (
     COMPONENTS,
     BidsChannels,
@@ -26,14 +26,14 @@ from biodance.lab.opensim.ground_forces import external_loads, ground_table, inv
 from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.plain_text import write_new
-from biodance.lab.session.results_folder import made_folder
+from biodance.lab.session.results_folder import made_folder, new_folder
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
 from biodance.pipeline.movement import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import CHANNELS, SIDES, Markers, Motion, Plate, Session, Trial, Wrench, runs
+from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run
 from biodance.version import __version__
 
 _DERIVED = "derivatives/biodance"
@@ -53,12 +53,11 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     TrialRefused
         No trial has markers.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
     raw = [trial for trial in session.trials if trial.markers is not None]
     if not raw:
         raise TrialRefused(f"{session.folder}: no trial has markers, so there is nothing to share as motion.")
     subject = bids_label(session.subject.name or session.folder.name)
+    new_folder(folder)
     place, derived = (made_folder(folder / part / f"sub-{subject}" / "motion") for part in (".", _DERIVED))
     write_description(folder, session.folder.name)
     write_description(folder / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
@@ -188,15 +187,10 @@ def write_opensim_folder(
         raise TrialRefused(
             f"{folder}: no trial gives a motion, so there is nothing for OpenSim to move. {said}".strip()
         )
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
-    made_folder(folder)
+    new_folder(folder)
     solids = segment_solids(body) if solids is None else solids
     write_model(body, folder / MODEL, format="osim", source=source, solids=solids)
-    written = []
-    for one in moving:
-        written.append(_trial(one, body, folder))
-    return tuple(written)
+    return tuple(_trial(one, body, folder) for one in moving)
 
 
 def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
@@ -209,7 +203,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     if contact is None:
         return OpensimTrial(name, tuple(files), None, "It has no force plate.")
     feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
-    ground = {f"{side}_foot": _finite(wrench) for side, wrench in zip(SIDES, feet, strict=True)}
+    ground = {foot: _finite(wrench) for foot, wrench in feet.items()}
     files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
     loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
     files.append(write_new(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
@@ -239,7 +233,7 @@ def _finite(wrench: Wrench) -> Wrench:
 
 def _span(contact: Contact, motion: Motion) -> slice | None:
     """Return the longest run of frames in which plates and markers tell all; None where it is too short."""
-    first, stop = max(runs(contact.measured & motion.determined), key=lambda run: run[1] - run[0], default=(0, 0))
+    first, stop = longest_run(contact.measured & motion.determined)
     return slice(first, stop) if stop - first >= _SHORTEST else None
 
 

@@ -14,7 +14,7 @@ from biodance.identification.validation import TrialValidation
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import SIDES, Array
+from biodance.records import Array, side_in_name
 from biodance.spatial import zero_moment_point
 
 _FASTEST, _FRAMES = 25.0, 3000
@@ -76,7 +76,7 @@ def frames_of(result: SessionResult) -> SessionReplay | None:
         tuple(_trial(whole, body, one, rate, validated) for one in moving),
         np.reshape([box for _, box in parts], (-1, 2, 3)),
         tuple(segment for segment, _ in parts),
-        tuple(next((side for side in SIDES if body.segments[k].startswith(side)), "middle") for k, _ in parts),
+        tuple(side_in_name(body.segments[k]) for k, _ in parts),
         (body.segment_index(best.segment), best.place) if best is not None and placed else None,
     )
 
@@ -90,8 +90,7 @@ def _trial(
     trial, motion = one.trial, one.motion
     assert motion is not None
     assert trial.markers is not None
-    height = float(np.mean([p.height for p in trial.plates])) if trial.plates else 0.0
-    simulated, parameters, residual = _simulated(one, validated.get(one.name), height)
+    simulated, parameters, residual = _simulated(one, validated.get(one.name))
     size = np.linalg.norm(residual, axis=1)
     worst, step = int(np.nanargmax(size)) if np.isfinite(size).any() else None, max(1, round(motion.rate / rate))
     chosen = np.arange((worst or 0) % step, motion.time.size, step)
@@ -99,7 +98,7 @@ def _trial(
     pose = poses(body, shown.q)
     measured = np.full((motion.time.size, 2, 3), np.nan)
     if trial.plates:
-        measured = np.stack([trial.wrench.force, trial.wrench.cop(height=height)], axis=1)
+        measured = np.stack([trial.wrench.force, trial.wrench.cop(height=trial.floor)], axis=1)
     turn = Rotation.from_matrix(pose.rotation.reshape(-1, 3, 3)).as_quat().reshape(*pose.rotation.shape[:2], 4)
     return TrialReplay(
         one.name,
@@ -117,7 +116,7 @@ def _trial(
     )
 
 
-def _simulated(one: TrialResult, found: TrialValidation | None, height: float) -> tuple[Array, str, Array]:
+def _simulated(one: TrialResult, found: TrialValidation | None) -> tuple[Array, str, Array]:
     """Return force and centre of pressure (T, 2, 3) of the simulation, whose parameters it has, and the residual force
     (T, 3) of the fully measured frames.
     """
@@ -131,5 +130,5 @@ def _simulated(one: TrialResult, found: TrialValidation | None, height: float) -
     else:
         nothing = np.full((one.motion.time.size, 2, 3), np.nan)
         return nothing, "table", nothing[:, 0]
-    cop = zero_moment_point(wrench, height=height - about[2], threshold=20.0) + about
+    cop = zero_moment_point(wrench, height=one.trial.floor - about[2], threshold=20.0) + about
     return np.stack([wrench[:, :3], cop], axis=1), parameters, np.where(use[:, None], left[:, :3], np.nan)

@@ -13,7 +13,7 @@ from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
 from biodance.motion.kinematics import centre_of_mass, in_blocks, poses
 from biodance.pipeline.trial_result import QuietStanding
-from biodance.records import Array, Markers, Motion, Trial, runs
+from biodance.records import Array, Markers, Motion, Trial, longest_run
 from biodance.settings import StandingRules
 
 FOOT_LANDMARKS = tuple(
@@ -31,8 +31,7 @@ def quiet_run(
     if not used.any() or np.median(vertical[used]) < rules.force:
         return None
     middle = float(np.median(vertical[used]))
-    steady = runs((np.abs(vertical - middle) <= rules.sway * middle) & used)
-    first, stop = max(steady, key=lambda run: run[1] - run[0], default=(0, 0))
+    first, stop = longest_run((np.abs(vertical - middle) <= rules.sway * middle) & used)
     return slice(first, stop) if stop - first >= rules.shortest * rate else None
 
 
@@ -74,8 +73,7 @@ def quiet_standing(
     run = quiet_run(wrench.force[:, 2], used, wrench.rate, rules)
     if run is None or not _still(trial.markers, run, rules.still):
         return None
-    height = float(np.mean([plate.height for plate in trial.plates]))
-    cop = wrench.cop(height=height)[run, :2]
+    cop = wrench.cop(height=trial.floor)[run, :2]
     com, ahead = np.empty((0, 2)), np.array([1.0, 0.0])
     if body is not None and motion is not None:
         com, ahead = centre_of_mass(body, motion)[run, :2], facing(body, motion)

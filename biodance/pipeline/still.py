@@ -17,7 +17,7 @@ from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still
 from biodance.pipeline.standing import facing
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import Array, Motion
+from biodance.records import Array, Motion, side_in_name
 
 
 def _parents(body: Body) -> list[int]:
@@ -41,40 +41,28 @@ def _tip(box: Array) -> Array:
     return middle
 
 
-def _side(segment: str) -> str:
-    return next((side for side in ("left", "right") if segment.startswith(side)), "middle")
-
-
 def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
-    """Return lines (B, 2, 3) m of the first frame of ``pose`` and their sides.
+    """Return lines (T, B, 2, 3) m of a ``pose`` of T frames and their sides (B).
 
     A segment is drawn from its origin to the origin of its child; to the middle of a left and a right child, which a
     bar joins; beyond its children, or without any, to the end of its box. Only the trunk reaches beyond its children.
     """
-    parents, place = _parents(body), pose.position[0]
-    lines: list[tuple[Array, Array]] = []
-    sides: list[str] = []
-
-    def draw(start: Array, end: Array, side: str) -> None:
-        lines.append((start, end))
-        sides.append(side)
-
+    parents, place = _parents(body), pose.position
+    lines: list[tuple[Array, Array, str]] = []
     for i, segment in enumerate(body.segments):
-        start = place[i]
-        pair = [place[j] for j, parent in enumerate(parents) if parent == i and _side(body.segments[j]) != "middle"]
+        start, children = place[:, i], [j for j, parent in enumerate(parents) if parent == i]
+        pair = [place[:, j] for j in children if side_in_name(body.segments[j]) != "middle"]
         if len(pair) > 1:
-            draw(pair[0], pair[-1], "middle")
-            draw(start, (pair[0] + pair[-1]) / 2, "middle")
-            start = (pair[0] + pair[-1]) / 2
-        for j in (
-            j
-            for j, parent in enumerate(parents)
-            if parent == i and (len(pair) < 2 or _side(body.segments[j]) == "middle")
-        ):
-            draw(place[i], place[j], _side(body.segments[j]))
-        if i not in parents or segment.startswith("trunk"):
-            draw(start, place[i] + pose.rotation[0, i] @ _tip(body.boxes[i]), _side(segment))
-    return np.array(lines), tuple(sides)
+            middle = (pair[0] + pair[-1]) / 2
+            lines += [(pair[0], pair[-1], "middle"), (start, middle, "middle")]
+            start = middle
+        for j in children:
+            side = side_in_name(body.segments[j])
+            if len(pair) < 2 or side == "middle":
+                lines.append((place[:, i], place[:, j], side))
+        if not children or segment.startswith("trunk"):
+            lines.append((start, place[:, i] + pose.rotation[:, i] @ _tip(body.boxes[i]), side_in_name(segment)))
+    return np.stack([np.stack(line[:2], axis=1) for line in lines], axis=1), tuple(line[2] for line in lines)
 
 
 def still_of(body: Body, results: tuple[TrialResult, ...]) -> Still:
@@ -98,10 +86,7 @@ def still_at(body: Body, one: TrialResult, frame: int) -> Still:
     assert trial.markers is not None
     force, cop = np.full(3, np.nan), np.full(3, np.nan)
     if trial.plates:
-        force, cop = (
-            trial.wrench.force[frame],
-            trial.wrench.cop(height=float(np.mean([p.height for p in trial.plates])))[frame],
-        )
+        force, cop = trial.wrench.force[frame], trial.wrench.cop(height=trial.floor)[frame]
     posed = posture_still(body, motion.q[frame], trial.name)
     return replace(
         posed,
@@ -124,7 +109,7 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
     return Still(
         trial=title,
         time=0.0,
-        bones=lines,
+        bones=lines[0],
         sides=sides,
         markers=np.empty((0, 3)),
         plates=np.empty((0, 4, 3)),
@@ -135,7 +120,7 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
         boxes=np.reshape([box for _, box in parts], (-1, 2, 3)),
         rotations=pose.rotation[0, on],
         positions=pose.position[0, on],
-        box_sides=tuple(_side(body.segments[segment]) for segment in on),
+        box_sides=tuple(side_in_name(body.segments[segment]) for segment in on),
     )
 
 

@@ -225,8 +225,7 @@ def _loads(body: Body, one: TrialResult, contact: Contact) -> Iterator[Output]:
     """Yield moments and powers; NaN where nobody knows what the ground does to the leg's foot."""
     assert one.motion is not None
     motion = one.motion
-    feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
-    ground = {f"{side}_foot": wrench for side, wrench in zip(SIDES, feet, strict=True)}
+    ground = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
     torque, rate = joint_torques(body, motion, ground).torque, motion.v[:, body.n_root :]
     for name, columns, axes in _groups(body):
         told = motion.determined & _told(name, contact)

@@ -5,12 +5,22 @@ ground's action ON the subject, about the lab origin, force first; time is the f
 are copied, checked for shape at birth and read-only afterwards; change a record with ``dataclasses.replace``.
 """
 
-from biodance.records.arrays import CHANNEL_TITLES, CHANNELS, Array, Index, Mask, by_name, frozen_array, runs
+from biodance.records.arrays import (
+    CHANNEL_TITLES,
+    CHANNELS,
+    Array,
+    Index,
+    Mask,
+    by_name,
+    frozen_array,
+    longest_run,
+    runs,
+)
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
 from biodance.records.session import ROLES, Role, Session, Source, Trial
 from biodance.records.sip import Sip
-from biodance.records.subject import SIDES, FootSizes, Subject
+from biodance.records.subject import SIDES, FootSizes, Subject, side_in_name
 from biodance.records.wrench import Plate, Wrench
 
 __all__ = [
@@ -34,5 +44,7 @@ __all__ = [
     "Wrench",
     "by_name",
     "frozen_array",
+    "longest_run",
     "runs",
+    "side_in_name",
 ]

@@ -98,3 +98,8 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the runs of True in ``mask`` (T,) as (start, stop), stop excluded."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+
+
+def longest_run(mask: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the first of the longest runs of True in ``mask`` (T,) as (start, stop), (0, 0) where there is none."""
+    return max(runs(mask), key=lambda run: run[1] - run[0], default=(0, 0))

@@ -141,6 +141,11 @@ class Trial:
         }
 
     @property
+    def floor(self) -> float:
+        """Mean height of the plates' surfaces, m; 0 without plates."""
+        return float(np.mean([plate.height for plate in self.plates])) if self.plates else 0.0
+
+    @property
     def wrench(self) -> Wrench:
         """Total wrench of all plates about the lab origin; TrialRefused without plates or with different time bases."""
         if not self.plates:

@@ -151,8 +151,7 @@ def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FrameP
     look = Look(there, cut, np.zeros(cut.time.size, dtype=bool), 0.0, 1.0)
     measured = _contact(body, look, soles).measured if forces.sized else _carried(body, look)
     use = measured & cut.determined
-    height = float(np.mean([plate.height for plate in there.plates]))
-    about = np.nanmean(there.wrench.cop(height=height, threshold=_PRESSED), axis=0)
+    about = np.nanmean(there.wrench.cop(height=there.floor, threshold=_PRESSED), axis=0)
     return replace(look, use=use), soles, about
 
 

@@ -7,12 +7,13 @@ s² (J'WJ)^-1 J'W²J (J'WJ)^-1 (J the marker Jacobian, W the markers' weights), 
 (2 pi f)^2, and the wrench is linear in accelerations.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.tables.error_sizes import error_size
 from biodance.motion.kinematics import place_jacobian, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Markers, Motion, Plate, Trial
@@ -115,6 +116,17 @@ def of_plates(density: Array, count: int) -> Array:
     root Hz each.
     """
     return np.diag(count * density**2 * BANDS.rate / 2)
+
+
+def of_zeros(seconds: Sequence[float]) -> Array:
+    """Return (B, 6, 6): covariance of one coefficient from plates whose zero is not quite the same in every run of so
+    many ``seconds``: of the mean of a run alone, which longer runs make no surer.
+    """
+    out = np.zeros((len(BANDS), 6, 6))
+    sd = np.repeat([error_size("plate_zero", "force"), error_size("plate_zero", "moment")], 3)
+    if len(seconds):
+        out[0] = float(np.mean(seconds)) * BANDS.rate * np.diag(sd**2)
+    return out
 
 
 def added_noise(

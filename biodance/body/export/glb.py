@@ -12,6 +12,7 @@ from biodance.body.body import Body
 from biodance.body.export._tree import WORLD, segment_tree
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError
+from biodance.records import side_in_name
 
 FORMAT = "glb"
 SUFFIX = ".glb"
@@ -45,8 +46,7 @@ def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
             place[:3, :3], place[:3, 3] = branch.rotation, branch.translation
         above = WORLD_NODE if branch.parent == WORLD else body.segments[branch.parent]
         mesh = solids[name].copy() if name in solids else trimesh.Trimesh()
-        side = next((side for side in ("left", "right") if name.startswith(side)), "")
-        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=_COLOURS[side])
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=_COLOURS[side_in_name(name, "")])
         mesh.metadata = {"mass_kg": float(body.sip.of(name)[0]), "com_m": body.sip.com[branch.segment].tolist()}
         scene.add_geometry(mesh, node_name=name, geom_name=name, parent_node_name=above, transform=place)
     for name, segment, position in zip(body.markers.names, body.markers.segment, body.markers.position, strict=True):

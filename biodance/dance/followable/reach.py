@@ -91,7 +91,7 @@ class Reach:
         if last is not None and last.catalogue is catalogue and s == catalogue.mirrored[last.s]:
             return DanceStep(catalogue, s, MIRROR_CALL, mirror=True)
         before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.catalogue.stance)
-        said = instructions(body, before[6:], catalogue.x[s, 6:], feet, catalogue.stance)
+        said = instructions(body, before, catalogue.x[s], feet, catalogue.stance)
         return DanceStep(catalogue, s, said) if len(said) <= most else None
 
     def leads(self, catalogue: Catalogue, s: int, goal: Catalogue, steps: int) -> bool:

@@ -16,8 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from biodance.dance.limits._checked import NOTHING, CheckedMotion, Remaining
-from biodance.dance.limits._imprecise import Copied, ForImprecise
+from biodance.dance.limits._checked import NOTHING, CheckedMotion, Copied, ForImprecise, Remaining
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family

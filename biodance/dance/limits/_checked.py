@@ -1,13 +1,17 @@
 """A stretch of any motion, as the check of every limit sees it: an ordinary Motion of the body, nothing of the design's
-coordinates.
+coordinates; and a copy by somebody imprecise, as what a limit demands of such people sees it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.body.inertia import rigid_inertia
+from biodance.body.parts import GRAVITY
 from biodance.dance.problem.stance import Stance
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import Poses, poses
@@ -76,3 +80,83 @@ class CheckedMotion:
             names = [self.body.segments[self.body.feet[side].segment] for side in SIDES]
             loads = dict(zip(names, parts, strict=True))
         return joint_torques(self.body, self.motion, loads).torque
+
+
+@dataclass(frozen=True, eq=False)
+class Copied:
+    """A dance as somebody copied it: coordinates ``q`` (T, nq) of ``body`` at ``time`` (T,) s, at equal intervals; on
+    the feet ``stances[on[t]]``. ``still`` True where the frames are held postures, and not one after the other.
+    """
+
+    body: Body
+    time: Array
+    q: Array
+    stances: tuple[Stance, ...]
+    on: NDArray[np.intp]
+    still: bool = False
+
+    @cached_property
+    def pose(self) -> Poses:
+        """Where every segment is."""
+        return poses(self.body, self.q)
+
+    @cached_property
+    def zero_moment_point(self) -> Array:
+        """(T, 2) m on the ground, by differences; at both ends and where the postures are held, of standing still."""
+        sip, pose = self.body.sip, self.pose
+        centre = pose.position + np.einsum("tnij,nj->tni", pose.rotation, sip.com)
+        pull, change = np.broadcast_to(-np.array(GRAVITY), centre.shape), np.zeros_like(centre)
+        if not self.still:
+            pull, change = pull + _second(centre, self._step), self._spin_change(pose)
+        moment = (np.cross(centre, sip.mass[:, None] * pull) + change).sum(axis=1)
+        force = (sip.mass[:, None] * pull).sum(axis=1)
+        return np.asarray(np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:])
+
+    @property
+    def _step(self) -> float:
+        return float(self.time[1] - self.time[0])
+
+    def _spin_change(self, pose: Poses) -> Array:
+        """Return the rates (T, N, 3) N·m at which the segments' angular momenta change."""
+        spin = np.zeros_like(pose.position)
+        spin[1:-1] = _vector(pose.rotation[2:] @ np.swapaxes(pose.rotation[:-2], -1, -2)) / (2 * self._step)
+        own = np.array([rigid_inertia(self.body.sip.of(name)).inertia for name in self.body.segments])
+        inertia = pose.rotation @ own @ np.swapaxes(pose.rotation, -1, -2)
+        return np.asarray(np.gradient((inertia @ spin[..., None])[..., 0], self._step, axis=0))
+
+    def inside(self, share: float) -> Array:
+        """Return how far (T,) m the zero-moment point lies inside the base of support of all feet on the ground, drawn
+        together to ``share``.
+        """
+        point, out = self.zero_moment_point, np.full(len(self.q), np.inf)
+        for k in np.unique(self.on):
+            normals, offsets = self.stances[k].whole.reduced(share)
+            out[self.on == k] = (point[self.on == k] @ normals.T + offsets).min(axis=1)
+        return out
+
+
+@dataclass(frozen=True)
+class ForImprecise:
+    """What imprecise people must keep of a limit.
+
+    ``left`` gives what a copy leaves, in the limit's unit, at least ``least`` of which is demanded; ``key`` is its name
+    in results.json, ``words`` say it of the worst of them (``{}``: cm).
+    """
+
+    left: Callable[[Copied], Remaining]
+    least: float
+    key: str
+    words: str
+
+
+def _second(values: Array, step: float) -> Array:
+    out = np.zeros_like(values)
+    out[1:-1] = (values[2:] - 2 * values[1:-1] + values[:-2]) / step**2
+    return out
+
+
+def _vector(turn: Array) -> Array:
+    """Return the rotation vectors of small rotations (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)

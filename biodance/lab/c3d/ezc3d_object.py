@@ -53,7 +53,7 @@ def write_trial(trial: Trial, path: Path) -> None:
     BiodanceError
         Markers and plates have rates that do not fit, a wrench is not finite, or the file exists.
     """
-    plates = [_recording(plate) for plate in trial.plates]
+    plates = [plate_recording(plate) for plate in trial.plates]
     rate = trial.plates[0].wrench.rate if trial.plates else 0.0
     said = {"PROCESSING": _measurements(trial)} if trial.measurements else None
     first = trial.source.first_frame
@@ -82,7 +82,7 @@ def from_ezc3d(file: "ezc3d.c3d", *, name: str = "trial", role: Role = "fit", su
     return replace(trial, source=replace(trial.source, path=Path(f"{name}.c3d"), format="ezc3d object"))
 
 
-def _recording(plate: Plate) -> PlateRecording:
+def plate_recording(plate: Plate) -> PlateRecording:
     """Return what a plate of TYPE 2 records: the wrench in its own axes, about the centre of its surface."""
     axes, wrench = plate_axes(plate.corners), wrench_about_point(plate.wrench.value, plate.centre)
     return PlateRecording(2, plate.corners, np.zeros(3), np.hstack([wrench[:, :3] @ axes, wrench[:, 3:] @ axes]))

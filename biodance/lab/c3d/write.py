@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
+from biodance.lab.plain_text import write_new
 from biodance.records import Array, Markers, frozen_array
 
 FileValue = str | Sequence[str] | ArrayLike
@@ -127,13 +128,7 @@ def write_c3d(
         .astype("<f4")
         .tobytes()
     )
-    try:
-        with open(path, "xb") as stream:
-            stream.write(header + section + data + bytes(-len(data) % C3D_BLOCK))
-    except FileExistsError as error:
-        raise BiodanceError(f"{path}: the file exists already and is not overwritten. Choose another name.") from error
-    except OSError as error:
-        raise BiodanceError(f"{path}: the file cannot be written ({error.strerror}). Check the folder.") from error
+    write_new(path, header + section + data + bytes(-len(data) % C3D_BLOCK))
 
 
 def _samples(path: Path, markers: Markers | None, plates: Sequence[PlateRecording], analog_rate: float) -> int:

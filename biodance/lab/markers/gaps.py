@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.records import Array, Markers, runs
+from biodance.spatial import rigid_fit
 
 FLANK = 6
 """Seen frames that each side of a short gap must have."""
@@ -125,7 +126,8 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
         return None, "left unseen: fewer than three markers that keep their distance to it were seen throughout"
     span = slice(gap.start - 1, gap.stop + 1)
     others, own = np.stack([markers[label][span] for label in carriers], axis=1), markers[gap.label][span]
-    forward, backward = (_move(others[edge], others, own[edge]) for edge in (0, -1))
+    ways = ((rigid_fit(others[edge], others), own[edge]) for edge in (0, -1))
+    forward, backward = (turn @ point + place for (turn, place), point in ways)
     closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
     if closure > CLOSURE:
         return (
@@ -159,13 +161,3 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
 def _spans_a_plane(points: Array) -> bool:
     """Return whether points (K, 3) m are far enough from one line (10 mm) to fix a rotation."""
     return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1]) > 0.01
-
-
-def _move(reference: Array, moved: Array, point: Array) -> Array:
-    """Return where ``point`` (3,) goes (n, 3) when the cluster ``reference`` (K, 3) goes to ``moved`` (n, K, 3)
-    rigidly (Kabsch).
-    """
-    middle, middles = reference.mean(axis=0), moved.mean(axis=1)
-    u, _, vt = np.linalg.svd(np.einsum("nki,kj->nij", moved - middles[:, None], reference - middle))
-    u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
-    return middles + (u @ vt) @ (point - middle)

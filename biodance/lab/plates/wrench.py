@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from biodance.lab.plates.parameters import PlateParameters
 from biodance.lab.plates.zero import block_means
-from biodance.records import Array, runs
+from biodance.records import Array, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
 
@@ -204,7 +204,7 @@ def _standing(vertical: Array, rate: float) -> slice | None:
     steady = (np.abs(blocks.mean(axis=1) - middle) <= SWAY_STEADY * abs(middle)) & (
         blocks.std(axis=1) <= SWAY_STEADY * abs(middle)
     )
-    start, stop = max(runs(steady), key=lambda run: run[1] - run[0], default=(0, 0))
+    start, stop = longest_run(steady)
     return slice(start * size, stop * size) if (stop - start) * size >= SWAY_TIME * rate else None
 
 

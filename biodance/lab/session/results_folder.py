@@ -60,6 +60,13 @@ def made_folder(folder: Path) -> Path:
     return folder
 
 
+def new_folder(folder: Path) -> Path:
+    """Return a folder that was missing or empty, made; SessionRefused if it holds files or cannot be made."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
+    return made_folder(folder)
+
+
 _LOCK = ".biodance.lock"
 
 

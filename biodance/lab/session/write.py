@@ -6,21 +6,23 @@ import json
 import math
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from biodance.errors import SessionRefused
+from biodance.lab.c3d.ezc3d_object import plate_recording
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.plates.corners import plate_axes
 from biodance.lab.session.file import FILES
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import made_folder
-from biodance.records import Array, Markers, Plate, Session, Subject, Trial
-from biodance.spatial import wrench_about_point
+from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench
 
 FILE = "session.toml"
 
@@ -255,21 +257,7 @@ def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[Pl
     recordings = []
     for plate in plates:
         value = make_interp_spline(time, plate.wrench.value, k=3)(fine)
-        recordings.append(_recording(plate.corners, np.asarray(value)))
+        down = plate_axes(plate.corners)[2, 2] < 0  # the order of corners that a plate of TYPE 2 has
+        corners = plate.corners if down else plate.corners[[1, 0, 3, 2]]
+        recordings.append(plate_recording(replace(plate, corners=corners, wrench=Wrench(fine, np.asarray(value)))))
     return seen, recordings, many * markers.rate
-
-
-def _recording(corners: Array, value: Array) -> PlateRecording:
-    """Return a plate of TYPE 2, z down, from the wrench (S, 6) about the room's origin."""
-    right, up = corners[[0, 3]].mean(axis=0) - corners[[1, 2]].mean(axis=0), corners[[0, 1]].mean(axis=0)
-    y = up - corners[[2, 3]].mean(axis=0)
-    if np.cross(right, y)[2] > 0:
-        corners = corners[[1, 0, 3, 2]]
-        right = -right
-    x = right / np.linalg.norm(right)
-    z = np.cross(x, y)
-    z = z / np.linalg.norm(z)
-    turn = np.stack([x, np.cross(z, x), z], axis=1)
-    local = wrench_about_point(value, corners.mean(axis=0))
-    channels = np.concatenate([local[:, :3] @ turn, local[:, 3:] @ turn], axis=1)
-    return PlateRecording(2, corners, np.zeros(3), channels)

@@ -274,8 +274,9 @@ def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules
     return tuple(notes)
 
 
-def foot_wrenches(trial: Trial, contact: Contact, soles: Soles) -> tuple[Wrench, Wrench]:
-    """Return the measured wrenches (right, left): each plate goes to the foot on it, or is distributed between both.
+def foot_wrenches(trial: Trial, contact: Contact, soles: Soles) -> dict[str, Wrench]:
+    """Return the measured wrenches on ``right_foot`` and ``left_foot``: each plate goes to the foot on it, or is
+    distributed between both.
 
     Plates under no foot go to the foot that is nearer to their centre of pressure. The sum is the trial's total wrench;
     only where ``contact.measured`` is it all that acts on the feet.
@@ -283,8 +284,8 @@ def foot_wrenches(trial: Trial, contact: Contact, soles: Soles) -> tuple[Wrench,
     parts = []
     for index, plate in enumerate(trial.plates):
         parts.append(distribute(plate.wrench, *_on_ground(soles, plate.height), contact.on_plate[:, :, index]))
-    right, left = (np.sum([part[foot].value for part in parts], axis=0) for foot in (0, 1))
-    return Wrench(trial.wrench.time, right), Wrench(trial.wrench.time, left)
+    total = (np.sum([part[foot].value for part in parts], axis=0) for foot in range(len(SIDES)))
+    return {f"{side}_foot": Wrench(trial.wrench.time, value) for side, value in zip(SIDES, total, strict=True)}
 
 
 def _on_ground(soles: Soles, height: float) -> tuple[Array, Array]:

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import place_jacobian, poses
 from biodance.records import Array
-from biodance.spatial import cross
 
 _LEVER = 0.1
 """m, what one radian is compared with: one metre of root translation counts as 10 rad."""
@@ -75,22 +74,7 @@ def _jacobian(body: Body, columns: list[int]) -> Array:
     angles = np.clip(0.4 + 0.2 * np.cos(1.7 * np.arange(len(body.joints))), body.limits.lower, body.limits.upper)
     pose = poses(body, np.concatenate([body.neutral[: body.nq - len(angles)], angles]))
     segment = [body.markers.segment[c] for c in columns]
-    points = pose.points(segment, body.markers.position[columns])[0]
-    out = np.zeros((len(columns), 3, body.nv))
-    if body.n_root:
-        out[:, :, :3] = np.eye(3)
-        out[:, :, 3:6] = np.cross(np.eye(3), points[:, None]).transpose(0, 2, 1) / _LEVER
-    axes = (pose.joint_rotation[0] @ np.array([joint.axis for joint in body.joints]).reshape(-1, 3, 1))[..., 0]
-    turned = cross(axes[:, None], points - pose.joint_position[0][:, None])
-    out[:, :, body.n_root :] = np.moveaxis(_carried(body)[:, segment, None] * turned, 0, 2) / _LEVER
-    return out
-
-
-def _carried(body: Body) -> NDArray[np.bool_]:
-    """Return (n, N + P) True where a segment, or a part of one, moves with a joint."""
-    out = np.zeros((len(body.joints), len(body.segment_joint)), dtype=bool)
-    for segment, joint in enumerate(body.segment_joint):
-        while joint >= 0:
-            out[joint, segment] = True
-            joint = body.joints[joint].parent
+    out = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[columns]))
+    out = out.reshape(len(columns), 3, body.nv)
+    out[:, :, body.n_root // 2 :] /= _LEVER
     return out

@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.records import Array
-from biodance.spatial import axis_rotation
+from biodance.spatial import axis_rotation, zxy_angles
 
 LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_dorsiflexion", "ankle_inversion")
 
@@ -108,7 +108,7 @@ class Leg:
             @ axis_rotation(np.array([1.0, 0.0, 0.0]), inversion)
         )
         hip_turn = np.swapaxes(pelvis_turn @ self.hip_turn, 1, 2) @ foot_turn @ np.swapaxes(below, 1, 2)
-        flexion, adduction, rotation = _zxy_angles(hip_turn)
+        flexion, adduction, rotation = zxy_angles(hip_turn)
         s = self.sign
         return np.stack([flexion, s * adduction, s * rotation, knee, dorsiflexion, s * inversion], axis=1)
 
@@ -124,9 +124,3 @@ def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
 def _solve_sine(y: Array, z: Array, wanted: Array) -> Array:
     """Return the small angle i with ``y sin i + z cos i = wanted``."""
     return np.arcsin(np.clip(wanted / np.hypot(y, z), -1.0, 1.0)) - np.arctan2(z, y)
-
-
-def _zxy_angles(turn: Array) -> tuple[Array, Array, Array]:
-    """Return (z, x, y) angles with ``turn = Rz(z) Rx(x) Ry(y)``."""
-    x = np.arcsin(np.clip(turn[:, 2, 1], -1.0, 1.0))
-    return np.arctan2(-turn[:, 0, 1], turn[:, 1, 1]), x, np.arctan2(-turn[:, 2, 0], turn[:, 2, 2])

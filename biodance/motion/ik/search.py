@@ -11,6 +11,7 @@ from biodance.motion.ik.compiled.interpolation import interpolate
 from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, better, minimise_markers
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Index
+from biodance.spatial import rigid_fit
 
 _OTHERS = 0.01
 """Weight of the other segments' markers in the root's rigid fit: enough where the root's own markers are hidden."""
@@ -39,13 +40,7 @@ def place_root(problem: MarkerProblem, frames: Index, angles: Array) -> Array:
         return angles
     model = _markers(body, problem, angles)
     own = np.where(problem.chain.slot == 0, 1.0, _OTHERS) * problem.weight[frames]
-    weight = (own / own.sum(axis=1, keepdims=True))[:, :, None]
-    middle, seen = (weight * model).sum(axis=1), (weight * xyz).sum(axis=1)
-    cross = np.swapaxes(weight * (model - middle[:, None]), 1, 2) @ (xyz - seen[:, None])
-    left, _, right = np.linalg.svd(np.swapaxes(cross, 1, 2))
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    rotation = left @ right
-    place = seen - np.einsum("fij,fj->fi", rotation, middle)
+    rotation, place = rigid_fit(model, xyz, own)
     return np.concatenate([place, Rotation.from_matrix(rotation).as_quat(), angles], axis=1)
 
 

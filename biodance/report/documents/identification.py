@@ -134,12 +134,16 @@ def _search(search: LoadSearch) -> dict[str, Any]:
     }
 
 
-def _together(one: Identification) -> dict[str, Any] | None:
-    pair = known_together(one.sip) if one.status == "solved" else None
-    if pair is None:
-        return None
-    low, high = pair.mass - SIGMAS * pair.sd, pair.mass + SIGMAS * pair.sd
-    return {"segments": pair.segments, "mass_kg": pair.mass, "mass_sd_kg": pair.sd, "mass_ci95_kg": (low, high)}
+def _together(one: Identification) -> list[dict[str, Any]]:
+    return [
+        {
+            "segments": several.segments,
+            "mass_kg": several.mass,
+            "mass_sd_kg": several.sd,
+            "mass_ci95_kg": (several.mass - SIGMAS * several.sd, several.mass + SIGMAS * several.sd),
+        }
+        for several in (known_together(one.sip) if one.status == "solved" else ())
+    ]
 
 
 def _difference(row: Difference) -> dict[str, Any]:
@@ -202,7 +206,7 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
 
     CoM in the segment's axes from its proximal joint centre; inertia about the CoM, order xx xy yy xz yz zz; validation
     moments about ``about_m``, the mean centre of pressure. ``added_mass`` null: no load is announced;
-    ``known_together`` the mass of neighbours that is more certain than their own, null if none;
+    ``known_together`` the masses of neighbours that are more certain than their own, surest first;
     ``added_mass_search`` says what was looked for and whether one is "found", there is "none" or one "cannot tell";
     ``joint_torques`` of one trial with what the parameters leave uncertain (not this trial's own skin and plates);
     ``impacts`` the ``pull`` of every quantity from its prior and what is ``left`` of its standard deviation, both in

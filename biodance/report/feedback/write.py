@@ -17,7 +17,7 @@ from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.telling import telling_of
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES
+from biodance.records import SIDES, side_in_name
 from biodance.report.pages.template import three_js
 from biodance.version import __version__
 
@@ -153,7 +153,7 @@ def scene_of(dance: Dance) -> dict[str, Any]:
         "segments": [
             {
                 "name": name,
-                "side": next((side for side in SIDES if name.startswith(side)), ""),
+                "side": side_in_name(name, ""),
                 "vertices": _text(np.asarray(solids[name].vertices).astype("<f4")),
                 "faces": _text(np.asarray(solids[name].faces).astype("<u2")),
             }

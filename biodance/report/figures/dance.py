@@ -9,7 +9,8 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array
+from biodance.pipeline.still import bone_lines
+from biodance.records import Array
 from biodance.report.figures.style import FIGURE_WIDTH, SIDE_COLOURS, figure, look
 
 if TYPE_CHECKING:
@@ -26,54 +27,11 @@ VIEW = np.array([[0.80, -0.60, 0.0], [0.18, 0.24, 0.95]])
 """(2, 3) oblique view from the front, right: lab x, y, z to the page's right and up."""
 
 
-def stick_lines(body: Body, q: Array) -> tuple[Array, tuple[str, ...]]:
-    """Return the line of each bone (P, B, 2, 3) m in postures ``q`` (P, nq), and its side ("right", "left",
-    "middle").
-    """
-    pose = poses(body, q)
-    lines, sides = [], []
-    carrier = body.segment_joint
-    for i, name in enumerate(body.segments):
-        joint = carrier[i]
-        children = [k for k, other in enumerate(body.segments) if k != i and _parent(body, k) == i]
-        ends = [pose.position[:, k] for k in children] or [_tip(body, pose.rotation[:, i], pose.position[:, i], i)]
-        if joint >= 0 and children and name.startswith("trunk"):
-            ends.append(_tip(body, pose.rotation[:, i], pose.position[:, i], i))
-        for end in ends:
-            lines.append(np.stack([pose.position[:, i], end], axis=1))
-            sides.append(next((side for side in SIDES if name.startswith(side)), "middle"))
-    return np.stack(lines, axis=1), tuple(sides)
-
-
-def _parent(body: Body, segment: int) -> int:
-    """Return the segment that carries this one, -1 for the root's."""
-    joint = body.segment_joint[segment]
-    while joint >= 0:
-        joint = body.joints[joint].parent
-        if joint < 0:
-            return 0
-        if body.joints[joint].segment >= 0:
-            return body.joints[joint].segment
-    return -1
-
-
-def _tip(body: Body, rotation: Array, position: Array, segment: int) -> Array:
-    """Return the far end (P, 3) of a segment without children: along its box from the joint, toes for a foot, crown
-    for the trunk.
-    """
-    low, high = body.boxes[segment]
-    reach = np.where(np.abs(high) > np.abs(low), high, low)
-    axis = int(np.argmax(np.abs(reach[:2])))
-    local = np.zeros(3)
-    local[axis] = reach[axis]
-    return np.asarray(rotation @ local + position)
-
-
 def postures_figure(body: Body, q: Array, titles: tuple[str, ...]) -> "Figure":
     """Draw the postures ``q`` (P, nq) in rows of ten, each with its title, all to one scale; right is blue, left red
     and dashed.
     """
-    lines, sides = stick_lines(body, q)
+    lines, sides = bone_lines(body, poses(body, q))
     flat = lines @ VIEW.T
     flat = flat - np.stack([flat[..., 0].mean(axis=(1, 2)), np.zeros(len(flat))], axis=1)[:, None, None]
     low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))

@@ -89,7 +89,7 @@ def _picture(body: Body, planned: Array, played: Array, cop: Array, time: float)
 
         for q, real in ((planned, False), (played, True)):
             lines, sides = bone_lines(body, poses(body, q))
-            for (a, b), side in zip(lines, sides, strict=True):
+            for (a, b), side in zip(lines[0], sides, strict=True):
                 draw.line([at(a), at(b)], fill=_INK[side if real else "planned"], width=4 if real else 7)
         if np.isfinite(cop).all():
             x, y = at(cop)

@@ -7,11 +7,10 @@ import numpy as np
 
 from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.identification.identification import Identification
-from biodance.identification.impact import Impact
 from biodance.identification.knowledge import QUANTITIES, mass_interval
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
-from biodance.identification.torques import TorqueBands
+from biodance.identification.torques import Impact, TorqueBands
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNELS
 from biodance.report.documents.identification import information_share, segment_rows, torques_document

@@ -152,7 +152,7 @@ function tell(now) {
   told = key;
   const shown = cues[now.phase === "move" ? now.cue : coming];
   by("number").textContent = now.phase === "end" ? "The end" : `${cues[now.cue].number} of ${cues.length}`;
-  by("stance").textContent = shown.stance;
+  by("stance").textContent = (now.phase === "hold" && !last ? "next: " : "") + shown.stance;
   by("told").className = now.phase;
   by("now").textContent = { ready: "Get ready", move: "Move now", end: "Thank you", hold: last ? "Stand still" :
     "Stand still. Next:" }[now.phase];

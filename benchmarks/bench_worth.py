@@ -1,0 +1,159 @@
+"""Is the followable dance worth it? Beside the free optimum, random movement and squats of equal time, and the table.
+
+    OMP_NUM_THREADS=1 python benchmarks/bench_worth.py FOLDER [--lab own,foreign] [--bodies small_woman,heavy_man]
+        [--visits 3] [--ways followable,free,random,squats] [--tell]
+
+FOLDER holds the dances of `bench_followable.py` (`small_woman_short.npz`); the free ones are designed into FOLDER/free
+(same feet, no limit on instructions, no price of one). Visit k of a body is another person of its size. ``own``: the
+virtual laboratory of this package, performer "normal"; ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which
+copies our dances (`foreign_dance.py`) and whose own random movement and squats are the rivals. Every way is as long.
+What is removed counts against one table, the mean of what the sessions of all ways say (it is scaled by each session).
+Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_chain import covered, errors, identified, rms
+from bench_dance import BODIES
+from bench_excitation import random_dance, squats
+from bench_people import deviations, truth
+
+from biodance.dance.dance import Dance
+from biodance.dance.design import design
+from biodance.dance.problem.plan import read_plan
+from biodance.lab.session.read import read_session
+from biodance.pipeline.dance import dancer
+from biodance.pipeline.danced import simulate_dance
+from biodance.pipeline.session import examine, identification_of
+from biodance.virtual_lab.movement.dancing import PERFORMERS
+from biodance.virtual_lab.simulate import simulate_session
+
+SECONDS = {"own": 136.0, "foreign": 140.0}
+"""Of every way; the foreign laboratory records trials of 10 s."""
+_SEEDS = {"own": 1100, "foreign": 1101}
+WAYS = ("followable", "free", "random", "squats")
+HEADING = (
+    "| laboratory, sessions | way | mass, kg | removed | share of free | CoM, mm | removed | share of free "
+    "| 95 % intervals hold mass, CoM |\n|" + "---|" * 9
+)
+
+
+def dance_of(folder: Path, name: str, way: str) -> Dance:
+    """Return the dance of a body, from the folder if it is there."""
+    path = folder / f"{name}_short.npz" if way == "followable" else folder / way / f"{name}_short.npz"
+    if not path.exists():
+        subject, plan = BODIES[name][0], replace(read_plan("short"), instructions=np.inf, simplicity=0.0)
+        like = Dance.load(folder / f"{name}_short.npz")
+        dance = random_dance(like, plan, subject) if way == "random" else design(dancer(subject, plan), plan, seed=0)[0]
+        path.parent.mkdir(exist_ok=True)
+        dance.save(path)
+    return Dance.load(path)
+
+
+def own(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[str, Any]:
+    """Return what a session of our virtual laboratory gave."""
+    subject, seconds = BODIES[name][0], SECONDS["own"]
+    if way == "squats":
+        simulate_session(subject, squats(seconds), place, seed=seed)
+    else:
+        dance = dance_of(folder, name, way)
+        performer = replace(PERFORMERS["normal"], pace=seconds / dance.duration)
+        simulate_dance(subject, dance, place, seed=seed, performer=performer)
+    return identified(place)
+
+
+def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[str, Any]:
+    """Return what a session of the foreign laboratory gave."""
+    subject, trials = BODIES[name][0], ["--trials", f"{SECONDS['foreign'] / 10.0:.0f}"]
+    who: dict[str, Any] = {"seed": seed, "sex": subject.sex, "height": subject.stature, "mass": subject.mass}
+    who |= {"noise": 0.6, "camera": 0.3, "out": place}
+    if way in ("random", "squats"):
+        kinds = ["--kinds", "squat"] if way == "squats" else []
+        first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", *trials, *kinds]
+    else:
+        dance_of(folder, name, way)
+        path = folder / (way if way == "free" else "") / f"{name}_short.npz"
+        first = [Path(__file__).with_name("foreign_dance.py"), path, SECONDS["foreign"]]
+    words = [str(text) for key, value in who.items() for text in (f"--{key}", value)]
+    subprocess.run([sys.executable, *map(str, first), *words], check=True, stdout=subprocess.DEVNULL)
+    result = examine(read_session(place))
+    body, sip = result.body, identification_of(result).identification.sip
+    static = next(one.motion for one in result.trials if one.trial.role == "static")
+    assert body is not None
+    assert static is not None
+    mass, com, _ = truth(body, static, json.loads(place.with_name(f"{place.name}.truth.json").read_text())["segments"])
+    sd = deviations(sip)
+    return {
+        "true": {"mass": mass[:, None], "com": com},
+        "table": {"mass": body.sip.mass[:, None], "com": body.sip.com},
+        "identified": {"mass": sip.mass[:, None], "com": sip.com},
+        "sd": {"mass": sd[:, :1], "com": sd[:, 1:]},
+    }
+
+
+def row(folder: Path, lab: str, name: str, way: str, visit: int, *, tell: bool) -> dict[str, Any] | None:
+    """Return what a session gave, from the folder if it is there."""
+    kept = folder / "worth" / f"{lab}_{name}_{way}_{visit}.json"
+    if not kept.exists():
+        if tell:
+            return None
+        with tempfile.TemporaryDirectory() as scratch:
+            write = own if lab == "own" else foreign
+            seed = _SEEDS[lab] + 20 * visit + 3 * list(BODIES).index(name)
+            found = write(folder, name, way, seed, Path(scratch) / "session")
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_text(json.dumps(found, default=np.ndarray.tolist), encoding="utf-8")
+    return dict(json.loads(kept.read_text(encoding="utf-8")))
+
+
+def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
+    """Return the table over ``sessions``, each with the row of every way: root mean squares over all segments."""
+    pairs = {way: [errors(one[way], "identified") for one in sessions] for way in sessions[0]}
+    tables = [errors(one[way], "table") for one in sessions for way in one]
+    table = [rms(pair[k] for pair in tables) for k in (0, 1)]
+    off = {way: [rms(pair[k] for pair in mine) for k in (0, 1)] for way, mine in pairs.items()}
+    out = [f"| {lab}, {len(sessions)} | table | {table[0]:.3f} | | | {1000 * table[1]:.1f} | | | |"]
+    for way, both in off.items():
+        cells = []
+        for k, (factor, digits) in enumerate(((1.0, 3), (1000.0, 1))):
+            removed = table[k] - both[k]
+            share = f"{100 * removed / (table[k] - off['free'][k]):.0f} %" if "free" in off else ""
+            cells += [f"{factor * both[k]:.{digits}f}", f"{factor * removed:.{digits}f}", share]
+        held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
+        out.append(f"| | {way} | {' | '.join(cells)} | {', '.join(f'{share:.0f} %' for share in held)} |")
+    return out
+
+
+def main() -> None:
+    """Run session by session and print the tables over those that all ways have."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--lab", default="own,foreign")
+    parser.add_argument("--bodies", default="small_woman,heavy_man,reference")
+    parser.add_argument("--visits", type=int, default=3)
+    parser.add_argument("--ways", default=",".join(WAYS))
+    parser.add_argument("--tell", action="store_true")
+    chosen = parser.parse_args()
+    print(HEADING)
+    for lab in chosen.lab.split(","):
+        sessions: list[dict[str, dict[str, Any]]] = []
+        for visit in range(chosen.visits):
+            for name in chosen.bodies.split(","):
+                rows = {w: row(chosen.folder, lab, name, w, visit, tell=chosen.tell) for w in chosen.ways.split(",")}
+                if all(rows.values()):
+                    sessions.append({way: one for way, one in rows.items() if one})
+        if sessions:
+            print("\n".join(lines(lab, sessions)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
