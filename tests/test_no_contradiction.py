@@ -147,6 +147,16 @@ def test_another_weight_is_said_once_and_a_slip_in_session_toml_is() -> None:
     assert any(one.text.startswith("[trials.wlak] fits no recording") for one in said)
 
 
+def test_standing_still_has_no_correlation_on_the_terminal() -> None:
+    screen = StringIO()
+    moved = next(one for one in FULL.trials if one.comparison is not None)
+    still = replace(moved, trial=replace(moved.trial, role="static"))
+    print_session(replace(FULL, trials=(still, moved)), (), Console(file=screen, width=200))
+    rows = [line.split() for line in screen.getvalue().splitlines() if line.startswith(moved.trial.name)]
+    assert rows[0][-1] == "–"
+    assert float(rows[1][-1].replace("−", "-")) <= 1
+
+
 @pytest.mark.parametrize(("verdict", "code"), [(WHOLE, DONE), (VERDICTS[1], NEEDS_A_PERSON), (None, DONE)])
 def test_report_asks_for_a_person_whenever_its_diagnosis_does(verdict: Diagnosis | None, code: int, tmp_path) -> None:
     trial = replace(FULL.trials[0], fit=None, comparison=None, standing=None, checks=())
