@@ -48,6 +48,25 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
         assert by_load.share == pytest.approx(1.0, abs=0.35)
 
 
+def test_a_zero_that_the_reader_took_off_in_one_trial_is_the_zero_of_the_others() -> None:
+    """Two of four trials saw the plate empty: the reader took the 25 N off there, and nowhere else."""
+    some = looks(
+        1, trials=4, hidden=about_plate(lambda local, session: zero(local, session) if session[0] < 0.4 else local)
+    )
+    plates = [look.trial.plates[0] for look in some]
+    tared = tuple(
+        replace(look, trial=replace(look.trial, plates=(replace(plate, zero=np.array([25.0, 0, 0]) * (k > 1)),)))
+        for k, (look, plate) in enumerate(zip(some, plates, strict=True))
+    )
+    untold, told = (
+        diagnose_trials(body(), those, tolerances=known(), effects=("plate_offset",)) for those in (some, tared)
+    )
+    assert not untold.diagnosis.findings
+    (found,) = told.diagnosis.findings
+    assert (found.effect, found.target) == ZERO
+    assert found.parameters[0].value == pytest.approx(25.0, abs=1.0)
+
+
 def test_what_is_only_resembled_must_move_something_that_matters() -> None:
     some = looks(1, trials=1, hidden=about_plate(zero))
     found = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).naming.found

@@ -53,8 +53,15 @@ def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed()
     assert as_strange(usual).log_likelihood == pytest.approx(usual.log_likelihood)
 
 
-@pytest.mark.parametrize(("name", "score", "stands"), [("plate_drift", 31.0, True), ("plate_drift", 29.0, False),
-                                                       ("trunk_joint", 1e4, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "score", "stands"),
+    [
+        ("plate_drift", 31.0, True),
+        ("plate_drift", 29.0, False),
+        ("trunk_joint", 1e4, False),
+        ("plate_crosstalk", 1e4, False),
+    ],
+)
 def test_a_joint_that_the_model_lacks_is_no_excuse_for_a_strange_body(name: str, score: float, stands: bool) -> None:
     effect = replace(family[name], target="Fx")
     touch = NamedCause(effect, np.ones(1), np.eye(1), {"t0": np.ones(3)})

@@ -2,6 +2,8 @@
 report follows the sign.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_effects import CASES
@@ -61,6 +63,15 @@ def test_crosstalk_goes_from_the_first_channel_into_the_second() -> None:
 
 def test_drift_is_negative_at_the_start_and_positive_at_the_end() -> None:
     assert_close(added("plate_drift", "Fz", 3.0), alone("Fz", 3.0 * (TIME - 0.5)))
+
+
+@pytest.mark.parametrize("name", ["plate_offset", "plate_drift"])
+def test_a_trial_that_saw_the_plate_empty_keeps_neither_its_zero_nor_its_drift(name: str) -> None:
+    (plate,) = CASE.trial.plates
+    seen = replace(plate, zero=np.array([0.4, -1.2, 3.0]))
+    tared = replace(CASE, trial=replace(CASE.trial, plates=(seen,)))
+    assert np.abs(effect(name).at("Fy", CASE).columns(CASE)).max() > 0
+    assert not effect(name).at("Fy", CASE).columns(tared).any()
 
 
 def test_a_body_mass_declared_too_small_is_positive() -> None:

@@ -27,15 +27,15 @@ def as_strange(found: Model) -> Model:
 def firm(found: Model, accepted: tuple[Round, ...]) -> set[tuple[str, str]]:
     """Return effect and target of the named causes whose evidence overwhelms (`OVERWHELMING`) beside a body that is as
     strange as it was found; of one that comes and goes, whose course takes part in the belief, that of its round. None
-    in a single trial, which cannot show that a size is the same in another one, and no joint that the model lacks
-    (`Effect.shown`), which makes a body strange by itself.
+    in a single trial, which cannot show that a size is the same in another one; no joint that the model lacks
+    (`Effect.shown`), which makes a body strange by itself; none that is believed only alone (`Effect.single`).
     """
     if len(found.problem.cases) == 1:
         return set()
     sure = OVERWHELMING * found.tolerances.threshold
-    lacking = {named_of(one) for one in found.named if type(one.effect).shown is not Effect.shown}
+    never = {named_of(n) for n in found.named if n.effect.single or type(n.effect).shown is not Effect.shown}
     if any(one.course for one in found.named):
         strong = {named_of(one) for one, by in zip(found.named, accepted, strict=True) if by.suspects[0].score >= sure}
-        return strong - lacking
+        return strong - never
     stern = replace(as_strange(found), tolerances=replace(found.tolerances, threshold=sure))
-    return {named_of(one) for one in held(stern, accepted)[0].named} - lacking
+    return {named_of(one) for one in held(stern, accepted)[0].named} - never

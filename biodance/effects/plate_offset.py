@@ -21,8 +21,8 @@ class PlateOffset(ChannelEffect):
     advice = "Record the empty plate before and after, and re-zero it."
 
     def in_channel(self, case: Case) -> Array:
-        """Return one."""
-        return np.ones(case.motion.time.size)
+        """Return one; zero in a trial that saw the plate empty: there its reading was taken off."""
+        return np.full(case.motion.time.size, 0.0 if self.plate_of(case).zero.any() else 1.0)
 
 
 EFFECT = PlateOffset
