@@ -4,6 +4,7 @@ The two folders lie at the top of a checkout and inside the package in an instal
 knows that.
 """
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 
 PACKAGE = Path(__file__).resolve().parent
+_COMMA = re.compile(r"=\s*[-+]?\d+,\d")
+"""A number with a decimal comma."""
 
 
 def folder(name: str) -> Path:
@@ -67,7 +70,14 @@ def read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise FileRefused(f"{path}: is no text in UTF-8, so not valid TOML. Save it as UTF-8.") from error
     except tomllib.TOMLDecodeError as error:
-        raise FileRefused(f"{path}: is not valid TOML: {error}. Correct that line.") from error
+        advice = "Write decimals with a point: 60.3." if _COMMA.search(_line(path, error)) else "Correct that line."
+        raise FileRefused(f"{path}: is not valid TOML: {error}. {advice}") from error
+
+
+def _line(path: Path, error: tomllib.TOMLDecodeError) -> str:
+    """Return the line of a file that is no TOML; "" where the error names none (its attributes are of Python 3.14)."""
+    place = re.search(r"line (\d+)", str(error))
+    return path.read_text(encoding="utf-8-sig").splitlines()[int(place[1]) - 1] if place else ""
 
 
 def refuse_special(path: Path) -> None:

@@ -80,6 +80,8 @@ def test_several_plates_of_different_types_add_up():
     raw = raw_file(plates, [channels(p, t) for p, t in zip(plates, truths, strict=True)])
     read, warnings = read_plates(raw, metres=0.001)
     assert [said[:29] for said in warnings] == ["Two signs in one laboratory: "]
+    assert "plate 2 holds the force" in warnings[0]
+    assert "plates 1, 3 hold the force" in warnings[0]
     assert [p.name for p in read] == ["plate1", "plate2", "plate3"]
     assert largest_error(read, sum(truths)) < 1e-6
 

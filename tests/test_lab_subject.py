@@ -146,7 +146,8 @@ def test_entry_that_fits_no_recording_is_said(folder):
         ('[trials.a]\nrole = "statik"\n', "Legal are static, fit, validate, check, skip"),
         ('[trials.a]\nroll = "static"\n', r"\[trials.a\] has the unknown key 'roll'. Did you mean 'role'"),
         ("[person]\nage = 3\n", "the top level has the unknown key 'person'"),
-        ("[subject\n", "is not valid TOML"),
+        ("[subject\n", "is not valid TOML: .* Correct that line"),
+        ("[subject]\nmass_kg = 60,3\n", "Write decimals with a point: 60.3"),
     ],
 )
 def test_mistake_in_session_toml_is_a_sentence(tmp_path, text, sentence):

@@ -17,8 +17,9 @@ from biodance.cli.session import print_reported
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import STRANGE, UNASKED
-from biodance.pipeline.attention import told
+from biodance.pipeline.attention import headline, session_attention, told
 from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.looked_at import TOO_SHORT
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Judged
@@ -107,6 +108,53 @@ def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> N
         first = told(one, replace(FULL, checks=()), (STATIC,)).attention[0]
         assert (first.level, first.text[: len(begins)]) == (level, begins)
         assert "It resembles plate gain Fz (gain 6 ± 0.2 %), which is not enough." in first.text
+
+
+@pytest.mark.parametrize(
+    ("verdict", "judged", "then"),
+    [
+        (replace(WHOLE, verdict="unexplained"), (MISSED,), "mend what stands below"),
+        (replace(WHOLE, verdict="unexplained"), (STATIC, replace(MISSED, why_not=TOO_SHORT)), "record some seconds"),
+        (VERDICTS[5], (STATIC,), "compare with another session of the same person"),
+        (replace(VERDICTS[3], adequacy=(replace(LEFT[0], z=1.0),), notes=(STRANGE,)), (STATIC,), "compare with anoth"),
+    ],
+)
+def test_who_cannot_tell_says_what_to_do_next(verdict: Diagnosis, judged: tuple[Judged, ...], then: str) -> None:
+    first = told(verdict, replace(FULL, checks=()), judged).attention[0].text
+    assert first.startswith("Cannot tell")
+    assert f"To know it, {then}" in first
+
+
+def test_checks_of_one_limit_are_said_together_and_a_refused_file_without_its_path() -> None:
+    name = "force difference, worst axis"
+    checks = [Check(name, f"walk_{k}", f"{k} % of weight", "at most 5 % of weight", False, "") for k in (6, 7)]
+    refused = Judged("b.asc", 0.0, "/home/lab/b.asc: does not say columns. Write it.", missed=True)
+    first = headline(WHOLE, "3 s", (STATIC, refused), tuple(checks))
+    assert f"{name} (walk_6 6 % of weight, walk_7 7 % of weight; should be at most 5 % of weight)" in first.text
+    assert "because: does not say columns" in first.text
+    assert "/home" not in first.text
+
+
+def test_another_weight_is_said_once_and_a_slip_in_session_toml_is() -> None:
+    mass = Check("mass on the plates against declared", "static", "2.9 %", "at most 2 %", False, "Weigh again.")
+    trial = replace(FULL.trials[0], checks=(mass,), fit=None, comparison=None, standing=None)
+    weighed = "The plates carry 72.2 kg in quiet standing, 70.2 kg are declared: check the mass."
+    trial = replace(trial, trial=replace(trial.trial, warnings=(weighed,)))
+    session = replace(FULL.session, notes=("Warning: [trials.wlak] fits no recording of the session.",))
+    result = replace(FULL, session=session, trials=(trial,), checks=(), standing=None, still=None)
+    said = session_attention(result)
+    assert sum("declared" in one.text + one.about for one in said) == 1
+    assert any(one.text.startswith("[trials.wlak] fits no recording") for one in said)
+
+
+def test_standing_still_has_no_correlation_on_the_terminal() -> None:
+    screen = StringIO()
+    moved = next(one for one in FULL.trials if one.comparison is not None)
+    still = replace(moved, trial=replace(moved.trial, role="static"))
+    print_session(replace(FULL, trials=(still, moved)), (), Console(file=screen, width=200))
+    rows = [line.split() for line in screen.getvalue().splitlines() if line.startswith(moved.trial.name)]
+    assert rows[0][-1] == "–"
+    assert float(rows[1][-1].replace("−", "-")) <= 1
 
 
 @pytest.mark.parametrize(("verdict", "code"), [(WHOLE, DONE), (VERDICTS[1], NEEDS_A_PERSON), (None, DONE)])

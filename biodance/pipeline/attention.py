@@ -15,7 +15,7 @@ from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or
 from biodance.pipeline.looked_at import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
-from biodance.records.attention import Attention, Judged, Level, strongest_first, without_path
+from biodance.records.attention import WARNING, Attention, Judged, Level, strongest_first, without_path
 
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
@@ -25,6 +25,17 @@ _EMPTY = "empty_plate"
 """The witness that sees plates with nobody on them."""
 _WEIGHED = "kg are declared: check the mass"
 """What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
+_MOVE = " To know it, record some seconds of movement with both feet on the plates: a few squats, for example."
+_MEND = " To know it, mend what stands below, and run this again."
+_COMPARE = (
+    " To know it, compare with another session of the same person (--reference), or teach what is usual in this "
+    "laboratory (biodance learn, then --lab)."
+)
+"""What to do next where nothing can be told: movement is missing, something is doubtful, or what is usual is not known
+well enough.
+"""
+_WEIGHT = "mass on the plates"
+"""Beginning of the name of the check of the weight."""
 _ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
 
 
@@ -94,6 +105,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         )  # fmt: skip
     elif one.doubt.startswith(_FITS):
         level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
+        text += _MOVE if one.doubt.endswith(_ONLY_STOOD) else _MEND
     elif not (one.adequacy and rests_on):
         partly = any(TOO_SHORT in row.why_not for row in judged) or any(
             check.what.startswith(_FORCES) for check in outside
@@ -101,12 +113,13 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         whole = f" for {SHORTEST_RUN:g} s without a break" if partly else ""
         level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
         text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
+        text += _MOVE if where else _MEND
     elif one.doubt:
         level = "warn"
-        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}, but {one.doubt}{beside}."
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}; but {one.doubt}{beside}.{_COMPARE}"
     elif _only_strange(one):
         level = "warn"
-        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}{beside}.{like}"
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}{beside}.{like}{_COMPARE}"
     else:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}{like}"
     return Attention(level, text.strip(), about=ABOUT)
@@ -121,7 +134,7 @@ def _checks(one: Diagnosis) -> str:
 
 def _doubtful(doubts: Sequence[str]) -> str:
     """Return what is doubtful of a body, without advice."""
-    return listed([_short(text.removeprefix("Warning: ").partition(": check")[0]) for text in doubts])
+    return listed([_short(text.removeprefix(WARNING).partition(": check")[0]) for text in doubts])
 
 
 def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
@@ -135,12 +148,16 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]
-    found += [Attention("warn", text.removeprefix("Warning: "), "", "body") for text in result.doubts]
+    found += [Attention("warn", text.removeprefix(WARNING), "", "session.toml") for text in result.slips]
+    found += [Attention("warn", text.removeprefix(WARNING), "", "body") for text in result.doubts]
+    weighed = False
     for trial in result.trials:
         level: Level = "fail" if trial.status == "refused" else "warn"
-        said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of("mass on the plates", findings))]
+        said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of(_WEIGHT, findings))]
+        weighed |= any(_WEIGHED in text for text in said)
         found += [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
-    found += [_checked(check, findings) for check in result.all_checks if not check.inside]
+    outside = [check for check in result.all_checks if not check.inside]
+    found += [_checked(check, findings) for check in outside if not (weighed and check.what.startswith(_WEIGHT))]
     return strongest_first([*found, *_load(result, findings)])
 
 
@@ -171,7 +188,8 @@ def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     stepped_only = [row.trial for row in judged if row.missed and row.seconds > 0]
     for row in judged:
         if row.missed and not row.seconds > 0:
-            missed.setdefault(_short(row.why_not).removeprefix(f"Trial {row.trial}: "), []).append(row.trial)
+            why = without_path(_short(row.why_not), row.trial).removeprefix(f"Trial {row.trial}: ")
+            missed.setdefault(why, []).append(row.trial)
     parts = [f"; not judged: {listed(names)}, because: {why}" for why, names in missed.items()]
     parts += [f"; judged only by steps on plates: {listed(stepped_only)}"] if stepped_only else []
     return "".join(parts) + (f"; outside the limit: {_named_checks(outside)}" if outside else "")
@@ -183,7 +201,11 @@ def _explained(checks: tuple[Check, ...]) -> str:
 
 
 def _named_checks(checks: tuple[Check, ...]) -> str:
-    return listed([f"{one.what}, {one.where} ({one.value}, should be {one.limit})" for one in checks])
+    """Return the checks in words, each once with its limit and the trials that it was held against."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for one in checks:
+        alike.setdefault((one.what, one.limit), []).append(f"{one.where} {one.value}")
+    return listed([f"{what} ({listed(said)}; should be {limit})" for (what, limit), said in alike.items()])
 
 
 def _short(reason: str) -> str:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 _FAR = "its markers move more on the body than where tolerances were learned"
 """Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
-_MORE_JOINTS = "its body moves at joints ({}) that the tolerances were not learned with"
+_MORE_JOINTS = "the body moves at joints ({}) for which nobody has learned yet what is usual"
 """Why what is left of a body with optional joints may be theirs."""
 _FEWER_JOINTS = "no marker shows what moves at {}, and the plates measure it all the same"
 """Why what is left of a part of a body may be the forces of the other part."""

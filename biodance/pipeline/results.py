@@ -16,6 +16,7 @@ from biodance.body.body import Body
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import Check, QuietStanding, ShownJoints, Step, TrialResult
 from biodance.records import Array, Session, Sip, Subject, by_name
+from biodance.records.attention import WARNING
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
@@ -176,6 +177,11 @@ class SessionResult:
         return tuple(note for note in (self.body.notes if self.body else ()) if note.startswith("Warning"))
 
     @property
+    def slips(self) -> tuple[str, ...]:
+        """What the session's notes warn about: lines of session.toml that fit no recording."""
+        return tuple(note for note in self.session.notes if note.startswith(WARNING))
+
+    @property
     def failures(self) -> Mapping[str, str]:
         """What identification could not compute, each with cause and cure."""
         return self.identification.failures if self.identification else {}
@@ -189,7 +195,9 @@ class SessionResult:
             or any(t.status != "ok" for t in self.trials)
         )
         return (
-            trouble or bool(self.session.refused or self.doubts) or any(not check.inside for check in self.all_checks)
+            trouble
+            or bool(self.session.refused or self.doubts or self.slips)
+            or any(not check.inside for check in self.all_checks)
         )
 
 

@@ -8,6 +8,10 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 
 
+WARNING = "Warning: "
+"""Beginning of a note that needs a person."""
+
+
 @dataclass(frozen=True)
 class Attention:
     """One plain sentence that needs a person: its ``level``, the ``trial`` ("" for the session) and what it is

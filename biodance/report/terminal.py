@@ -107,7 +107,12 @@ def print_session(result: SessionResult, attention: Sequence[dict[str, Any]], co
         rms = f"{millimetres(trial.fit.total_rms)} mm" if trial.fit else "–"
         c = trial.comparison
         wrench = (
-            (str(int(c.used.sum())), f"{format_number(float(c.rms[2]))} N", format_number(float(c.correlation[2]), 3))
+            (
+                str(int(c.used.sum())),
+                f"{format_number(float(c.rms[2]))} N",
+                # who stands still presses evenly: there is nothing to correlate but noise
+                "–" if trial.trial.role == "static" else format_number(float(c.correlation[2]), 3),
+            )
             if c
             else ("–", "–", "–")
         )

@@ -189,8 +189,8 @@ def _contradictions(given: Mapping[str, float], width: float, place: Mapping[str
             (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), marker_leg(place, side), LEG_TOLERANCE)
         )
     return [
-        f"Warning: {name} was typed as {1e3 * typed:.0f} mm but the markers are {1e3 * seen:.0f} mm apart; measure "
-        f"again or check them."
+        f"Warning: {name} was typed as {1e3 * typed:.0f} mm, the markers are {1e3 * seen:.0f} mm apart: check "
+        f"both, measure again."
         for name, typed, seen, tolerance in checks
         if typed is not None and abs(typed - seen) > tolerance
     ]

@@ -111,10 +111,13 @@ def _two_signs(readings: list[PlateReading], votes: list[float]) -> tuple[str, .
     by = {sign: [str(r.plate.number) for r, v in zip(readings, votes, strict=True) if v == sign] for sign in (1, -1)}
     if not (by[1] and by[-1]):
         return ()
+    up, down = (
+        f"plate{'s' * (len(by[sign]) > 1)} {', '.join(by[sign])} hold{'s' * (len(by[sign]) == 1)}" for sign in (1, -1)
+    )
     return (
-        f"Two signs in one laboratory: along the same direction plate {', '.join(by[1])} holds the force up and plate "
-        f"{', '.join(by[-1])} the force down; each was turned so that weight points up, its shear with it. If only Fz "
-        f"of one plate has the wrong sign, its shear is now wrong: check cabling and software.",
+        f"Two signs in one laboratory: along the same direction {up} the force up and {down} the force down; each was "
+        f"turned so that weight points up, its shear with it. If only Fz of one plate has the wrong sign, its shear is "
+        f"now wrong: check cabling and software.",
     )
 
 

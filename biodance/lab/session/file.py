@@ -44,6 +44,7 @@ from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.shape import legal_girths, traced_outline, typed_outline
 from biodance.library import read_toml
 from biodance.records import FootSizes, Role
+from biodance.records.attention import WARNING
 from biodance.settings import USUAL, Settings
 
 FILES = ("subject.toml", "session.toml")
@@ -143,7 +144,7 @@ class SessionFile:
             if not any(fnmatchcase(name.lower(), key.lower()) for name in names):
                 close = get_close_matches(key, names, n=1)
                 hint = f" Did you mean {close[0]!r}?" if close else ""
-                said.append(f"[trials.{key}] fits no recording of the session.{hint}")
+                said.append(f"{WARNING}[trials.{key}] fits no recording of the session.{hint}")
         return said
 
 

@@ -25,7 +25,8 @@ from biodance.lab.session.recordings import (
     role_by_name,
     vicon_notes,
 )
-from biodance.lab.session.subject import declared_mass, declared_stature, identify_subject
+from biodance.lab.session.strangers import PEOPLE, each_once, of_one_person
+from biodance.lab.session.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
@@ -149,7 +150,9 @@ def read_session(
     if not trials:
         raise SessionRefused(_nothing_left(folder, refused, readers))
     _refuse_several_people(folder, trials)
-    trials = _settle_static(trials, file_says, reasons, notes)
+    trials = _settle_static(each_once(trials, notes), file_says, reasons, notes)
+    trials, strangers = of_one_person(trials, file_says.subject)
+    refused |= strangers
     if marker_set is None:
         trials, guessed = dress(trials)
         notes += guessed
@@ -176,7 +179,7 @@ def session_folder(folder: str | Path) -> Path:
 
 def _refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:
     """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people."""
-    for said, of, unit, alike in ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m", 1.04)):
+    for said, of, unit, alike in PEOPLE:
         parts: dict[Path, list[float]] = {}
         for trial in trials:
             if math.isfinite(value := said(trial.measurements)):
