@@ -64,9 +64,11 @@ def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
     return np.asarray(idct(value, axis=0, norm="ortho"))
 
 
-def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench) -> tuple[Look, ...]:
-    """Return trials of a person whose parameters differ from the table by its own standard deviations; ``hidden``
-    changes the wrench.
+def looks(
+    seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench, unlike: float = 0.7
+) -> tuple[Look, ...]:
+    """Return trials of a person whose parameters differ from the table by ``unlike`` of its own standard deviations;
+    ``hidden`` changes the wrench.
     """
     from biodance.identification.posterior import prior_factor
     from biodance.uncertainty.caution import widened
@@ -74,7 +76,7 @@ def looks(seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wre
     rng = np.random.default_rng(1000 + seed)
     prior = widened(body().sip)
     factor = prior_factor(prior)
-    phi = prior.phi + 0.7 * factor @ rng.normal(size=factor.shape[1])
+    phi = prior.phi + unlike * factor @ rng.normal(size=factor.shape[1])
     found = []
     for k in range(trials):
         moving = motion(10 * seed + k)

@@ -114,15 +114,12 @@ def bases_of(causes: Sequence[Candidate]) -> tuple[Array, tuple[slice, ...]]:
 
 def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]:
     """Return what the silent parameters change at the typical size of the others: first differences, then second."""
-    loud = np.where(silent, 0.0, effect.typical)
-    middle = changes(problem, effect, loud)
-    first, second = [], []
-    for k in np.flatnonzero(silent):
-        step = effect.typical * (np.arange(len(silent)) == k)
-        up, down = changes(problem, effect, loud + step), changes(problem, effect, loud - step)
-        first.append(0.5 * (up - down))
-        second.append(0.5 * (up + down) - middle)
-    return first + [bend for bend in second if np.linalg.norm(bend) > _NOTHING * np.linalg.norm(middle)]
+    middle, steps = np.where(silent, 0.0, effect.typical)[:, None], np.diag(effect.typical)[:, silent]
+    rows = _in_rows(problem, effect, np.hstack([middle, middle + steps, middle - steps]), effect.added)
+    here, up, down = np.split(rows, [1, 1 + steps.shape[1]], axis=1)
+    first, second = 0.5 * (up - down), 0.5 * (up + down) - here
+    bent = np.linalg.norm(second, axis=0) > _NOTHING * np.linalg.norm(here)
+    return [*first.T, *second[:, bent].T]
 
 
 def local_basis(problem: Problem, effect: Effect) -> ByTrial | None:

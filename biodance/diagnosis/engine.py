@@ -31,6 +31,7 @@ from biodance.diagnosis.observability import detection_limits, hidden, visibilit
 from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.plate_axes import in_plate_axes
 from biodance.diagnosis.problem import Look, Problem, problem
+from biodance.diagnosis.strange import firm
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
@@ -164,6 +165,10 @@ def judged(examined: Examined) -> Examined:
     strange = _strange(naming.found, named=bool(large))
     told = verdict(len(large), alarming(left), one.gates, strained=bool(strange))
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
+    if told == "unexplained" and strange == (STRANGE,) and alarming(left) <= LIMIT and len(doubted) < len(large):
+        stand = firm(naming.found, naming.accepted)
+        doubted = [pair for pair in large if pair in doubted or named_of(pair[0]) not in stand]
+        told = "named, incomplete" if len(doubted) < len(large) else told
     trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
     several = any(_one_of_several(cause, named) for cause, _ in large)
     if doubted and told != "unexplained":

@@ -37,6 +37,7 @@ from biodance.motion.ik.joint_unknowns import (
     own_turn,
     own_unknowns,
 )
+from biodance.motion.ik.knee_markers import knees_elsewhere
 from biodance.motion.kinematics import chains
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
@@ -175,6 +176,7 @@ def _told(
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
+    notes += knees_elsewhere(scaling.centres, found.theta, found.information, shown, known=(*wrong, *spared))
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
     return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))

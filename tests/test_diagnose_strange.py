@@ -1,0 +1,63 @@
+"""Names beside a body that is more unlike the table than people are."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, known, looks
+from scipy.interpolate import make_interp_spline
+
+from biodance.diagnosis.adequacy import STRAINED, strain
+from biodance.diagnosis.engine import STRANGE, diagnose_trials
+from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.naming import Round
+from biodance.diagnosis.screening import ScoredCandidate
+from biodance.diagnosis.strange import as_strange, firm
+from biodance.effects import effects
+
+family = effects()
+CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
+
+
+def late(wrench, session, moving):
+    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
+
+
+def diagnosed(hidden, *, unlike: float, trials: int = 4):
+    some = looks(1, hidden=hidden, unlike=unlike, trials=trials)
+    return diagnose_trials(body(), some, tolerances=known(), effects=CAUSES)
+
+
+def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_is_not() -> None:
+    strange = diagnosed(late, unlike=4.0)
+    assert strain(strange.naming.found) > STRAINED
+    assert strange.diagnosis.verdict == "named, incomplete"
+    assert STRANGE in strange.diagnosis.notes
+    (finding,) = strange.diagnosis.findings
+    (size,) = finding.parameters
+    assert finding.effect == "time_delay"
+    assert size.interval[0] < 0.02 < size.interval[1]
+    alone = diagnosed(late, unlike=6.0, trials=1)
+    assert strain(alone.naming.found) > STRAINED
+    assert not alone.diagnosis.findings, "one trial does not show that the delay is the same in another one"
+    clean = diagnosed(lambda wrench, session, moving: wrench, unlike=4.0).diagnosis
+    assert clean.verdict == "unexplained"
+    assert not clean.findings
+
+
+def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed() -> None:
+    wide, usual = (diagnosed(lambda w, s, m: w, unlike=size).naming.bare for size in (4.0, 0.7))
+    assert strain(wide) > STRAINED > abs(strain(as_strange(wide)))
+    np.testing.assert_array_equal(as_strange(usual).belief.X, usual.belief.X)
+    assert as_strange(usual).log_likelihood == pytest.approx(usual.log_likelihood)
+
+
+@pytest.mark.parametrize(("name", "score", "stands"), [("plate_drift", 31.0, True), ("plate_drift", 29.0, False),
+                                                       ("trunk_joint", 1e4, False)])  # fmt: skip
+def test_a_joint_that_the_model_lacks_is_no_excuse_for_a_strange_body(name: str, score: float, stands: bool) -> None:
+    effect = replace(family[name], target="Fx")
+    touch = NamedCause(effect, np.ones(1), np.eye(1), {"t0": np.ones(3)})
+    by = Round((ScoredCandidate(effect, score, score, np.zeros(0), 1.0),))
+    found = SimpleNamespace(problem=SimpleNamespace(cases=(1, 2)), tolerances=known(), named=(touch,))
+    assert firm(found, (by,)) == ({(name, "Fx")} if stands else set())

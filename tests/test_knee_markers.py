@@ -1,0 +1,44 @@
+"""A knee that bends elsewhere than it was marked is told, one that was marked as people are is not."""
+
+import re
+
+import numpy as np
+import pytest
+from test_motion_functional_joints import displaced, hidden, moving, scaling
+
+from biodance.motion.ik.functional_joints import functional_joints
+from biodance.motion.ik.joint_unknowns import SIZE, JointUnknowns, own_centre, own_turn
+from biodance.records import Array
+
+
+def knees(theta: Array) -> list[str]:
+    """Return what is said of knees beside which the markers were put, ``theta`` (37,) where the joints are."""
+    found = functional_joints(scaling(), [moving(displaced(theta))])
+    return [note for note in found.notes if "lateral marker" in note]
+
+
+def elsewhere(ahead: float, turned: float) -> Array:
+    """Return a left knee whose axis passes ``ahead`` m before its lateral marker (lab x, the person faces x), turned
+    about the bone by ``turned`` rad in the lateral marker.
+    """
+    theta, centres = np.zeros(SIZE), scaling().centres
+    theta[own_turn("left_knee")] = turned
+    arm = centres.place["left_knee"] - centres.lateral["left_knee"]
+    bone = JointUnknowns(centres).bone("left_knee")
+    theta[own_centre("left_knee")] = turned * np.cross(bone, arm) + [ahead, 0.0, 0.0]
+    return theta
+
+
+def test_knees_where_they_were_marked_are_not_mentioned() -> None:
+    assert knees(hidden()) == []
+    assert knees(elsewhere(0.008, 0.1)) == []
+
+
+@pytest.mark.parametrize(("ahead", "turned"), [(-0.04, 0.0), (0.04, 0.0), (0.0, 0.9)])
+def test_a_knee_that_bends_elsewhere_is_a_warning(ahead: float, turned: float) -> None:
+    (said,) = knees(elsewhere(ahead, turned))
+    assert said.startswith("Warning: the left knee bends about an axis ")
+    millimetres, way, degrees = re.search(r"axis (\d+) mm (\w+) its lateral marker and (\d+) degrees", said).groups()
+    for found, true in ((int(millimetres), 1e3 * abs(ahead)), (int(degrees), np.degrees(abs(turned)))):
+        assert 0.7 * true - 9 < found < true + 9  # the placing leaves a part where the markers are
+    assert not ahead or way == ("before" if ahead > 0 else "behind")
