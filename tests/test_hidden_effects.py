@@ -154,14 +154,16 @@ def test_real_standing_is_not_accused_of_a_plate_fault(
 def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
     name: str, text: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Standing shows nothing but weights: a wrong mass, a gain or an offset, all with their right size, and it cannot
-    tell which of them.
+    """Standing shows nothing but weights: a wrong mass, a load, a gain or an offset, all with their right size, and it
+    cannot tell which of them.
     """
     diagnosis = found(standing(data, tmp_path / "faulty", name, text), monkeypatch, without=("labels_swapped",))
     assert diagnosis.verdict == "named, incomplete"
     (finding,) = diagnosis.findings
     names = {one.effect for one in finding.set}
-    assert {"body_mass", "plate_gain"} <= names <= {"body_mass", "plate_gain", "plate_offset"}
+    assert (
+        {"body_mass", "added_mass", "plate_gain"} <= names <= {"body_mass", "added_mass", "plate_gain", "plate_offset"}
+    )
     static = read_session(data / "biomechzoo" / name)
     weight = {"plate_gain": 0.08 * static.subject.mass, "plate_offset": 30 / 9.81}[text.partition(":")[0]]
     size = {"body_mass": weight, "plate_gain": weight / static.subject.mass, "plate_offset": 9.81 * weight}

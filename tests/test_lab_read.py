@@ -11,6 +11,7 @@ from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.read import read_session
+from biodance.records import Source
 
 
 @pytest.fixture
@@ -71,7 +72,9 @@ def test_a_reader_may_be_given_as_an_object(folder):
         EXTENSIONS=(".stick",),
         PREFERENCE=5,
         sniff=lambda head: head.startswith(b"STICK"),
-        read=lambda path, *, role, subject: replace(read_trial(folder / "static01.trc", role=role), name=path.stem),
+        read=lambda path, *, role, subject: replace(
+            read_trial(folder / "static01.trc", role=role), name=path.stem, source=Source(path, "", "stick figures")
+        ),
     )
     (folder / "walk.stick").write_bytes(b"STICK 1")
     assert "walk" not in [trial.name for trial in read_session(folder).trials]

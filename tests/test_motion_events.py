@@ -20,7 +20,7 @@ def walked(*, measured=True, shared=False):
     on[:, 1, 0] = shared
     sure = np.full(200, measured)
     contact = Contact(TIME, on.any(axis=2), on, sure, np.zeros((200, 2)), (), np.stack([sure, sure], axis=1))
-    return (Wrench(TIME, value), Wrench(TIME, np.zeros((200, 6)))), contact
+    return {"right_foot": Wrench(TIME, value), "left_foot": Wrench(TIME, np.zeros((200, 6)))}, contact
 
 
 def test_a_step_is_one_strike_and_one_off():
@@ -36,10 +36,10 @@ def test_what_is_not_measured_or_shared_tells_no_event():
 
 
 def test_a_flicker_is_no_event():
-    (right, left), contact = walked()
-    value = np.array(right.value)
+    feet, contact = walked()
+    value = np.array(feet["right_foot"].value)
     value[80, 2], value[20, 2] = 0.0, 400.0
-    assert [event.time for event in foot_events((Wrench(TIME, value), left), contact)] == [
+    assert [event.time for event in foot_events(feet | {"right_foot": Wrench(TIME, value)}, contact)] == [
         pytest.approx(0.392),
         pytest.approx(1.208),
     ]

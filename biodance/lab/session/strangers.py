@@ -15,17 +15,22 @@ PEOPLE = ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m",
 def each_once(trials: Sequence[Trial], notes: list[str]) -> list[Trial]:
     """Return the trials without second copies of a file, which would count twice; ``notes`` says which were left aside.
 
-    Of two copies the static trial stays, else the one of the shorter name.
+    Of two copies the static trial stays, else the one of the shorter name. A reader of one's own need not say what
+    bytes it read.
     """
     first: dict[str, Trial] = {}
     for trial in sorted(trials, key=lambda one: (one.role != "static", len(one.name), one.name)):
-        kept = first.setdefault(trial.source.sha256, trial)
+        kept = first.setdefault(_bytes_of(trial), trial)
         if kept is not trial:
             notes.append(
                 f"{WARNING}{trial.source.path.name} holds the same bytes as {kept.source.path.name} and was left "
                 f"aside, or it would count twice. Move one of the two away."
             )
-    return [trial for trial in trials if first[trial.source.sha256] is trial]
+    return [trial for trial in trials if first[_bytes_of(trial)] is trial]
+
+
+def _bytes_of(trial: Trial) -> str:
+    return trial.source.sha256 or f"{trial.source.path} {trial.name}"
 
 
 def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Trial], dict[str, str]]:
