@@ -56,6 +56,11 @@ class Estimate:
         """95 % interval."""
         return self.skewed or (self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd)
 
+    @property
+    def known(self) -> bool:
+        """Whether it lies two standard deviations from none, so that anything is known of it."""
+        return abs(self.value) >= 2 * self.sd
+
 
 @dataclass(frozen=True, eq=False)
 class Gain:

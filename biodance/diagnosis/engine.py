@@ -166,8 +166,9 @@ def judged(examined: Examined) -> Examined:
     told = verdict(len(large), alarming(left), one.gates, strained=bool(strange))
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
     if told == "unexplained" and strange == (STRANGE,) and alarming(left) <= LIMIT and len(doubted) < len(large):
-        stand = firm(naming.found, naming.accepted)
-        doubted = [pair for pair in large if pair in doubted or named_of(pair[0]) not in stand]
+        sure = firm(naming.found, naming.accepted)
+        stand = [pair for pair in large if named_of(pair[0]) in sure and any(p.known for p in pair[1].parameters)]
+        doubted = [pair for pair in large if pair in doubted or pair not in stand]
         told = "named, incomplete" if len(doubted) < len(large) else told
     trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
     several = any(_one_of_several(cause, named) for cause, _ in large)

@@ -34,12 +34,12 @@ EXPLAINS: dict[str, tuple[str, ...]] = {
 
 def in_words(finding: Finding) -> str:
     """Return a cause with its place, or all places that it may be at, and its size: ``plate gain Fz (gain 6 ± 0.2 %)``;
-    a size less than two standard deviations from none is not known. A load is told by its mass; where its centre lies
+    a size that is hardly known is said to be (`Estimate.known`). A load is told by its mass; where its centre lies
     is said beside its segment.
     """
     name = f"{cause_in_words(finding.effect, finding.target)}{_elsewhere(finding)}"
     told = finding.parameters[:1] if finding.effect == LOAD else finding.parameters
-    known = [abs(p.value) >= 2 * p.sd for p in finding.parameters if p.sd == p.sd]
+    known = [p.known for p in finding.parameters if p.sd == p.sd]
     if not known:
         return name
     return f"{name} ({', '.join(map(_size, told))}{'' if any(known) else '; its size is hardly known'})"
