@@ -98,3 +98,13 @@ def test_what_the_simulation_tells_from_its_look_alikes_keeps_its_name() -> None
     one = with_witnesses(replace(BY_SIMULATION, findings=(gain,)), Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
     assert one.findings == (gain,)
     assert one.verdict == "named, complete"
+
+
+def test_what_two_witnesses_say_of_one_finding_names_it_once() -> None:
+    """The gain of one plate weighs like a heavier body, and the foot of the other plate says so again."""
+    gain = finding("plate_gain", "plate2:Fz", 0.057, "1")
+    again = finding("plate_gain", "plate1:Fz", -0.05, "1", ("plate_gain", "plate2:Fz"))
+    heavier = finding("body_mass", "", 2.5, "kg", ("plate_gain", "plate2:Fz"))
+    simulation = replace(BY_SIMULATION, findings=(gain,))
+    one = with_witnesses(simulation, Verdicts((heavier, again), HEARD), HEARD, judged=True)
+    assert one.findings == (gain,)

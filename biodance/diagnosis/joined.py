@@ -39,8 +39,12 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
         return _checked(one, heard)
     checked = _checked(one, heard) if judged else one
     mine, shadows = [], []
+    joined: list[Finding | None] = []
     for finding in said.findings:
         alike = next((f for alias in finding.set for f in checked.findings if _covers(alias, f)), None)
+        if alike is not None and alike in joined:
+            continue  # two things that witnesses tell apart are one to the simulation, which told it already
+        joined.append(alike)
         if alike is None and judged and (_explained_without(finding, checked) or _habit(finding, checked, heard)):
             shadows.append(finding)
         else:
