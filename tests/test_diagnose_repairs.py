@@ -9,7 +9,7 @@ from human_cases import human_case
 from biodance.body.changes import move_marker
 from biodance.body.parts import JointError
 from biodance.diagnosis.consequence import Adequacy
-from biodance.diagnosis.diagnosis import Diagnosis
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
 from biodance.diagnosis.repairs import with_repairs
 from biodance.uncertainty.tolerances import shipped
 
@@ -51,6 +51,12 @@ def test_a_marker_that_moved_is_named_with_how_far() -> None:
     shift = np.array([p.value for p in one.parameters])
     assert (one.effect, one.target) == ("marker_misplaced", "RKNE")
     np.testing.assert_allclose(shift, [0.05, 0.0, 0.0], atol=0.012)
+
+
+def test_a_marker_that_carries_another_ones_name_has_not_moved() -> None:
+    exchanged = Finding("labels_swapped", "RKNE/LKNE", (), (Alias("labels_swapped", "RKNE/LKNE", 30.0),), 1.0)
+    told = replace(CLEAN, verdict="named, incomplete", findings=(exchanged,))
+    assert named(JointError("right_knee", 0.007, 0.1, moved=0.04, spared="RKNE"), told) == told
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ _ALIKE = {
 _PLACED_BY = {"knee": "KNE", "ankle": "ANK", "shoulder": "SHO", "elbow": "ELB"}
 """The marker by which the static trial places a joint: wrong there and in all trials, it is that joint elsewhere."""
 
+_EXCHANGED = "labels_swapped"
 _EXPLAINS = 0.5
 """Share of the way that a joint seemed to have gone by which a marker beside it must have moved, to explain it."""
 
@@ -35,9 +36,11 @@ def with_repairs(
     diagnosis: Diagnosis, cases: tuple[Case, ...], known: Tolerances, chosen: Chosen[Effect | DiscreteEffect] = None
 ) -> Diagnosis:
     """Return the diagnosis with what was put right in the body of ``cases`` named first, sized under the tolerances
-    ``known`` and limited to ``chosen`` effects; as it is where more is wrong that nobody can name.
+    ``known`` and limited to ``chosen`` effects; as it is where more is wrong that nobody can name. A marker that
+    carries another one's name has not moved.
     """
-    found = tuple(repairs(cases, known, effects(chosen)))
+    exchanged = {name for one in diagnosis.findings if one.effect == _EXCHANGED for name in one.target.split("/")}
+    found = tuple(one for one in repairs(cases, known, effects(chosen)) if one.target not in exchanged)
     if not found or diagnosis.verdict == "unexplained":
         return diagnosis
     told = diagnosis.verdict
