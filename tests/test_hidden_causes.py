@@ -42,14 +42,12 @@ CAUSES = (
     "head_joint:angle=0.25",
     "trunk_joint:angle=0.2",
     "shoulder_girdle:angle=0.25",
-    "sloshing_load:target=trunk_head,mass=6,sloshing=4.5",
     "joint_centre:target=right_shoulder,shift=0;0;0.07",
     "marker_misplaced:target=RKNE,shift=0.06;0;0",
     "marker_misplaced:target=LSHO,shift=0.06;0;0",
 )
 UNTOLD = (
     "head_joint:angle=0.25",  # the body has a neck where its markers show one, so that no joint is missing
-    "sloshing_load:target=trunk_head,mass=6,sloshing=4.5",
     "joint_centre:target=right_shoulder,shift=0;0;0.07",
     "shoulder_girdle:angle=0.25",
 )
