@@ -31,7 +31,7 @@ class PlateDrift(ChannelEffect):
         """Return session time minus one half; zero in a trial that saw the plate empty: there its reading was taken
         off.
         """
-        return (case.session_time - 0.5) * (not self.plate_of(case).zero.any())
+        return (case.session_time - 0.5) * (not self.plate_of(case).tared)
 
 
 EFFECT = PlateDrift

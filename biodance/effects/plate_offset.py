@@ -22,7 +22,7 @@ class PlateOffset(ChannelEffect):
 
     def in_channel(self, case: Case) -> Array:
         """Return one; zero in a trial that saw the plate empty: there its reading was taken off."""
-        return np.full(case.motion.time.size, 0.0 if self.plate_of(case).zero.any() else 1.0)
+        return np.full(case.motion.time.size, 0.0 if self.plate_of(case).tared else 1.0)
 
 
 EFFECT = PlateOffset

@@ -198,6 +198,11 @@ class Plate:
         )
         assign(self, corners=corners, zero=zero, decisions=tuple(self.decisions))
 
+    @property
+    def tared(self) -> bool:
+        """Whether the empty plate read something in this recording, which the reader took off (`zero`)."""
+        return bool(self.zero.any())
+
     def __repr__(self) -> str:
         return f"Plate({self.name!r}, TYPE {self.type}, {span(self.wrench.time)})"
 

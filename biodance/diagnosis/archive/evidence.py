@@ -115,7 +115,7 @@ def _empty(plate: Plate) -> Array | None:
     found = find_baseline(force[:, 2], zero=None, rate=rate)
     if found.stop <= found.start:
         means, _ = block_means(force[:, 2], rate)
-        return plate.zero if np.abs(means).max() < _LOADED and plate.zero.any() else None
+        return plate.zero if np.abs(means).max() < _LOADED and plate.tared else None
     return np.asarray(plate.zero + force[found.start : found.stop].mean(axis=0))
 
 
@@ -123,7 +123,7 @@ def _of_empty(plate: Plate, trial: Trial, visit: PlateVisit, kind: Mapping[str, 
     reads = _empty(plate)
     if reads is None:
         return []
-    taken = bool(plate.zero.any()) or float(np.abs(reads).max()) < _WEIGHS
+    taken = plate.tared or float(np.abs(reads).max()) < _WEIGHS
     return [
         PlateEvidence(
             f"offset_{axis}",
