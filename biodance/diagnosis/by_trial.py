@@ -40,11 +40,6 @@ class ByTrial:
             row, column = row + rows, column + width
         return cls(tuple(parts), column)
 
-    @property
-    def length(self) -> float:
-        """Sum of squares of all columns."""
-        return float(sum(np.sum(part.values**2) for part in self.parts))
-
     def scaled(self, size: float) -> "ByTrial":
         """Return ``size`` times the columns."""
         return replace(self, parts=tuple(replace(part, values=size * part.values) for part in self.parts))

@@ -146,7 +146,7 @@ def _as_loud(
     if louder <= LOUDER:
         return naming, ()
     del naming  # no two of them at once: they are the largest that a diagnosis keeps
-    return named(replace(known, noise=louder**2 * known.noise)), (LOUD.format(louder),)
+    return named(replace(known, noise=louder**2 * known.noise, zeros=louder**2 * known.zeros)), (LOUD.format(louder),)
 
 
 def judged(examined: Examined) -> Examined:

@@ -94,6 +94,15 @@ class Model:
         """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
         return white(self.problem, self.tolerances, rows, out=out)
 
+    def length(self, Z: Array, rows: slice = slice(None)) -> float:
+        """Return the sum of squares of whitened columns ``Z`` (r, k), which are these ``rows`` of the session, had no
+        plate a zero: noise is always there, but a zero is an error, which hides what looks like it.
+        """
+        slow = np.flatnonzero(np.repeat(self.problem.spectrum.band, 6)[rows] == 0)
+        known, means = self.tolerances, Z[slow].reshape(-1, 6, Z.shape[1])
+        alone, both = np.linalg.cholesky(known.noise[0] - known.zeros[0]), np.linalg.cholesky(known.noise[0])
+        return float(np.sum(Z**2) - np.sum(means**2) + np.sum((np.linalg.solve(alone, both) @ means) ** 2))
+
     def white_by_trial(self, columns: ByTrial) -> ByTrial:
         """Return the whitened ``columns`` of the plates' rows, of which every trial has its own."""
         band, mass = self.problem.spectrum.band, _body_mass(self.problem)

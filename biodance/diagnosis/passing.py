@@ -37,7 +37,7 @@ _STEPS = 2
 @dataclass(frozen=True, eq=False)
 class _Passing:
     """One cause that comes and goes: whitened unit columns ``white``, their ``score`` (k,) and ``information`` (k, k),
-    and its ``log_bayes_factor`` at the best ``size``.
+    and its ``log_bayes_factor`` at the best ``size``; ``length`` of the columns (`Model.length`).
     """
 
     effect: Effect
@@ -46,17 +46,18 @@ class _Passing:
     information: Array
     size: float
     log_bayes_factor: float
+    length: float
 
     @cached_property
     def found(self) -> Evidence:
         """Its evidence at its size."""
         squared = self.size**2
-        return evidence(self.size * self.score, squared * self.information, squared * self.white.length)
+        return evidence(self.size * self.score, squared * self.information, squared * self.length)
 
     @property
     def visible(self) -> float:
         """Share of it that is left when all that is no fault may adapt."""
-        return visible(self.information, self.white.length)
+        return visible(self.information, self.length)
 
 
 def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
@@ -138,7 +139,7 @@ def _passing(base: Model, effect: Effect) -> _Passing | None:
     white = base.white_by_trial(columns)
     s, G = white.against(base.belief.left), white.information(base.belief)
     value, size = max((_log_bayes_factor(s, G, size), size) for size in SIZES)
-    return _Passing(effect, white, s, G, size, value)
+    return _Passing(effect, white, s, G, size, value, sum(base.length(p.values, p.rows) for p in white.parts))
 
 
 def _log_bayes_factor(s: Array, G: Array, size: float) -> float:

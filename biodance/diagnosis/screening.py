@@ -60,7 +60,7 @@ def _scored(found: Model, causes: tuple[Candidate, ...]) -> Iterator[Evidence]:
     lost = absorbed(found, Z, half)
     for cut in cuts:
         own, hides = Z[:, cut], np.concatenate([half[:, cut], lost[:, cut]])
-        yield evidence(s[cut], own.T @ own - hides.T @ hides, float(np.sum(own**2)))
+        yield evidence(s[cut], own.T @ own - hides.T @ hides, found.length(own))
 
 
 def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:

@@ -16,7 +16,7 @@ from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Role, Trial, runs
 from biodance.records.attention import Judged
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.session_noise import added_noise, of_zeros, with_own_noise
+from biodance.uncertainty.session_noise import added_noise, of_zeros, with_own_noise, with_zeros
 from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
 
 
@@ -174,7 +174,7 @@ def own_tolerances(
             f"larger to be seen."
         )
     zeros = of_zeros([run for look in chosen for run in _runs_of(look)])
-    return Own(with_own_noise(found, zeros, float(body.sip.mass.sum())), tuple(notes), believed=factor <= _TOO_FAR)
+    return Own(with_zeros(found, zeros, float(body.sip.mass.sum())), tuple(notes), believed=factor <= _TOO_FAR)
 
 
 def widened_by(known: Tolerances, factor: float) -> Tolerances:

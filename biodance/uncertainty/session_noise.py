@@ -150,6 +150,14 @@ def added_noise(
     return np.asarray(out)
 
 
+def with_zeros(known: Tolerances, zeros: Array, mass: float) -> Tolerances:
+    """Return tolerances with the spread ``zeros`` (B, 6, 6) of the plates' zeros (`of_zeros`), for a person of ``mass``
+    kg.
+    """
+    found = with_own_noise(known, zeros, mass)
+    return replace(found, zeros=found.noise - known.noise)
+
+
 def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:
     """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg: limits and adequacy
     follow.

@@ -72,7 +72,8 @@ class Tolerances:
     by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
     share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like
     its model; ``norms`` by kind of observation (`witnesses.Observation.kind`): what a laboratory's own sessions share
-    beyond what is expected everywhere, and its standard deviation.
+    beyond what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is
+    the plates' zero, an error like the other sizes: it hides causes, and no noise does.
     """
 
     sizes: Mapping[str, float]
@@ -85,6 +86,7 @@ class Tolerances:
     accuracy: Mapping[str, float] = field(default_factory=dict)
     instruments: "InstrumentNoise" = field(default_factory=InstrumentNoise)
     norms: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    zeros: Array = field(default_factory=lambda: np.zeros(()))
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
@@ -93,6 +95,8 @@ class Tolerances:
         object.__setattr__(self, "accuracy", MappingProxyType(dict(self.accuracy)))
         object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
         object.__setattr__(self, "noise", frozen_array(self.noise, (bands, 6, 6), "Tolerances.noise"))
+        zeros = np.broadcast_to(self.zeros, self.noise.shape)
+        object.__setattr__(self, "zeros", frozen_array(zeros, (bands, 6, 6), "Tolerances.zeros"))
         for name in ("energy", "energy_sd"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
 
