@@ -16,6 +16,8 @@ from biodance.diagnosis.joined import with_witnesses
 from biodance.diagnosis.naming import built
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.testimony import Verdicts
+from biodance.witnesses import Observation
+from biodance.witnesses._causes import Alteration
 
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
 
@@ -96,6 +98,41 @@ DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), 
 def test_a_witness_names_nothing_of_which_the_simulation_saw_no_trace(simulation: Diagnosis, named: bool) -> None:
     one = with_witnesses(simulation, Verdicts((a_finding(9.2),), HEARD), HEARD, judged=True)
     assert bool(one.findings) is named
+
+
+MASS = ("body_mass", "")
+
+
+def weighed(value: float, sd: float, hangs_on: str = "") -> Finding:
+    return Finding(*MASS, (Estimate("error", value, sd, "kg"),), (Alias(*MASS, 12.0),), 0.5, hangs_on=hangs_on)
+
+
+def observed(witness: str) -> heard.Testimony:
+    one = Observation(witness, "mass", "stand", 66.0, 0.5, 70.0, "kg")
+    step = Alteration(*MASS, "error", "kg", 0.5, lambda seen, size: seen)
+    return heard.Testimony((one,), {MASS: step}, {MASS: np.array([1.0])})
+
+
+@pytest.mark.parametrize(
+    ("value", "hangs_on", "witness", "named"),
+    [
+        (-4.2, "2.5-6 Hz", "standing_force", True),
+        (-4.2, "Mx", "stride_force", True),
+        (-4.2, "load", "standing_force", False),  # what the plates weigh grows with the load: a gain
+        (-4.2, "0-0.04 Hz", "standing_force", False),
+        (-1.0, "2.5-6 Hz", "standing_force", False),  # another size than the plates weigh
+        (-4.2, "2.5-6 Hz", "force_onset", False),  # feet that lift see what is fast
+    ],
+)
+def test_what_the_plates_weigh_stays_named_though_fast_bands_depart(
+    value: float, hangs_on: str, witness: str, named: bool
+) -> None:
+    limits = (Unobservable(*MASS, 0.5, "kg"),)
+    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(weighed(value, 0.4, hangs_on),))
+    said = observed(witness)
+    one = with_witnesses(simulation, Verdicts((weighed(-3.9, 0.8),), said), said, judged=True)
+    assert [(f.effect, f.parameters[0].value) for f in one.findings] == ([("body_mass", -3.9)] if named else [])
+    assert len(one.resembles) == (0 if named else 1)
 
 
 def test_a_loud_person_makes_no_body_strange_and_a_strange_body_stays_strange() -> None:

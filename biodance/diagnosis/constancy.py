@@ -108,6 +108,10 @@ def _band(index: int) -> str:
     return f"{BANDS.edges[index]:g}-{BANDS.edges[index + 1]:g} Hz"
 
 
+WEIGHTLESS = frozenset((*(_band(b) for b in range(1, len(BANDS))), *CHANNELS[3:]))
+"""What a size may hang on that no mean force shows: the moments, and all bands but the slowest."""
+
+
 def _signals(put: Problem) -> dict[str, list[Array]]:
     """Return per trial (T,) what a size may hang on, about its mean over the frames used: load (of its mean) and place
     (in `_STEP`) as the movement needs them (what was measured reproduces any residual), time of the session and of the

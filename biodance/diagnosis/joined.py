@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from biodance.diagnosis.constancy import WEIGHTLESS
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.testimony import SOMEWHERE, Verdicts, size_by
@@ -21,6 +22,8 @@ _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks 
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _STANDING = {"standing_place"}
 """Witnesses of a habit: no law says where over their feet people stand."""
+_WEIGHING = {"standing_force", "stride_force"}
+"""Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
 _NOT_MOVED = "Standing alone looks like a {} of {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
@@ -45,7 +48,11 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
         if alike is not None and alike in joined:
             continue  # two things that witnesses tell apart are one to the simulation, which told it already
         joined.append(alike)
-        if alike is None and judged and (_explained_without(finding, checked) or _habit(finding, checked, heard)):
+        if (
+            alike is None
+            and judged
+            and (_explained_without(finding, checked, heard) or _habit(finding, checked, heard))
+        ):
             shadows.append(finding)
         else:
             mine.append(_together(finding, alike))
@@ -75,14 +82,15 @@ def _covers(alias: Alias, one: Finding | Alias) -> bool:
     return _names(alias) == _names(one) or (_names(alias) == SOMEWHERE and one.effect == alias.effect)
 
 
-def _explained_without(finding: Finding, one: Diagnosis) -> bool:
+def _explained_without(finding: Finding, one: Diagnosis, heard: Testimony) -> bool:
     """Return whether the simulation found something else wrong, though it would see a cause of this size: a load is
     weight to the plates, and a hand that carries it moves where people stand; or found this very cause to have no one
-    size. Exchanged labels are nothing to the plates. Where it doubts what it found, it still has to have seen some of a
-    cause that is `_PLAIN`.
+    size where the witnesses look (`_weighed_alike`). Exchanged labels are nothing to the plates. Where it doubts what
+    it found, it still has to have seen some of a cause that is `_PLAIN`.
     """
-    if any(_names(other) == _names(finding) and other.hangs_on for other in one.resembles):
-        return True
+    hanging = [other for other in one.resembles if _names(other) == _names(finding) and other.hangs_on]
+    if hanging:
+        return not _weighed_alike(finding, hanging[0], heard)
     labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
     if not finding.parameters or one.verdict == "nothing wrong" or labels:
         return False
@@ -90,6 +98,22 @@ def _explained_without(finding: Finding, one: Diagnosis) -> bool:
     if one.doubt:
         return times > _PLAIN and _evidence(finding, one) <= 0.0
     return times > 1.0
+
+
+def _weighed_alike(finding: Finding, hanging: Finding, heard: Testimony) -> bool:
+    """Return whether a cause that only weighing shows has the same size in the simulation, and hangs there on nothing
+    that weighs: what the plates weigh they weigh, however the movement's fast bands and moments depart.
+    """
+    alone = _names(finding) in heard.causes and set(heard.seen_by(_names(finding))) <= _WEIGHING
+    return alone and hanging.hangs_on in WEIGHTLESS and _same_size(finding, hanging)
+
+
+def _same_size(finding: Finding, other: Finding) -> bool:
+    """Return whether two sizes of one cause do not contradict each other."""
+    if not (finding.parameters and other.parameters):
+        return False
+    mine, its = finding.parameters[0], other.parameters[0]
+    return bool(abs(mine.value - its.value) <= _FAR * np.hypot(mine.sd, its.sd))
 
 
 def _habit(finding: Finding, one: Diagnosis, heard: Testimony) -> bool:
