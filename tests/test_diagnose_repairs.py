@@ -53,8 +53,9 @@ def test_a_marker_that_moved_is_named_with_how_far() -> None:
     np.testing.assert_allclose(shift, [0.05, 0.0, 0.0], atol=0.012)
 
 
-def test_a_marker_that_carries_another_ones_name_has_not_moved() -> None:
-    exchanged = Finding("labels_swapped", "RKNE/LKNE", (), (Alias("labels_swapped", "RKNE/LKNE", 30.0),), 1.0)
+@pytest.mark.parametrize("pair", ["RKNE/LKNE", "LWRA/LWRB"])
+def test_nothing_moved_in_a_body_that_exchanged_labels_placed(pair: str) -> None:
+    exchanged = Finding("labels_swapped", pair, (), (Alias("labels_swapped", pair, 30.0),), 1.0)
     told = replace(CLEAN, verdict="named, incomplete", findings=(exchanged,))
     assert named(JointError("right_knee", 0.007, 0.1, moved=0.04, spared="RKNE"), told) == told
 

@@ -22,8 +22,6 @@ _ROUNDS = 3
 """Causes named at most."""
 REFINED = 6
 """Causes of the screening that are fitted with all their curvature."""
-_NEAR = 12.0
-"""Natural logarithm: causes this far behind the best one of the screening are refined."""
 TOGETHER = 3.0
 """Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
 SURE = 2.0
@@ -221,13 +219,13 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
     one named. Where none of them is possible, they hide nobody: the next ones are fitted.
     """
-    refined, rest = [_refined(found, one) for one in _near(ranking)], ranking
+    refined, rest = [_refined(found, one) for one in _near(found, ranking)], ranking
     while True:
         tried = {one.names for one, _ in refined}
         rest = Round(tuple(one for one in rest.suspects if one.names not in tried))
         if any(np.isfinite(one.score) for one, _ in refined) or not suspicious(rest, found.tolerances):
             break
-        refined += [_refined(found, one) for one in _near(rest)]
+        refined += [_refined(found, one) for one in _near(found, rest)]
     refined.sort(key=lambda pair: -pair[0].score)
     return Round((*(one for one, _ in refined), *rest.suspects)), refined[0][1]
 
@@ -243,10 +241,12 @@ def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model
     return replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled
 
 
-def _near(ranking: Round) -> list[ScoredCandidate]:
-    """Return the causes worth fitting: the first ones of the screening."""
-    best = ranking.suspects[0].score
-    return [one for one in ranking.suspects[:REFINED] if best - one.score <= max(_NEAR, 0.5 * best)]
+def _near(found: Model, ranking: Round) -> list[ScoredCandidate]:
+    """Return the causes worth fitting: the first ones of the screening, as far as it suspects them. Far from proportion
+    one finds in noise what nobody suspected: cameras of 0.3 mm look like a filter of 6 Hz.
+    """
+    least = max(ranking.suspects[0].score * 0.5, found.tolerances.threshold)
+    return [one for one in ranking.suspects[:REFINED] if one.score >= least]
 
 
 def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:

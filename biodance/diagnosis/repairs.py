@@ -36,11 +36,11 @@ def with_repairs(
     diagnosis: Diagnosis, cases: tuple[Case, ...], known: Tolerances, chosen: Chosen[Effect | DiscreteEffect] = None
 ) -> Diagnosis:
     """Return the diagnosis with what was put right in the body of ``cases`` named first, sized under the tolerances
-    ``known`` and limited to ``chosen`` effects; as it is where more is wrong that nobody can name. A marker that
-    carries another one's name has not moved.
+    ``known`` and limited to ``chosen`` effects; as it is where more is wrong that nobody can name, or where markers
+    carry each other's names: that body was placed by wrong ones.
     """
-    exchanged = {name for one in diagnosis.findings if one.effect == _EXCHANGED for name in one.target.split("/")}
-    found = tuple(one for one in repairs(cases, known, effects(chosen)) if one.target not in exchanged)
+    exchanged = any(one.effect == _EXCHANGED for one in diagnosis.findings)
+    found = () if exchanged else tuple(repairs(cases, known, effects(chosen)))
     if not found or diagnosis.verdict == "unexplained":
         return diagnosis
     told = diagnosis.verdict

@@ -133,10 +133,10 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     heard = hear(result.session, effects, (tolerances or shipped()).norms)
     whole = with_witnesses(found.diagnosis, weigh(heard), heard, judged=found.examined is not None)
-    if mended:
-        whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     if found.examined:
         whole = with_repairs(whole, found.examined.naming.found.problem.cases, tolerances or shipped(), effects)
+    if mended:
+        whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
     used = looked_at(result.trials) if found.examined else ()
