@@ -55,9 +55,7 @@ class Margins:
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
-    """Return a number of a limit: its ``default`` and the range from ``low`` to ``high`` in ``unit`` that a protocol
-    may give it.
-    """
+    """Return a limit's number: ``default`` and the range from ``low`` to ``high`` in ``unit`` it may have."""
     return field(default=default, metadata={"low": low, "high": high, "unit": unit})
 
 
