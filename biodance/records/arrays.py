@@ -55,6 +55,13 @@ def assign(record: object, **values: object) -> None:
         object.__setattr__(record, name, value)
 
 
+def freeze(record: object, what: str, **shapes: tuple[int | None, ...]) -> None:
+    """Make arrays of a frozen record read-only during its ``__post_init__``, each of its shape (`frozen_array`)."""
+    assign(
+        record, **{name: frozen_array(getattr(record, name), shape, f"{what}.{name}") for name, shape in shapes.items()}
+    )
+
+
 def check_time(time: ArrayLike, what: str) -> Array:
     """Return times (T,) s as a read-only array; BiodanceError where they do not increase."""
     time = frozen_array(time, (None,), f"{what}.time")

@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.filters import force_filter, low_pass
-from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench, frozen_array
+from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench, freeze
 from biodance.settings import Settings
 from biodance.spatial import axis_rotation, wrench_about_origin
 
@@ -38,7 +38,7 @@ class FramePose:
     shift: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shift", frozen_array(self.shift, (3,), "FramePose.shift"))
+        freeze(self, "FramePose", shift=(3,))
 
     @property
     def turn(self) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.records import Array, frozen_array
+from biodance.records import Array, freeze
 from biodance.spatial import wrench_shift
 from biodance.uncertainty.bands import WHITE, Bands
 
@@ -24,10 +24,7 @@ class Noise:
     bands: Bands = WHITE
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "covariance", frozen_array(self.covariance, (len(self.bands), 6, 6), "Noise.covariance")
-        )
-        object.__setattr__(self, "about", frozen_array(self.about, (3,), "Noise.about"))
+        freeze(self, "Noise", covariance=(len(self.bands), 6, 6), about=(3,))
 
     @classmethod
     def of_sd(cls, force: float, moment: float, about: Array) -> "Noise":

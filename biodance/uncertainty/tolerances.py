@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_rows, error_size
 from biodance.library import locate
-from biodance.records import Array, Index, frozen_array
+from biodance.records import Array, Index, assign, freeze
 
 REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
@@ -88,13 +88,9 @@ class Tolerances:
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
-        object.__setattr__(self, "sizes", MappingProxyType(dict(self.sizes)))
-        object.__setattr__(self, "means", MappingProxyType(dict(self.means)))
-        object.__setattr__(self, "accuracy", MappingProxyType(dict(self.accuracy)))
-        object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
-        object.__setattr__(self, "noise", frozen_array(self.noise, (bands, 6, 6), "Tolerances.noise"))
-        for name in ("energy", "energy_sd"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
+        tables = ("sizes", "means", "accuracy", "norms")
+        assign(self, **{name: MappingProxyType(dict(getattr(self, name))) for name in tables})
+        freeze(self, "Tolerances", noise=(bands, 6, 6), energy=(bands, 6), energy_sd=(bands, 6))
 
     def size(self, key: str) -> float:
         """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint

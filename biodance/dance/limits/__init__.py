@@ -21,7 +21,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Array
+from biodance.records import Array, assign
 
 __all__ = [
     "FAR",
@@ -120,7 +120,7 @@ class Limit(ABC):
         other = copy(self)
         for one in fields(self):
             if one.metadata.get("unit") == "m":
-                object.__setattr__(other, one.name, length * getattr(self, one.name))
+                assign(other, **{one.name: length * getattr(self, one.name)})
         return other
 
     @property

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.records import SIDES, Array, Index, frozen_array
+from biodance.records import SIDES, Array, Index, assign, freeze
 from biodance.threads import Sendable
 
 if TYPE_CHECKING:
@@ -58,12 +58,8 @@ class Stance(Sendable):
     hands: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "planted", tuple(self.planted))
-        object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
-        object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
-        object.__setattr__(self, "hands", frozen_array(self.hands, (2, 3), "Stance.hands"))
-        props = self.props if np.size(self.props) else np.empty((0, 2))
-        object.__setattr__(self, "props", frozen_array(props, (None, 2), "Stance.props"))
+        assign(self, planted=tuple(self.planted), props=self.props if np.size(self.props) else np.empty((0, 2)))
+        freeze(self, "Stance", ankle=(2, 3), soles=(2, None, 3), hands=(2, 3), props=(None, 2))
 
     @cached_property
     def support(self) -> Array:

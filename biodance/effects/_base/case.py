@@ -13,7 +13,7 @@ from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
 from biodance.motion.regressor import wrench_of_segments
-from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
+from biodance.records import Array, Motion, Plate, Trial, Wrench, freeze
 from biodance.spatial import wrench_about_point
 
 OF_MOTION = ("segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
@@ -41,8 +41,7 @@ class Case:
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
-        object.__setattr__(self, "phi", frozen_array(self.phi, (10 * len(self.body.segments),), "Case.phi"))
-        object.__setattr__(self, "session_time", frozen_array(self.session_time, (frames,), "Case.session_time"))
+        freeze(self, "Case", phi=(10 * len(self.body.segments),), session_time=(frames,))
         if len(self.measured) != frames:
             raise TrialRefused(
                 f"Trial {self.trial.name}: {frames} frames of motion, other samples of force; prepare the trial first."

@@ -18,7 +18,7 @@ from biodance.lab.c3d.raw import RawC3d, read_raw, split_label
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import write_new
-from biodance.records import Array, frozen_array
+from biodance.records import Array, assign, frozen_array
 
 
 def write_relabelled(source: Path, target: Path, names: Mapping[str, str]) -> Path:
@@ -80,7 +80,7 @@ class Output:
     turns: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "value", frozen_array(self.value, (None, 3), f"Output {self.label}"))
+        assign(self, value=frozen_array(self.value, (None, 3), f"Output {self.label}"))
 
 
 @dataclass(frozen=True)

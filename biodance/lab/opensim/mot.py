@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
 from biodance.lab.plain_text import cells, parse_number, read_text, write_new
-from biodance.records import Array, frozen_array
+from biodance.records import Array, assign, frozen_array
 
 LONGEST_HEADER = 200
 JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writers round the time column
@@ -39,13 +39,7 @@ class TimeTable:
     def __post_init__(self) -> None:
         time = frozen_array(self.time, (None,), "Table.time")
         values = frozen_array(self.values, (time.size, len(self.columns)), "Table.values")
-        for field, value in (
-            ("columns", tuple(self.columns)),
-            ("time", time),
-            ("values", values),
-            ("warnings", tuple(self.warnings)),
-        ):
-            object.__setattr__(self, field, value)
+        assign(self, columns=tuple(self.columns), time=time, values=values, warnings=tuple(self.warnings))
         if len(set(self.columns)) != len(self.columns):
             raise BiodanceError(f"Table {self.name}: a column label occurs twice in {', '.join(self.columns)}.")
 

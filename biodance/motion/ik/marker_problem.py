@@ -9,7 +9,7 @@ from biodance.body.body import Body
 from biodance.motion.ik.chart import Chart, chart_of
 from biodance.motion.ik.compiled import newton
 from biodance.motion.ik.compiled.chain import MarkerChain, chain_of
-from biodance.records import Array, Index
+from biodance.records import Array, Index, assign
 
 _STEPS = 200
 """Most Newton steps of a frame."""
@@ -33,7 +33,7 @@ class MarkerProblem:
         """Keep ``xyz`` as a view that nothing writes to: one type for the compiled code, whatever was given."""
         view = self.xyz.view()
         view.flags.writeable = False
-        object.__setattr__(self, "xyz", view)
+        assign(self, xyz=view)
 
 
 class Minimum(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.records import Array, Markers, Role, frozen_array
+from biodance.records import Array, Markers, Role, assign, frozen_array
 from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
 from biodance.virtual_lab.movement.protocol import TrialPlan
@@ -130,7 +130,7 @@ class LabVisit:
     marker_shifts: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tolerances", self.tolerances or self.laboratory.tolerances)
+        assign(self, tolerances=self.tolerances or self.laboratory.tolerances)
 
 
 FIRST_VISIT = LabVisit()
