@@ -1,11 +1,11 @@
-"""Hide everything, diagnose, judge: writes docs/benchmarks/diagnosis.md.
+"""Hide everything, diagnose, judge: prints a page, or writes it, and its figure beside it, where there is none yet.
 
-    python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out docs/benchmarks/diagnosis.md] [--prepare]
+    python benchmarks/bench_diagnosis.py [--run NAME] [--minutes 30] [--out build/diagnosis.md] [--prepare]
                                         [--group null] [--sample]
 
 Sessions are simulated and tracked once and kept on disk (`hidden_sessions.CACHE`); scores are kept per ``--run``, so
 that a run that was stopped goes on, and the same command may run twice at once: every session is claimed by one of
-them. ``--minutes`` ends the run early (0: only the page is written): the sessions come in an order in which every
+them. ``--minutes`` ends the run early (0: only the page is made): the sessions come in an order in which every
 beginning is a sample of the whole, and the page says how many there were. ``--prepare`` only simulates and tracks;
 ``--group`` only makes the scores of one group; ``--sample`` takes the fixed sample of `hidden_causes.sample` instead of
 the whole list and writes no page but one line for every session.
@@ -20,6 +20,8 @@ from diagnosis_page import draw, page
 from diagnosis_scores import Score, judged, stored
 from hidden_causes import everything, sample
 from hidden_sessions import Scenario, examined
+
+from biodance.lab.plain_text import write_new
 
 
 def without_culprit(scenarios: list[Scenario]) -> list[Scenario]:
@@ -46,7 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", default="now")
     parser.add_argument("--minutes", type=float, default=1e9)
-    parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/diagnosis.md"))
+    parser.add_argument("--out", type=Path)
     parser.add_argument("--prepare", action="store_true")
     parser.add_argument("--group", default="")
     parser.add_argument("--sample", action="store_true")
@@ -75,11 +77,11 @@ def main() -> None:
             )
         scores += [found] if found else []
     if not chosen.prepare and not chosen.sample and scores:
-        figure = chosen.out.parents[1] / "figures" / "diagnosis_confusion.png"
-        draw(scores, figure)
-        lines = page(scores, run=chosen.run, figure="../figures/diagnosis_confusion.png", total=len(jobs))
-        chosen.out.write_text("\n".join(lines) + "\n")
-        print(f"wrote {chosen.out}")
+        name = "diagnosis_confusion.png"
+        text = "\n".join(page(scores, run=chosen.run, figure=name, total=len(jobs))) + "\n"
+        print(write_new(chosen.out, text.encode()) if chosen.out else text)
+        if chosen.out:
+            draw(scores, chosen.out.with_name(name))
 
 
 if __name__ == "__main__":

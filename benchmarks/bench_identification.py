@@ -1,7 +1,7 @@
-"""What identification achieves on virtual subjects, with all that goes wrong in a laboratory; writes
-docs/benchmarks/identification.md.
+"""What identification achieves on virtual subjects, with all that goes wrong in a laboratory; prints a
+page, or writes it where there is none yet.
 
-    python benchmarks/bench_identification.py [--subjects 20] [--tuned] [--out docs/benchmarks/identification.md]
+    python benchmarks/bench_identification.py [--subjects 20] [--tuned] [--out build/identification.md]
 
 Sections: accuracy beside the table and the paper's programme, coverage, squats that were not fitted, joint torques,
 prior scale, quiet standing, added mass, time (of the processor). Constants were tuned on the catalogue of ``--tuned``;
@@ -43,6 +43,7 @@ from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import posterior
 from biodance.identification.statistics import Fit, layout_for, standing_point, statistics
 from biodance.identification.torques import torque_bands, torque_regressor
+from biodance.lab.plain_text import write_new
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
 
@@ -254,7 +255,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--subjects", type=int, default=20)
     parser.add_argument("--tuned", dest="catalogue", action="store_const", const=TUNED, default=FRESH)
-    parser.add_argument("--out", type=Path, default=Path("docs/benchmarks/identification.md"))
+    parser.add_argument("--out", type=Path)
     chosen = parser.parse_args()
     start = time.perf_counter()
     lines = run(
@@ -262,8 +263,8 @@ def main() -> None:
         chosen.catalogue,
         lambda text: print(f"{time.perf_counter() - start:6.0f} s  {text}", flush=True),
     )
-    chosen.out.write_text("\n".join(lines) + "\n")
-    print(f"wrote {chosen.out}")
+    text = "\n".join(lines) + "\n"
+    print(write_new(chosen.out, text.encode()) if chosen.out else text)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,12 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from inject import inject
+
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.plates.parameters import count_plates
 from biodance.pipeline.plates import judge_plates
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
-from biodance.virtual_lab.faults.inject import inject
 
 REAL = (
     "", "plate_position:target=plate2:x,shift=0.015", "plate_position:target=plate2:y,shift=0.015",

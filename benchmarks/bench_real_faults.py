@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 from hidden_sessions import REAL
+from inject import inject
 
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.effects import discrete_effects, effects, unit_of
@@ -25,7 +26,6 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
-from biodance.virtual_lab.faults.inject import inject
 
 SESSIONS = ("biomechzoo/HC030A", "biomechzoo/HC032A", "adl_gait")
 FAULTS = (

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from robot_lab import RobotLab, write_robot_trial
 
 from biodance.body.body import Body
 from biodance.body.robot.urdf import read_urdf
@@ -21,7 +22,6 @@ from biodance.errors import BiodanceError
 from biodance.motion.grounded import _soles
 from biodance.pipeline.robot import identify_robot
 from biodance.records import Array, Sip
-from biodance.virtual_lab.robot_recording import RobotLab, write_robot_trial
 
 TALOS, G1 = ("leg_right_6_link", "leg_left_6_link"), ("right_ankle_roll_link", "left_ankle_roll_link")
 ROBOTS: dict[str, tuple[str, tuple[str, str]]] = {

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from robot_lab import RobotLab, write_robot_trial
 
 from biodance.body.body import Body
 from biodance.body.inertia import smallest_eigenvalues
@@ -32,7 +33,6 @@ from biodance.dance.robot import person_sized, shrunk
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Array, Sip
 from biodance.spatial import point_mass
-from biodance.virtual_lab.robot_recording import RobotLab, write_robot_trial
 
 FEET = ("right_foot", "left_foot")
 COVERS = {

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from inject import inject
 from scipy.stats import norm
 from scipy.stats import t as student
 
@@ -36,7 +37,6 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Session
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
-from biodance.virtual_lab.faults.inject import inject
 from biodance.witnesses import Observation, SeenTrial, observe, recording
 
 CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from robot_lab import RobotLab, write_robot_trial
 
 from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.robot.hoap3 import hoap3
 from biodance.records import Array, Sip
-from biodance.virtual_lab.robot_recording import RobotLab, write_robot_trial
 
 FEET = ("right_foot", "left_foot")
 RATE = 200.0

@@ -1,10 +1,10 @@
 """Girths of a person: exact solids, refusals with a sentence, and a prior that covers people it was not made of."""
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import bench_girths
 import numpy as np
 import pytest
 
@@ -15,9 +15,6 @@ from biodance.errors import SessionRefused
 from biodance.lab.session.file import read_session_file
 from biodance.lab.shape import legal_girths, usual_girths
 from biodance.records import Subject
-
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-import bench_girths
 
 MAN = Subject(78.1, 1.777, "M", 30.0)
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from inject import inject
 
 from biodance.cli import run
 from biodance.diagnosis.diagnosis import Diagnosis
@@ -21,7 +22,6 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Subject
 from biodance.virtual_lab.faults.causes import fault_of, hide, parse_cause
-from biodance.virtual_lab.faults.inject import inject
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.recording.laboratory import LabVisit
 from biodance.virtual_lab.simulate import simulate_session

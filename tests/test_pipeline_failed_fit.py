@@ -15,7 +15,6 @@ from biodance.identification.identification import identify_body
 from biodance.identification.paper_programme import paper_programme
 from biodance.identification.physical import FailedFit
 from biodance.identification.sessions import differences
-from biodance.identification.streaming import begin
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.identification import identify_trials
 from biodance.records.attention import Attention
@@ -62,12 +61,6 @@ def test_sessions_whose_bodies_with_room_for_a_load_fail_cannot_be_compared(monk
     monkeypatch.setattr("biodance.identification.sessions.physical_fit", refuse)
     with pytest.raises(NotSolved, match=r"cannot be compared: t, .*by force"):
         differences(found, found)
-
-
-def test_a_stream_that_contradicts_every_body_knows_nothing_enough(failing):
-    one, (fit,) = session()
-    progress = begin(one, rate=100.0).feed(fit.motion, fit.wrench, fit.use).progress()
-    assert (progress.known, progress.enough, progress.cause) == ((), (), FORCED.cause)
 
 
 def test_the_paper_s_programme_without_a_solution_has_no_parameters(monkeypatch):

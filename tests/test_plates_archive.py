@@ -2,15 +2,11 @@
 
 import csv
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parent.parent / "benchmarks"))
-
 from plate_archives import Step, draw
 
 from biodance.cli import run

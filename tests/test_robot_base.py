@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 import pytest
+from robot_lab import RobotLab, write_robot_trial
 from robot_recordings import FEET, SOLE_OVER_ANKLE, danced, drawing, real_robot
 
 from biodance.body.body import Body
@@ -17,7 +18,6 @@ from biodance.motion.base_seen import base_of_markers
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.robot_trials import bring_together
 from biodance.records import Array, Markers
-from biodance.virtual_lab.robot_recording import RobotLab, write_robot_trial
 
 PLACES = {"T1": (0.05, 0.04, 0.10), "T2": (-0.06, 0.05, 0.08), "T3": (0.0, -0.07, 0.12), "T4": (0.02, 0.0, -0.05)}
 SAID = "[base]\nmarkers = {" + ", ".join(f"{name} = {list(xyz)}" for name, xyz in PLACES.items()) + "}\n"

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from robot_lab import RobotLab
 from robot_recordings import COVER, FEET, drawing, real_robot, recorded
 
 from biodance.body.robot.urdf import read_urdf
@@ -18,7 +19,6 @@ from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import told_of
 from biodance.records import Wrench
 from biodance.records.attention import Attention
-from biodance.virtual_lab.robot_recording import RobotLab
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,13 @@
 """A scanned person: exact cuts, masses of solids that nothing here cuts, refusals with a sentence."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import bench_scan
 import numpy as np
 import pytest
 import trimesh
+from scanned_people import ScannedPerson, scanned_person
 from trimesh.triangles import mass_properties
 
 from biodance.body.human.prior import prior
@@ -18,10 +19,6 @@ from biodance.errors import SessionRefused
 from biodance.lab.session.file import read_session_file
 from biodance.records import Subject
 from biodance.settings import Settings
-
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-import bench_scan
-from scanned_people import ScannedPerson, scanned_person
 
 TILTED = np.array([0.6, 0.0, 0.8])
 Z = np.array([0.0, 0.0, 1.0])

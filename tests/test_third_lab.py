@@ -1,15 +1,9 @@
 """The third laboratory itself: force is the rate of momentum, files say what was measured, seeds repeat."""
 
-import sys
-from pathlib import Path
-
 import ezc3d
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
-
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-
 from third_lab import make_session
 from third_lab.faults import Fault
 from third_lab.movement import Plan, check_feet, find_zmp, realize

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inject import inject
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import read_trial
 from biodance.records import Array, Subject, Trial
 from biodance.virtual_lab.faults.causes import fault_of, hide, parse_cause
-from biodance.virtual_lab.faults.inject import inject
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit
 from biodance.virtual_lab.simulate import simulate_session

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.heard import hear
@@ -12,7 +13,6 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
-from biodance.virtual_lab.faults.inject import inject
 
 DATA = Path(os.environ.get("BIODANCE_DATA", "")) / "biomechzoo"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="BIODANCE_DATA does not name the real recordings")

@@ -26,9 +26,7 @@ Rows = tuple[dict[str, Any], ...]
 
 
 class SessionStatus(StrEnum):
-    """What became of a session. Refused: the recordings cannot be used. Failed: biodance, or the machine, did not get
-    through.
-    """
+    """What became of a session. Refused: the recordings cannot be used. Failed: biodance, or the machine, gave up."""
 
     DONE = "done"
     NEEDS_A_PERSON = "needs a person"

@@ -18,7 +18,7 @@ from biodance import display
 from biodance.body.parts import GRAVITY, Foot, Joint, JointError, JointLimits, JointTree, Part, SegmentMarkers
 from biodance.body.pinocchio_model import build
 from biodance.errors import BiodanceError
-from biodance.records import Array, Sip, frozen_array
+from biodance.records import Array, Sip, freeze
 from biodance.threads import Sendable
 
 if TYPE_CHECKING:
@@ -92,9 +92,7 @@ class Body(JointTree, Sendable):
 
     def __post_init__(self) -> None:
         count = len(self.segments)
-        object.__setattr__(self, "boxes", frozen_array(self.boxes, (count, 2, 3), f"{self.name}.boxes"))
-        object.__setattr__(self, "gravity", frozen_array(self.gravity, (3,), f"{self.name}.gravity"))
-        object.__setattr__(self, "com_boxes", frozen_array(self.com_boxes, (count, 2, 3), f"{self.name}.com_boxes"))
+        freeze(self, self.name, boxes=(count, 2, 3), gravity=(3,), com_boxes=(count, 2, 3))
         if self.sip.segments != self.segments:
             raise BiodanceError(
                 f"{self.name}: the SIP name other segments ({self.sip.segments}) than the body ({self.segments})."

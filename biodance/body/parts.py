@@ -1,6 +1,6 @@
 """What a Body is made of: joints and their tree, marker places, limits and soles; the constants of its frames."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.body.inertia import shift_matter
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Array, frozen_array
+from biodance.records import Array, freeze
 from biodance.settings import STANDARD_GRAVITY
 
 NO_SEGMENT = -1
@@ -38,8 +38,7 @@ class Joint:
     positive: str = ""
 
     def __post_init__(self) -> None:
-        for name, shape in (("axis", (3,)), ("rotation", (3, 3)), ("translation", (3,))):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"joint {self.name}.{name}"))
+        freeze(self, f"joint {self.name}", axis=(3,), rotation=(3, 3), translation=(3,))
         if abs(np.linalg.norm(self.axis) - 1) > 1e-9:
             raise BiodanceError(f"Joint {self.name}: axis {self.axis} is not a unit vector.")
 
@@ -59,7 +58,7 @@ class Part:
     share: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "share", frozen_array(self.share, (10,), f"part {self.name}.share"))
+        freeze(self, f"part {self.name}", share=(10,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +74,7 @@ class SegmentMarkers:
 
     def __post_init__(self) -> None:
         count = len(self.names)
-        object.__setattr__(self, "position", frozen_array(self.position, (count, 3), "SegmentMarkers.position"))
-        object.__setattr__(self, "weight", frozen_array(self.weight, (count,), "SegmentMarkers.weight"))
+        freeze(self, "SegmentMarkers", position=(count, 3), weight=(count,))
         if len(self.segment) != count:
             raise BiodanceError(f"SegmentMarkers: {count} names but {len(self.segment)} segment indices.")
 
@@ -114,8 +112,7 @@ class JointLimits:
 
     def __post_init__(self) -> None:
         count = np.size(self.lower)
-        for name in ("lower", "upper", "velocity", "torque_lower", "torque_upper"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (count,), f"JointLimits.{name}"))
+        freeze(self, "JointLimits", **{field.name: (count,) for field in fields(self)})
         if np.any(self.lower > self.upper):
             raise BiodanceError(f"JointLimits: lower > upper at joint {int(np.argmax(self.lower > self.upper))}.")
 
@@ -130,7 +127,7 @@ class Foot:
     outline: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "outline", frozen_array(self.outline, (None, 3), "Foot.outline"))
+        freeze(self, "Foot", outline=(None, 3))
 
 
 class JointTree:
@@ -193,9 +190,7 @@ class JointTree:
 
     @cached_property
     def sharing(self) -> Array | None:
-        """(10 (N + P), 10 N): the parameters of the `links` from those of the segments, each of which means the whole;
-        None without parts.
-        """
+        """(10 (N + P), 10 N): the parameters of the `links` from those of the whole segments; None without parts."""
         if not self.parts:
             return None
         count = 10 * len(self.segments)

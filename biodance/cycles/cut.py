@@ -139,9 +139,7 @@ def _reach(height: Array, level: float, start: int, step: int) -> int | None:
 
 
 def _still_before(centre: Array, motion: Motion, leaves: int) -> int:
-    """Return the last frame before ``leaves`` at which the centre of mass was at rest; the first of the trial without
-    one.
-    """
+    """Return the last frame before ``leaves`` at which the centre of mass rested; the trial's first without one."""
     speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
     rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
     return int(rest[-1]) if rest.size else 0
@@ -173,9 +171,7 @@ STRIDE_UNITS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Stride:
-    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that the trial does not tell is
-    missing.
-    """
+    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); those not told lack."""
 
     cycle: Cycle
     values: Mapping[str, float]

@@ -23,7 +23,7 @@ from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
 from biodance.library import refuse_special
-from biodance.records import SIDES, Array, Motion, Subject, frozen_array
+from biodance.records import SIDES, Array, Motion, Subject, freeze
 from biodance.threads import Sendable
 
 if TYPE_CHECKING:
@@ -93,9 +93,7 @@ class Dance(Sendable):
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
-        shapes = {"postures": (count, size), "hold": (count,), "via": (count - 1, 2, size), "move": (count - 1,)}
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Dance.{name}"))
+        freeze(self, "Dance", postures=(count, size), hold=(count,), via=(count - 1, 2, size), move=(count - 1,))
         if not (len(self.stances) == len(self.under) + 1 == count) or size != self.chain.size:
             raise BiodanceError(
                 f"Dance: {count} postures of {size} coordinates, {len(self.stances)} stances and {len(self.under)} "
@@ -148,9 +146,7 @@ class Dance(Sendable):
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """False for postures in between, (P,) bool: weight over one foot of two, and stops that are not held as
-        long.
-        """
+        """False for postures in between, (P,) bool: weight over one foot of two, and stops held shorter."""
         return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property

@@ -12,7 +12,7 @@ import numpy as np
 from biodance import display
 from biodance.diagnosis.consequence import Adequacy
 from biodance.identification.knowledge import SIGMAS
-from biodance.records import Array, frozen_array
+from biodance.records import Array, freeze
 from biodance.records.attention import Attention, Judged
 
 if TYPE_CHECKING:
@@ -83,9 +83,7 @@ class Gain:
     channels: Array = field(default_factory=lambda: np.full((6, 2), np.nan))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", frozen_array(self.channels, (6, 2), "Gain.channels"))
-        for name in ("rms_before", "rms_after"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (6,), f"Gain.{name}"))
+        freeze(self, "Gain", channels=(6, 2), rms_before=(6,), rms_after=(6,))
 
     @property
     def proven(self) -> bool:

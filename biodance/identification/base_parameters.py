@@ -16,7 +16,7 @@ from biodance.body.parts import GRAVITY
 from biodance.identification.information import Information, fold
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Motion, frozen_array
+from biodance.records import Array, Motion, freeze
 
 PARAMETERS = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")
 """Names of the ten parameters of a segment, in Pinocchio's order."""
@@ -35,9 +35,7 @@ class BaseParameters:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "regroup", frozen_array(self.regroup, (len(self.columns), len(self.names)), "BaseParameters.regroup")
-        )
+        freeze(self, "BaseParameters", regroup=(len(self.columns), len(self.names)))
 
     @property
     def count(self) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.plain_text import write_new
-from biodance.records import Array, frozen_array
+from biodance.records import Array, freeze
 from biodance.records.arrays import rate_of
 
 VERSION = "1.10.0"
@@ -41,7 +41,7 @@ class BidsChannels:
     def __post_init__(self) -> None:
         if len(self.rows) != np.shape(self.values)[1]:
             raise BiodanceError(f"BidsChannels: {len(self.rows)} rows for {np.shape(self.values)[1]} columns.")
-        object.__setattr__(self, "values", frozen_array(self.values, (self.time.size, None), "BidsChannels.values"))
+        freeze(self, "BidsChannels", values=(self.time.size, None))
 
 
 def bids_label(name: str) -> str:

@@ -82,9 +82,7 @@ def _name(path: Path, folder: Path) -> str:
 
 @cache
 def commit(package: Path = PACKAGE) -> str:
-    """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else
-    "unknown".
-    """
+    """Return the git commit of the checkout that holds ``package``, with "+changed" if changed; else "unknown"."""
     if not (package.parent / ".git").exists():
         return _UNKNOWN
     try:

@@ -55,6 +55,13 @@ def assign(record: object, **values: object) -> None:
         object.__setattr__(record, name, value)
 
 
+def freeze(record: object, what: str, **shapes: tuple[int | None, ...]) -> None:
+    """Make arrays of a frozen record read-only during its ``__post_init__``, each of its shape (`frozen_array`)."""
+    assign(
+        record, **{name: frozen_array(getattr(record, name), shape, f"{what}.{name}") for name, shape in shapes.items()}
+    )
+
+
 def check_time(time: ArrayLike, what: str) -> Array:
     """Return times (T,) s as a read-only array; BiodanceError where they do not increase."""
     time = frozen_array(time, (None,), f"{what}.time")
@@ -78,9 +85,7 @@ def rate_of(time: Array) -> float:
 
 
 def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
-    """Return the one of ``trials`` that has a ``name``; UnknownName says what it is no ``kind`` of and lists all
-    names.
-    """
+    """Return the one of ``trials`` that has a ``name``; UnknownName says the ``kind`` and lists all names."""
     found = {one.name: one for one in trials}
     if name not in found:
         raise UnknownName.of(kind, name, tuple(found))

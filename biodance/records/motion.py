@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records.arrays import Array, assign, check_time, frozen_array, in_time, rate_of, span
+from biodance.records.arrays import Array, assign, check_time, freeze, frozen_array, in_time, rate_of, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,7 +91,6 @@ class Motion:
     def __post_init__(self) -> None:
         time = check_time(self.time, "Motion")
         frames = time.size
-        v = frozen_array(self.v, (frames, None), "Motion.v")
         residual = self.residual if np.size(self.residual) else np.empty((frames, 0))
         determined = np.array(self.determined, dtype=bool) if np.size(self.determined) else np.ones(frames, dtype=bool)
         if determined.shape != (frames,):
@@ -102,13 +101,12 @@ class Motion:
             time=time,
             determined=determined,
             notes=tuple(self.notes),
-            q=frozen_array(self.q, (frames, None), "Motion.q"),
-            v=v,
-            a=frozen_array(self.a, (frames, v.shape[1]), "Motion.a"),
-            residual=frozen_array(residual, (frames, len(self.marker_names)), "Motion.residual"),
+            residual=residual,
             marker_names=tuple(self.marker_names),
             joint_names=tuple(self.joint_names),
         )
+        freeze(self, "Motion", v=(frames, None), q=(frames, None), residual=(frames, len(self.marker_names)))
+        freeze(self, "Motion", a=(frames, self.v.shape[1]))
         if self.joint_names and self._root + len(self.joint_names) != self.q.shape[1]:
             names, columns = len(self.joint_names), self.q.shape[1]
             raise BiodanceError(

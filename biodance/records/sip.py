@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance import display
 from biodance.errors import UnknownName
-from biodance.records.arrays import Array, assign, frozen_array
+from biodance.records.arrays import Array, assign, freeze
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,13 +58,8 @@ class Sip:
 
     def __post_init__(self) -> None:
         n = 10 * len(self.segments)
-        assign(
-            self,
-            segments=tuple(self.segments),
-            phi=frozen_array(self.phi, (n,), "Sip.phi"),
-            covariance=frozen_array(self.covariance, (n, n), "Sip.covariance"),
-            measured=tuple(self.measured),
-        )
+        assign(self, segments=tuple(self.segments), measured=tuple(self.measured))
+        freeze(self, "Sip", phi=(n,), covariance=(n, n))
 
     def __repr__(self) -> str:
         return f"Sip({len(self.segments)} segments, {self.mass.sum():.2f} kg)"

@@ -12,6 +12,7 @@ from biodance.records.arrays import (
     Array,
     assign,
     check_time,
+    freeze,
     frozen_array,
     in_time,
     rate_of,
@@ -192,11 +193,8 @@ class Plate:
     placed: bool = True
 
     def __post_init__(self) -> None:
-        corners, zero = (
-            frozen_array(self.corners, (4, 3), f"{self.name}.corners"),
-            frozen_array(self.zero, (3,), f"{self.name}.zero"),
-        )
-        assign(self, corners=corners, zero=zero, decisions=tuple(self.decisions))
+        assign(self, decisions=tuple(self.decisions))
+        freeze(self, self.name, corners=(4, 3), zero=(3,))
 
     @property
     def tared(self) -> bool:

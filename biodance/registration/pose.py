@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.filters import force_filter, low_pass
-from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench, frozen_array
+from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench, freeze
 from biodance.settings import Settings
 from biodance.spatial import axis_rotation, wrench_about_origin
 
@@ -38,7 +38,7 @@ class FramePose:
     shift: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shift", frozen_array(self.shift, (3,), "FramePose.shift"))
+        freeze(self, "FramePose", shift=(3,))
 
     @property
     def turn(self) -> Array:
@@ -55,9 +55,7 @@ class FramePose:
         return wrench_about_origin(turned, self.shift)
 
     def changed(self, change: Array, about: Array) -> "FramePose":
-        """Return the pose after a ``change`` (4,): x, y m, yaw rad about the vertical through ``about`` (3,) m, delay
-        s.
-        """
+        """Return the pose after a ``change`` (4,): x, y m, yaw rad about the vertical at ``about`` (3,) m, delay s."""
         x, y, yaw, delay = change
         turned = axis_rotation(_UP, np.array([yaw]))[0] @ (self.shift - about) + about
         return FramePose(self.delay + delay, self.yaw + yaw, turned + np.array([x, y, 0.0]))

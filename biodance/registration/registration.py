@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance import display
 from biodance.errors import TrialRefused
-from biodance.records import Array, Plate, frozen_array
+from biodance.records import Array, Plate, freeze
 from biodance.registration.alignment import Alignment
 from biodance.registration.pose import Forces, FramePose
 from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
@@ -84,8 +84,7 @@ class PlacedPlate:
     loaded: bool
 
     def __post_init__(self) -> None:
-        for name in ("position", "sd"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,), f"PlacedPlate.{name}"))
+        freeze(self, "PlacedPlate", position=(3,), sd=(3,))
 
     def document(self) -> dict[str, Any]:
         """Return it as plain values, the unit in the key."""

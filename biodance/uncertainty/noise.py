@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.records import Array, frozen_array
+from biodance.records import Array, freeze
 from biodance.spatial import wrench_shift
 from biodance.uncertainty.bands import WHITE, Bands
 
@@ -24,10 +24,7 @@ class Noise:
     bands: Bands = WHITE
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "covariance", frozen_array(self.covariance, (len(self.bands), 6, 6), "Noise.covariance")
-        )
-        object.__setattr__(self, "about", frozen_array(self.about, (3,), "Noise.about"))
+        freeze(self, "Noise", covariance=(len(self.bands), 6, 6), about=(3,))
 
     @classmethod
     def of_sd(cls, force: float, moment: float, about: Array) -> "Noise":
@@ -61,9 +58,7 @@ class Noise:
         return inverse[band[keep]] @ self.bands.coefficients(shifted)[keep]
 
     def weighted(self, rows: Array) -> Array:
-        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and
-        its transpose.
-        """
+        """S^-1 rows (T, 6, n) of samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and its transpose."""
         white = self.whiten(rows)
         if self.bands.white:
             return np.asarray(self.shift.T @ np.linalg.solve(np.linalg.cholesky(self.covariance[0]).T, white))

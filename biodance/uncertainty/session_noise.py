@@ -39,9 +39,7 @@ _LEVER = 0.03
 
 
 def white_noise(samples: Array) -> Array:
-    """Return the standard deviation (...) of white noise in ``samples`` (T, ...), NaN = not seen; NaN where there are
-    too few.
-    """
+    """Return the standard deviation (...) of white noise in ``samples`` (T, ...), NaN = not seen; NaN if few."""
     change = np.abs(np.diff(samples, n=_ORDER, axis=0))
     enough = np.isfinite(change).sum(axis=0) >= _ENOUGH
     value = np.full(samples.shape[1:], np.nan)
@@ -159,7 +157,5 @@ def with_zeros(known: Tolerances, zeros: Array, mass: float) -> Tolerances:
 
 
 def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:
-    """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg: limits and adequacy
-    follow.
-    """
+    """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg."""
     return replace(known, noise=known.noise + added * (REFERENCE_PERSON / mass) ** 2)

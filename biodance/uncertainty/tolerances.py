@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_rows, error_size
 from biodance.library import locate
-from biodance.records import Array, Index, frozen_array
+from biodance.records import Array, Index, assign, freeze
 
 REFERENCE_PERSON = 70.0
 """kg: the noise is stated for a person of this mass and grows in proportion to it."""
@@ -90,15 +90,10 @@ class Tolerances:
 
     def __post_init__(self) -> None:
         bands = len(self.noise)
-        object.__setattr__(self, "sizes", MappingProxyType(dict(self.sizes)))
-        object.__setattr__(self, "means", MappingProxyType(dict(self.means)))
-        object.__setattr__(self, "accuracy", MappingProxyType(dict(self.accuracy)))
-        object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
-        object.__setattr__(self, "noise", frozen_array(self.noise, (bands, 6, 6), "Tolerances.noise"))
-        zeros = np.broadcast_to(self.zeros, self.noise.shape)
-        object.__setattr__(self, "zeros", frozen_array(zeros, (bands, 6, 6), "Tolerances.zeros"))
-        for name in ("energy", "energy_sd"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (bands, 6), f"Tolerances.{name}"))
+        tables = ("sizes", "means", "accuracy", "norms")
+        assign(self, **{name: MappingProxyType(dict(getattr(self, name))) for name in tables})
+        assign(self, zeros=np.broadcast_to(self.zeros, self.noise.shape))
+        freeze(self, "Tolerances", noise=(bands, 6, 6), zeros=(bands, 6, 6), energy=(bands, 6), energy_sd=(bands, 6))
 
     def size(self, key: str) -> float:
         """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint
@@ -113,9 +108,7 @@ class Tolerances:
         return self.means.get(key, 0.0)
 
     def unlike(self, effect: str) -> float:
-        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other"
-        ones.
-        """
+        """Return the share of its size by which ``effect`` errs beyond noise; else that of "other" ones."""
         return self.accuracy.get(effect, self.accuracy.get("other", 0.0))
 
     def knows(self, effect: str) -> bool:
@@ -129,9 +122,7 @@ class Tolerances:
 
 @cache
 def shipped() -> Tolerances:
-    """Return the tolerances that come with biodance, learned from virtual subjects (``null_sessions.toml`` says
-    which).
-    """
+    """Return the tolerances of biodance, learned from virtual subjects (``null_sessions.toml`` says which)."""
     rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
     return without_habits(replace(rest, sizes=table_sizes()))
 
@@ -253,9 +244,7 @@ def in_state(key: str, joint: str, body: Body) -> str:
 
 
 def mean_key(name: str, target: str, parameter: str) -> str:
-    """Return the key of what is expected of one parameter of an effect: sides of the body each have their own, as
-    signs may be mirrored.
-    """
+    """Return the key of what is expected of one parameter of an effect: each side its own, as signs may be mirrored."""
     plate, colon, rest = target.partition(":")
     return " ".join(filter(None, (name, rest if colon and plate.startswith("plate") else target, parameter)))
 

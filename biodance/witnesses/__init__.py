@@ -19,6 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.discovery import Chosen, Family
+from biodance.records import assign
 from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
 from biodance.witnesses._feet import FootPath
 from biodance.witnesses._recording import ONSET, FootStep, SeenTrial, recording
@@ -66,7 +67,7 @@ class Observation:
     counts: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "norms", MappingProxyType(dict(self.norms)))
+        assign(self, norms=MappingProxyType(dict(self.norms)))
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -21,7 +21,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import Array
+from biodance.records import Array, assign
 
 __all__ = [
     "FAR",
@@ -55,9 +55,7 @@ class Margins:
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
-    """Return a number of a limit: its ``default`` and the range from ``low`` to ``high`` in ``unit`` that a protocol
-    may give it.
-    """
+    """Return a limit's number: ``default`` and the range from ``low`` to ``high`` in ``unit`` it may have."""
     return field(default=default, metadata={"low": low, "high": high, "unit": unit})
 
 
@@ -122,7 +120,7 @@ class Limit(ABC):
         other = copy(self)
         for one in fields(self):
             if one.metadata.get("unit") == "m":
-                object.__setattr__(other, one.name, length * getattr(self, one.name))
+                assign(other, **{one.name: length * getattr(self, one.name)})
         return other
 
     @property

@@ -5,14 +5,14 @@ distances in time. The spline is linear in its points, so a whole trajectory, it
 constant matrices times the points.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from biodance.dance.problem.stance import Phase
 from biodance.errors import BiodanceError
-from biodance.records import Array, frozen_array
+from biodance.records import Array, freeze
 
 _DEGREE = 5
 """Order six: continuous up to the fourth derivative."""
@@ -30,9 +30,7 @@ class Basis:
     acceleration: Array
 
     def __post_init__(self) -> None:
-        for name in ("time", "position", "velocity", "acceleration"):
-            value = getattr(self, name)
-            object.__setattr__(self, name, frozen_array(value, (None,) * np.ndim(value), f"Basis.{name}"))
+        freeze(self, "Basis", **{one.name: (None,) * np.ndim(getattr(self, one.name)) for one in fields(self)})
 
 
 def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
@@ -53,9 +51,7 @@ def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
 
 
 def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
-    """Return the basis of a rest-to-rest transition of ``duration`` s at the instants ``time`` (n,) in [0,
-    duration].
-    """
+    """Return the basis of a rest-to-rest transition of ``duration`` s at instants ``time`` (n,) in [0, duration]."""
     count = via + 6  # two ends with position, velocity and acceleration each, and the via points
     inner = np.linspace(0, duration, count - _DEGREE + 1)[1:-1]
     knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.full(_DEGREE + 1, duration)])

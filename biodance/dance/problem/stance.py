@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.records import SIDES, Array, Index, frozen_array
+from biodance.records import SIDES, Array, Index, assign, freeze
 from biodance.threads import Sendable
 
 if TYPE_CHECKING:
@@ -58,12 +58,8 @@ class Stance(Sendable):
     hands: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "planted", tuple(self.planted))
-        object.__setattr__(self, "ankle", frozen_array(self.ankle, (2, 3), "Stance.ankle"))
-        object.__setattr__(self, "soles", frozen_array(self.soles, (2, None, 3), "Stance.soles"))
-        object.__setattr__(self, "hands", frozen_array(self.hands, (2, 3), "Stance.hands"))
-        props = self.props if np.size(self.props) else np.empty((0, 2))
-        object.__setattr__(self, "props", frozen_array(props, (None, 2), "Stance.props"))
+        assign(self, planted=tuple(self.planted), props=self.props if np.size(self.props) else np.empty((0, 2)))
+        freeze(self, "Stance", ankle=(2, 3), soles=(2, None, 3), hands=(2, 3), props=(None, 2))
 
     @cached_property
     def support(self) -> Array:
@@ -75,9 +71,7 @@ class Stance(Sendable):
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both
-        bases.
-        """
+        """(2,) m middle of the base of support (bounding box); with the weight over one foot: deepest in both."""
         if self.over is not None:
             from scipy.optimize import linprog
 
@@ -186,9 +180,7 @@ def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
 
 
 def hip_width(body: Body) -> float:
-    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where
-    legs are straight.
-    """
+    """Return the distance (m) sideways between the ankles at zero angles: that of the hips where legs are straight."""
     from biodance.motion.kinematics import poses
 
     place = poses(body, body.neutral[None]).position[0]
@@ -230,9 +222,7 @@ def stance_words(stance: Stance) -> str:
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
-    to.
-    """
+    """A stretch of a dance from ``start`` to ``end`` s with the feet unchanged; ``posture`` is held, or moved to."""
 
     start: float
     end: float

@@ -13,7 +13,7 @@ from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.filters import motion_filter
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
 from biodance.motion.regressor import wrench_of_segments
-from biodance.records import Array, Motion, Plate, Trial, Wrench, frozen_array
+from biodance.records import Array, Motion, Plate, Trial, Wrench, freeze
 from biodance.spatial import wrench_about_point
 
 OF_MOTION = ("segments", "poses", "marker_columns", "measured_markers", "marker_residual", "memory")
@@ -41,8 +41,7 @@ class Case:
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
-        object.__setattr__(self, "phi", frozen_array(self.phi, (10 * len(self.body.segments),), "Case.phi"))
-        object.__setattr__(self, "session_time", frozen_array(self.session_time, (frames,), "Case.session_time"))
+        freeze(self, "Case", phi=(10 * len(self.body.segments),), session_time=(frames,))
         if len(self.measured) != frames:
             raise TrialRefused(
                 f"Trial {self.trial.name}: {frames} frames of motion, other samples of force; prepare the trial first."
@@ -61,9 +60,7 @@ class Case:
         return self.needed(self.phi)
 
     def needed(self, phi: Array) -> Array:
-        """Return (T, 6) N, N·m the wrench about the lab origin that the motion needs of the parameters ``phi``
-        (10N,).
-        """
+        """Return (T, 6) N, N·m the wrench about the lab origin the motion needs of parameters ``phi`` (10N,)."""
         return wrench_of_segments(self.body, self.segments, phi)
 
     def needed_by(self, load: Array, segment: int) -> Array:
@@ -103,9 +100,7 @@ class Case:
 
     @cached_property
     def marker_residual(self) -> Array:
-        """(K, 3) m mean over time of measured minus model marker, in the axes of the marker's segment; zero for a
-        marker never seen.
-        """
+        """(K, 3) m mean over time of measured minus model marker, in its segment's axes; zero for one never seen."""
         columns = list(self.marker_columns)
         segment = [self.body.markers.segment[c] for c in columns]
         apart = self.measured_markers - self.poses.points(segment, self.body.markers.position[columns])
@@ -115,9 +110,7 @@ class Case:
 
     @cached_property
     def memory(self) -> dict[str, object]:
-        """What was computed of the motion and the markers and serves again, by name; nothing that depends on forces
-        or parameters.
-        """
+        """What was computed of the motion and the markers , by name; nothing that depends on forces or parameters."""
         return {}
 
     @cached_property
@@ -165,9 +158,7 @@ class Case:
         return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")
 
     def with_parameters(self, phi: Array) -> "Case":
-        """Return the case with the parameters ``phi`` (10N,) in use; what moved joints would do stays while the
-        masses are `ALIKE`.
-        """
+        """Return the case with the parameters ``phi`` (10N,) in use; moved joints' stays while masses are `ALIKE`."""
         known = self.__dict__.get("geometry")
         used = self.body.link_parameters(self.phi) if known is None else known.phi
         before, now = (np.asarray(p)[::10] for p in (used, self.body.link_parameters(phi)))

@@ -18,7 +18,7 @@ from biodance.lab.c3d.raw import RawC3d, read_raw, split_label
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import write_new
-from biodance.records import Array, frozen_array
+from biodance.records import Array, assign, frozen_array
 
 
 def write_relabelled(source: Path, target: Path, names: Mapping[str, str]) -> Path:
@@ -80,7 +80,7 @@ class Output:
     turns: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "value", frozen_array(self.value, (None, 3), f"Output {self.label}"))
+        assign(self, value=frozen_array(self.value, (None, 3), f"Output {self.label}"))
 
 
 @dataclass(frozen=True)
@@ -243,9 +243,7 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
 
 
 def _gathered(group: dict[str, Any], name: str) -> list[str]:
-    """Return a list of texts with its continuations NAME2, NAME3 ..., which are taken out of the group: ezc3d writes
-    them anew.
-    """
+    """Return a list of texts with its continuations NAME2, NAME3 ..., taken out of the group: ezc3d writes them."""
     rest = [text for tail in range(2, 100) for text in group.pop(f"{name}{tail}", {"value": []})["value"]]
     return [*group[name]["value"], *rest]
 

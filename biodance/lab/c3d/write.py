@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
 from biodance.lab.plain_text import write_new
-from biodance.records import Array, Markers, frozen_array
+from biodance.records import Array, Markers, assign, freeze, frozen_array
 
 FileValue = str | Sequence[str] | ArrayLike
 FileParameters = Mapping[str, Mapping[str, FileValue]]
@@ -53,23 +53,18 @@ class PlateRecording:
         if self.type not in CHANNEL_KINDS:
             raise BiodanceError(f"A plate of TYPE {self.type} cannot be written; legal are 1, 2, 3 and 4.")
         count = len(CHANNEL_KINDS[self.type])
-        values = {
-            "corners": frozen_array(self.corners, (4, 3), "PlateRecording.corners"),
-            "origin": frozen_array(self.origin, (3,), "PlateRecording.origin"),
-            "channels": frozen_array(self.channels, (None, count), f"PlateRecording.channels of TYPE {self.type}"),
-            "labels": tuple(self.labels),
-        }
+        channels = frozen_array(self.channels, (None, count), f"PlateRecording.channels of TYPE {self.type}")
+        assign(self, channels=channels, labels=tuple(self.labels))
+        freeze(self, "PlateRecording", corners=(4, 3), origin=(3,))
         if (self.type == 4) != (self.calibration is not None):
             raise BiodanceError(
                 f"A plate of TYPE {self.type} has calibration {self.calibration}; TYPE 4 needs one, no other may have "
                 f"one."
             )
         if self.calibration is not None:
-            values["calibration"] = frozen_array(self.calibration, (6, 6), "PlateRecording.calibration")
+            freeze(self, "PlateRecording", calibration=(6, 6))
         if self.labels and len(self.labels) != count:
             raise BiodanceError(f"A plate of TYPE {self.type} has {len(self.labels)} channel labels, expected {count}.")
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
 
 
 def write_c3d(

@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
 from biodance.lab.plain_text import cells, parse_number, read_text, write_new
-from biodance.records import Array, frozen_array
+from biodance.records import Array, assign, frozen_array
 
 LONGEST_HEADER = 200
 JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writers round the time column
@@ -39,13 +39,7 @@ class TimeTable:
     def __post_init__(self) -> None:
         time = frozen_array(self.time, (None,), "Table.time")
         values = frozen_array(self.values, (time.size, len(self.columns)), "Table.values")
-        for field, value in (
-            ("columns", tuple(self.columns)),
-            ("time", time),
-            ("values", values),
-            ("warnings", tuple(self.warnings)),
-        ):
-            object.__setattr__(self, field, value)
+        assign(self, columns=tuple(self.columns), time=time, values=values, warnings=tuple(self.warnings))
         if len(set(self.columns)) != len(self.columns):
             raise BiodanceError(f"Table {self.name}: a column label occurs twice in {', '.join(self.columns)}.")
 
@@ -91,9 +85,7 @@ def read_mot(path: str | Path) -> TimeTable:
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
-    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a
-    wrong header.
-    """
+    """Return the column labels of a .mot or .sto file without ``time``; FileRefused for a wrong header."""
     return tuple(_parts(Path(path))[1][1:])
 
 
@@ -129,9 +121,7 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
 
 
 def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
-    """Return the header (keys in lower case, the name of the table under ""), the column labels, and the numbered
-    rows below them.
-    """
+    """Return the header (lower-case keys, the table's name under ""), column labels, and numbered rows below."""
     rows = read_text(path).splitlines()
     start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
     if start is None:

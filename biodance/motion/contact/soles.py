@@ -8,7 +8,7 @@ from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import MarkerSet, landmark
 from biodance.motion.kinematics import in_blocks, poses
-from biodance.records import SIDES, Array, Markers, Motion, frozen_array
+from biodance.records import SIDES, Array, Markers, Motion, freeze
 
 OUTLINE = np.array([[0.0, 0.17], [0.0, -0.17], [0.6, -0.21], [1.0, -0.23], [1.25, 0.0], [1.0, 0.23], [0.6, 0.21]])
 """(P, 2) outline of a sole, in units of the horizontal distance from the heel to the toe marker: forwards from the heel
@@ -30,9 +30,7 @@ class Soles:
     outline: Array
 
     def __post_init__(self) -> None:
-        time = frozen_array(self.time, (None,), "Soles.time")
-        object.__setattr__(self, "time", time)
-        object.__setattr__(self, "outline", frozen_array(self.outline, (time.size, 2, None, 3), "Soles.outline"))
+        freeze(self, "Soles", time=(None,), outline=(np.size(self.time), 2, None, 3))
 
     @property
     def centre(self) -> Array:

@@ -9,7 +9,7 @@ from biodance.body.body import Body
 from biodance.motion.ik.chart import Chart, chart_of
 from biodance.motion.ik.compiled import newton
 from biodance.motion.ik.compiled.chain import MarkerChain, chain_of
-from biodance.records import Array, Index
+from biodance.records import Array, Index, assign
 
 _STEPS = 200
 """Most Newton steps of a frame."""
@@ -33,13 +33,11 @@ class MarkerProblem:
         """Keep ``xyz`` as a view that nothing writes to: one type for the compiled code, whatever was given."""
         view = self.xyz.view()
         view.flags.writeable = False
-        object.__setattr__(self, "xyz", view)
+        assign(self, xyz=view)
 
 
 class Minimum(NamedTuple):
-    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, largest projected gradient; ``steps``
-    (B,) steps tried.
-    """
+    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, projected gradient; ``steps`` (B,) tried."""
 
     q: Array
     cost: Array
@@ -72,9 +70,7 @@ def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: flo
 
 
 def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, steps: int = _STEPS) -> Minimum:
-    """Return the minima (F frames) of ``frames`` (F,) reached from the postures ``start`` (F, nq) in at most
-    ``steps`` steps.
-    """
+    """Return the minima (F frames) of ``frames`` (F,) reached from ``start`` (F, nq) in at most ``steps`` steps."""
     count, joints = len(frames), len(problem.chain.lower)
     q = np.array(start, order="C")
     angles = q[:, q.shape[1] - joints :]

@@ -55,9 +55,7 @@ def figure(height: float, *, width: float = FIGURE_WIDTH) -> "Figure":
 
 
 def svg_address(drawn: "Figure") -> str:
-    """Return ``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same
-    characters.
-    """
+    """``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same characters."""
     stream = BytesIO()
     with look():
         drawn.savefig(stream, format="svg", metadata={"Date": None})

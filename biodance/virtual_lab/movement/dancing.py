@@ -18,7 +18,7 @@ from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array, Motion, frozen_array
+from biodance.records import SIDES, Array, Motion, freeze
 from biodance.virtual_lab.movement.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
 from biodance.virtual_lab.movement.performance import MARGIN, NODE_RATE, Performance, keep_balance
 from biodance.virtual_lab.movement.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body
@@ -109,8 +109,7 @@ class Shown:
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size
-        for name, shape in (("ankle", (2, 3)), ("raised", (frames, 2)), ("pressure", (frames, 2))):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, f"Shown.{name}"))
+        freeze(self, "Shown", ankle=(2, 3), raised=(frames, 2), pressure=(frames, 2))
 
     def plan(self, seconds: float) -> TrialPlan:
         """Return the trial of a performance that takes ``seconds``."""

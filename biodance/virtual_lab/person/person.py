@@ -9,7 +9,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
-from biodance.records import SIDES, Array, Sip, Subject, frozen_array
+from biodance.records import SIDES, Array, Sip, Subject, freeze
 from biodance.virtual_lab.person.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
 from biodance.virtual_lab.person.placement import glue_markers
 from biodance.virtual_lab.person.skeleton import (
@@ -39,8 +39,7 @@ class AddedLoad:
             raise UnknownName.of("segment of the true body", self.segment, TRUE_SEGMENTS)
         if not 0 < self.mass < 30:
             raise BiodanceError(f"AddedLoad on {self.segment}: mass = {self.mass} kg; legal: above 0 and below 30 kg.")
-        for name in ("place", "radii"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), (3,), f"AddedLoad.{name}"))
+        freeze(self, "AddedLoad", place=(3,), radii=(3,))
 
 
 @dataclass(frozen=True)
@@ -163,9 +162,7 @@ def _box(phi: Array) -> Array:
 
 
 def _sole(size: Proportions, side: str) -> Foot:
-    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al.
-    2017).
-    """
+    """Return a foot's outline on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al. 2017)."""
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
     corners = [
         (back, 0.6 * half),

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.records import Array, Markers, Role, frozen_array
+from biodance.records import Array, Markers, Role, assign, frozen_array
 from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
 from biodance.virtual_lab.movement.protocol import TrialPlan
@@ -94,9 +94,7 @@ class Laboratory:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are
-    functions of this record.
-    """
+    """One trial as the instruments deliver it, unwritten; ``parameters`` of the C3D file. Faults map this record."""
 
     name: str
     role: Role
@@ -132,7 +130,7 @@ class LabVisit:
     marker_shifts: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tolerances", self.tolerances or self.laboratory.tolerances)
+        assign(self, tolerances=self.tolerances or self.laboratory.tolerances)
 
 
 FIRST_VISIT = LabVisit()
@@ -141,9 +139,7 @@ FIRST_VISIT = LabVisit()
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under
-    the markers.
-    """
+    """A visit's true instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, skin under markers."""
 
     visit: LabVisit
     plates: tuple[TruePlate, ...]
@@ -189,9 +185,7 @@ def _places(laboratory: Laboratory) -> list[tuple[str, Array, Array]]:
 
 
 def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
-    """Let the person perform one trial where the laboratory's plates are, with the forces and the moved markers of
-    the visit.
-    """
+    """Let the person perform a trial where the plates are, with the forces and the moved markers of the visit."""
     visit = instruments.visit
     lab = visit.laboratory
     if plan.role != "static":
@@ -239,9 +233,7 @@ def record(performance: Performance, instruments: Instruments) -> Recording:
 def measurements(
     person: Person, session: int, tolerances: LabTolerances
 ) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
-    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of
-    tape and calliper.
-    """
+    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with their errors."""
     rng = stream(person.seed, "measurements", str(session))
     size = person.size
     sided = {
