@@ -20,7 +20,7 @@ from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Gate, effects
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.attention import headline, is_well, session_attention, told
-from biodance.pipeline.finding_words import EXPLAINS
+from biodance.pipeline.finding_words import EXPLAINS, in_words
 from biodance.pipeline.trial_result import Check
 from biodance.records import Motion, Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
@@ -223,6 +223,14 @@ def test_a_size_that_is_hardly_known_says_so() -> None:
     line = headline(Diagnosis("named, complete", (shaky,)), "80 s of movement", (STATIC,), ())
     assert "hardly known" in line.text
     assert "hardly known" not in headline(Diagnosis("named, complete", (FOUND,)), "80 s", (STATIC,), ()).text
+
+
+@pytest.mark.parametrize(("late", "told"), [(0.034, "forces late"), (-0.034, "forces early")])
+def test_a_delay_says_in_words_which_way_it_goes(late: float, told: str) -> None:
+    delayed = Finding("time_delay", "", (Estimate("delay", late, 0.004, "s"),), (Alias("time_delay", "", 80.0),), 0.9)
+    assert in_words(delayed) == f"time delay (delay {1000 * late:.0f} ± 4 ms; {told})"
+    unsure = replace(delayed, parameters=(Estimate("delay", late, 0.03, "s"),))
+    assert told not in in_words(unsure)
 
 
 def test_a_poor_model_resembles_and_is_no_finding() -> None:

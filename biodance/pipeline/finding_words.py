@@ -30,6 +30,8 @@ EXPLAINS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Causes that a check outside its limit may come from, by the beginning of the check's name."""
+SIGNS = {"time_delay": ("forces late", "forces early")}
+"""What a positive and a negative size of a cause's first parameter mean, where the number alone does not say it."""
 
 
 def in_words(finding: Finding) -> str:
@@ -42,7 +44,8 @@ def in_words(finding: Finding) -> str:
     known = [p.known for p in finding.parameters if p.sd == p.sd]
     if not known:
         return name
-    return f"{name} ({', '.join(map(_size, told))}{'' if any(known) else '; its size is hardly known'})"
+    sure = SIGNS.get(finding.effect, ("", ""))[told[0].value < 0] if any(known) else "its size is hardly known"
+    return f"{name} ({', '.join(map(_size, told))}{sure and f'; {sure}'})"
 
 
 def _elsewhere(finding: Finding) -> str:
