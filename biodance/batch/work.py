@@ -26,7 +26,9 @@ Rows = tuple[dict[str, Any], ...]
 
 
 class SessionStatus(StrEnum):
-    """What became of a session. Refused: the recordings cannot be used. Failed: biodance, or the machine, gave up."""
+    """What became of a session. Refused: the recordings cannot be used. Failed: biodance, or the machine, did not get
+    through.
+    """
 
     DONE = "done"
     NEEDS_A_PERSON = "needs a person"

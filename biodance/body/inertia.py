@@ -16,7 +16,9 @@ TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 @dataclass(frozen=True, eq=False)
 class RigidInertia:
-    """A rigid lump: ``mass`` kg, ``com`` (3,) m, ``inertia`` (3, 3) kg·m² about the CoM, in one frame."""
+    """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM, axes of that
+    frame.
+    """
 
     mass: float
     com: Array
@@ -77,14 +79,18 @@ PSEUDO_INERTIA = _pseudo_inertia_map()
 
 
 def shift_matter(shift: Array) -> Array:
-    """Return the map (10, 10) of the ten parameters when matter moves by ``shift`` (3,) m in the segment's frame."""
+    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's
+    frame.
+    """
     move = np.eye(4)
     move[:3, 3] = shift
     return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
 
 
 def pseudo_inertia(phi: Array) -> Array:
-    """Return pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass kg."""
+    """Return the pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass
+    kg.
+    """
     return (phi.reshape(-1, 10) @ PSEUDO_INERTIA.T).reshape(-1, 4, 4)
 
 

@@ -190,7 +190,9 @@ class JointTree:
 
     @cached_property
     def sharing(self) -> Array | None:
-        """(10 (N + P), 10 N): the parameters of the `links` from those of the whole segments; None without parts."""
+        """(10 (N + P), 10 N): the parameters of the `links` from those of the segments, each of which means the whole;
+        None without parts.
+        """
         if not self.parts:
             return None
         count = 10 * len(self.segments)

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 def examine_robot(
     recording: Path, results: Results, robot: RobotFile, for_people: tuple[str, ...]
 ) -> "tuple[RobotResult, Path, dict[str, Any]]":
-    """Return what is in a recording, its folder and numbers; options ``for_people`` are refused."""
+    """Return what a recording says, the folder it is written to, and its numbers; options ``for_people`` are
+    refused.
+    """
     from biodance.errors import BiodanceError
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.dance import named_feet

@@ -139,7 +139,9 @@ def _reach(height: Array, level: float, start: int, step: int) -> int | None:
 
 
 def _still_before(centre: Array, motion: Motion, leaves: int) -> int:
-    """Return the last frame before ``leaves`` at which the centre of mass rested; the trial's first without one."""
+    """Return the last frame before ``leaves`` at which the centre of mass was at rest; the first of the trial without
+    one.
+    """
     speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
     rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
     return int(rest[-1]) if rest.size else 0
@@ -171,7 +173,9 @@ STRIDE_UNITS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Stride:
-    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); those not told lack."""
+    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that the trial does not tell is
+    missing.
+    """
 
     cycle: Cycle
     values: Mapping[str, float]

@@ -65,7 +65,9 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
 def _without_short(
     loaded: "np.ndarray[tuple[int], np.dtype[np.bool_]]", shortest: float
 ) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-    """Return ``loaded`` (T,) without gaps and without contacts shorter than ``shortest`` frames; ends stay."""
+    """Return ``loaded`` (T,) without gaps and without contacts shorter than ``shortest`` frames; the ends of the
+    trial stay.
+    """
     kept = loaded.copy()
     for value in (False, True):
         for start, stop in runs(kept == value):
@@ -132,7 +134,9 @@ def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
 
 
 def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[Array, Array]:
-    """Return by how much strikes and leavings (n,) s come later by markers than by forces, where both see one."""
+    """Return by how much the strikes and the leavings (n,) s come later by markers than by forces, where both see
+    one.
+    """
     late: dict[bool, list[float]] = {True: [], False: []}
     for event in force:
         same = [other.time - event.time for other in markers if (other.side, other.down) == (event.side, event.down)]

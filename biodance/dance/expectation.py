@@ -85,7 +85,9 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
 
 
 def typical_noise(about: Array) -> Noise:
-    """Return the noise of a typical session about the standing point ``about`` (3,) m, variance by the rate."""
+    """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance
+    grows with the rate.
+    """
     covariance = _RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
     return Noise(covariance, about, Bands(BANDS.edges, _RATE))
 
@@ -127,7 +129,9 @@ def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
 
 
 def parameter_deviations(belief: Posterior) -> Array:
-    """Return the sd (N, 3) of mass kg, CoM m (per axis) and moments of inertia kg·m² of every segment."""
+    """Return the standard deviations (N, 3) of mass kg, CoM m (per axis) and moments of inertia kg·m² of every
+    segment.
+    """
     out = []
     for first in range(0, belief.prior.phi.size, 10):
         cut = slice(first, first + 10)

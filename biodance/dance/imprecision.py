@@ -146,7 +146,9 @@ class PlannedDance:
         return np.where(during, 0.0, rise), ankle
 
     def _tops(self, x: Array, up: Array, ankle: Array) -> Array:
-        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a raised foot gives way."""
+        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a foot that is up gives
+        way.
+        """
         turn, tops = self.chain.root_rotation(x), []
         for side in (0, 1):
             leg = self.chain.legs[side]
@@ -176,7 +178,9 @@ class PlannedDance:
         return self._copied(times, places, errors, sways, how)
 
     def held_by(self, count: int, when: Array, how: Imprecision = USUAL_IMPRECISION) -> Copied:
-        """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, in turn."""
+        """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by
+        instant.
+        """
         rng, when = np.random.default_rng(0), np.repeat(when, count)
         error = how.tracking * rng.normal(size=(when.size, self.chain.size - 3))
         sway = how.sway * rng.normal(size=(when.size, 2))

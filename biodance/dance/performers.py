@@ -126,7 +126,9 @@ _Person = tuple[np.random.Generator, Array, Array, slice]
 
 
 def _person(dance: Dance, k: int, seed: int, only: tuple[int, ...], how: Imprecision) -> _Person:
-    """Return performer ``k`` and the instants of dancing to or in the postures ``only``, and two beyond."""
+    """Return performer ``k``, and the instants at which he or she dances to or in the postures ``only``, and two beyond
+    for differences.
+    """
     time, when = draw_clock(np.random.default_rng([seed, 7, k]), dance.duration, how)
     part = slice(None)
     if only:

@@ -89,7 +89,9 @@ def _mujoco() -> Any:
 
 
 def floor_model(body: Body, *, friction: float = 0.5) -> Any:
-    """Return the MuJoCo model of ``body`` with contact points at its soles' corners, on a floor with ``friction``."""
+    """Return the MuJoCo model of ``body`` with contact points at the corners of its soles, on a floor with Coulomb
+    ``friction``.
+    """
     mujoco = _mujoco()
     spec = mujoco.MjSpec.from_string(mjcf.text(body, "biodance playback"))
     spec.option.timestep, spec.option.integrator = _STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -185,7 +187,9 @@ def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: 
 
 
 class _Driver:
-    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; sets its dampers."""
+    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; gives the model its
+    dampers.
+    """
 
     def __init__(self, body: Body, model: Any) -> None:
         self.body, self.model = body, model
@@ -197,7 +201,9 @@ class _Driver:
         model.dof_armature[self.v_place] = ROTOR
 
     def place(self, data: Any, q: Array, v: Array) -> None:
-        """Put the body in a configuration of Pinocchio's order (quaternion x y z w, velocity in the root's frame)."""
+        """Put the body into a configuration of Pinocchio's order (quaternion x y z w, root velocity in the root's
+        frame).
+        """
         data.qpos[:3], data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
         data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
         data.qvel[3:6] = v[3:6]

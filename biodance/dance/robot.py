@@ -202,7 +202,9 @@ def robot_rows(body: Body, motion: Motion, wrench: Array) -> Array:
 
 
 def expect_robot(dance: Dance, *, steps: int = 10) -> Expectation:
-    """Return what is expected after ``steps`` durations of ``dance``, spread over its postures, danced exactly."""
+    """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures, if it is danced
+    exactly.
+    """
     body, motion = dance.body, dance.motion(_RATE)
     rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
     ends = [phase.end for phase in dance.phases if phase.kind == "hold"]

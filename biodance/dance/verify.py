@@ -26,7 +26,9 @@ JUMP = 1e-6
 
 @dataclass(frozen=True)
 class Margin:
-    """What is left of one limit: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what``."""
+    """What is left of one limit at its worst: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what``
+    (a joint, a pair).
+    """
 
     limit: str
     worst: float
@@ -50,13 +52,17 @@ def verify(
 
 
 def verify_with(workers: Executor, body: Body, dance: Dance, limits: tuple[Limit, ...]) -> tuple[Margin, ...]:
-    """Return what `verify` does, found by two ``workers`` side by side, each at every second phase."""
+    """Return what `verify` does, found by two ``workers`` side by side: one looks at every second phase, one at the
+    others.
+    """
     tasks = [workers.submit(verify, body, dance, limits, part=slice(first, None, 2)) for first in range(2)]
     return _least(margin for task in tasks for margin in task.result())
 
 
 def _least(margins: Iterable[Margin]) -> tuple[Margin, ...]:
-    """Return the worst margin of every limit, by name; of equal ones the first in time; NaN is the worst."""
+    """Return the worst margin of every limit, by name; of equal ones the first in time; one that is no number is the
+    worst.
+    """
     worst: dict[str, Margin] = {}
     for margin in sorted(margins, key=lambda one: (np.nan_to_num(one.worst, nan=-np.inf), one.where_s)):
         worst.setdefault(margin.limit, margin)

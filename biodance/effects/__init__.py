@@ -88,7 +88,9 @@ def effect(name: str) -> Effect:
 def gates(
     session: Session, cases: tuple[Case, ...] = (), *, chosen: Chosen[Cause | type[Cause]] = None
 ) -> tuple[Gate, ...]:
-    """Return all checks of a session, the bad ones first; ``chosen`` limits or extends the effects (`causes`)."""
+    """Return all checks of a session, those that are not well first; ``chosen`` limits or extends the effects
+    (`causes`).
+    """
     recorded = Recorded(session, cases)
     found = [
         replace(gate, advice=kind.advice) for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)

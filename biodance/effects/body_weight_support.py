@@ -58,7 +58,9 @@ class BodyWeightSupport(Effect):
         return -wrench_of_force(pull[:, None] * (hook - point), point)
 
     def _tied(self, case: Case, high: float) -> tuple[Array, float]:
-        """Return where the rope is tied (T, 3) m, and how high over the floor that is on a person upright."""
+        """Return where the rope is tied (T, 3) m, and how high over the floor that is on a person who stands
+        upright.
+        """
         body, index = case.body, case.body.segment_index(self.target)
         place = case.phi[None, 10 * index + 1 : 10 * index + 4] / case.phi[10 * index] + [0.0, high, 0.0]
         standing = poses(body, body.neutral)
@@ -70,7 +72,9 @@ class BodyWeightSupport(Effect):
         return bool(theta[0] > 0)
 
     def possible_in(self, case: Case, theta: Array) -> bool:
-        """Return whether the rope carries no more than the person weighs, and is tied within its segment."""
+        """Return whether the rope carries no more than the person weighs, and is tied to its segment, not beyond its
+        ends.
+        """
         index = case.body.segment_index(self.target)
         low, high = case.body.boxes[index, :, 1]
         tied = case.phi[10 * index + 2] / case.phi[10 * index] + theta[2]

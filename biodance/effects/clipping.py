@@ -62,7 +62,9 @@ class Clipping(DiscreteEffect):
 
 
 def clipped(trial: Trial) -> list[tuple[str, float]]:
-    """Return target and level of every channel that clips, about the plate's centre, lab axes, zero in it."""
+    """Return target and level of every channel that clips, about the plate's centre in lab axes and with its zero
+    still in it.
+    """
     found = []
     for plate in trial.plates:
         channels = wrench_about_point(plate.wrench.value, plate.centre)

@@ -45,7 +45,9 @@ class ExternalContact(Effect):
         return tuple(name for i, name in enumerate(body.segments) if i not in inner or i == 0)
 
     def columns(self, case: Case) -> Array:
-        """Return minus the wrench of a unit force at the contact: what another support carries, the plates miss."""
+        """Return minus the wrench of a unit force at the contact point: what another support carries, the plates
+        miss.
+        """
         index = case.body.segment_index(self.target)
         low, high = case.body.boxes[index]
         far = 0.5 * (low + high)

@@ -54,7 +54,9 @@ class FrameRate(DiscreteEffect):
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
-        """Return whether accelerations have the size that forces need, and whether the delay is constant."""
+        """Return whether accelerations have the size that forces need, and whether the delay is the same from start
+        to end.
+        """
         cut = {trial.name for trial in recorded.session.trials if clipped(trial)}
         whole = [case for case in recorded.cases if case.trial.name not in cut]
         parts = [(case, part) for case in whole if (part := moving_parts(case)) is not None]

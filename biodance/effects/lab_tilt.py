@@ -26,7 +26,9 @@ class LabTilt(Effect):
         return ("x", "y")
 
     def columns(self, case: Case) -> Array:
-        """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, as its moment."""
+        """Return the change of the predicted wrench per radian: the weight turns by axis x gravity, and its moment
+        with it.
+        """
         turned = np.cross(axis_vector(self.target), case.body.gravity)
         table = case.body.link_parameters(case.phi).reshape(-1, 10)
         move = case.segments

@@ -45,7 +45,9 @@ class LabelsSwapped(DiscreteEffect):
 
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
-        """Return the pairs that the markers of each trial show, or, without, those whose exchange fits."""
+        """Return the pairs that the markers of each trial show, and where they show none those whose exchange makes
+        the body fit.
+        """
         found = exchanges(recorded)
         where: dict[Pair, list[str]] = {}
         for name, pairs in found.items():
@@ -156,7 +158,9 @@ def exchanged(case: Case) -> tuple[tuple[str, str], ...]:
 
 
 def _misfit(body: Body, markers: Markers, frames: Array) -> float:
-    """Return the mean square distance (m²) of some frames' markers to the body; infinite where undetermined."""
+    """Return the mean square distance (m²) of some frames' markers to the body; infinite where they do not determine
+    it.
+    """
     some = Markers(markers.names, markers.time[frames], markers.xyz[frames])
     try:
         return float(np.nanmean(solve_ik(body, some, tolerance=ROUGH).residual ** 2))

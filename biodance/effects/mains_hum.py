@@ -50,7 +50,9 @@ class MainsHum(DiscreteEffect):
 
 
 def lines(trial: Trial) -> dict[tuple[str, float], float]:
-    """Return the amplitude (N, N·m) by channel and frequency (Hz) of the mains; 0 without a line."""
+    """Return the amplitude (N, N·m) by channel and frequency (Hz) of the mains; 0 where no line stands over its
+    neighbours.
+    """
     found = {}
     for plate in trial.plates:
         if not _fast_enough(plate.wrench.rate, plate.wrench.time.size):
@@ -65,7 +67,9 @@ def lines(trial: Trial) -> dict[tuple[str, float], float]:
 
 
 def line(values: Array, rate: float, frequency: float) -> tuple[Array, Array]:
-    """Return the amplitude (n,) of the line within 0.7 Hz of ``frequency``, and the median 2 to 8 Hz beside."""
+    """Return the amplitude (n,) of the line within 0.7 Hz of ``frequency``, and the median of the spectrum 2 to 8 Hz
+    beside it.
+    """
     window = np.hanning(len(values))
     spectrum = (
         2

@@ -39,7 +39,9 @@ class MarkerMisplaced(Effect):
         return tuple(markers.names[c] for c in case.marker_columns if markers.weight[c] > 0)
 
     def columns(self, case: Case) -> Array:
-        """Return the change of the wrench with the posture the true place gives, per metre; 0 without the marker."""
+        """Return the change of the wrench with the posture that the marker at its true place gives, per metre; zero
+        without the marker.
+        """
         own = self._own(case)
         if own is None:
             return np.zeros((case.motion.time.size, 6, 3))

@@ -28,7 +28,9 @@ class PlateDrift(ChannelEffect):
     advice = "Let the plate warm up, zero it before each trial."
 
     def in_channel(self, case: Case) -> Array:
-        """Return session time minus one half; zero in a trial that saw the plate empty, whose reading was taken off."""
+        """Return session time minus one half; zero in a trial that saw the plate empty: there its reading was taken
+        off.
+        """
         return (case.session_time - 0.5) * (not self.plate_of(case).tared)
 
 

@@ -53,7 +53,9 @@ class SloshingLoad(Effect):
         return tuple(name for name in case.body.segments if name in _CARRIERS) or case.body.segments
 
     def columns(self, case: Case) -> Array:
-        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for frequency and place."""
+        """Return the wrench per kilogram carried, and per kilogram that sloshes; nothing for frequency and place of
+        what is not there.
+        """
         rigid, sloshing = self._parts(case, _FREQUENCY, 0.0)
         return np.stack([rigid, sloshing, np.zeros_like(rigid), np.zeros_like(rigid)], axis=2)
 
@@ -97,7 +99,9 @@ def _frequency(theta: Array) -> float:
 
 
 def carried_at(case: Case, index: int) -> Array:
-    """Return where a load sits (3,) m in a segment's frame: mid back of trunk and pelvis, far end of others."""
+    """Return where a load sits (3,) m in a segment's frame: the middle of the back of trunk and pelvis, the far end
+    of others.
+    """
     low, high = case.body.boxes[index]
     place = np.array(0.5 * (low + high))
     if case.body.segments[index] in ("pelvis", "trunk_head"):

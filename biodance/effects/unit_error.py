@@ -64,7 +64,9 @@ class UnitError(DiscreteEffect):
 
 
 def weight_ratio(trial: Trial, mass: float) -> float | None:
-    """Return the loaded plates' vertical force over the weight of ``mass`` kg (median); None if not steady."""
+    """Return the loaded plates' vertical force over the weight of ``mass`` kg (median); None where it is no steady
+    whole.
+    """
     if not trial.plates or any(p.wrench.time.shape != trial.plates[0].wrench.time.shape for p in trial.plates):
         return None
     vertical = np.sum([plate.wrench.value[:, 2] for plate in trial.plates], axis=0)

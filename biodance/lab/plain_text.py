@@ -101,7 +101,9 @@ def read_text(path: Path) -> str:
 
 
 def cells(line: str) -> list[str]:
-    """Return the cells of one row: between tabs if there are any (a cell may be empty), else between runs of blanks."""
+    """Return the cells of one row: between tabs where there are tabs (a cell may be empty), else between runs of
+    blanks.
+    """
     return [cell.strip() for cell in line.rstrip("\r\n").split("\t")] if "\t" in line else line.split()
 
 

@@ -132,7 +132,9 @@ def read_enf(path: str | Path) -> EclipseNotes:
 
 
 def _in_si(values: dict[str, float]) -> dict[str, float]:
-    """Return lengths in m and masses in kg by the names of the PROCESSING group, without angles, flags and zeros."""
+    """Return the lengths in m and the masses in kg under the names of the PROCESSING group, without angles, flags
+    and zeros.
+    """
     measures: dict[str, float] = {}
     for name, value in values.items():
         short = _SIDE.sub(lambda side: side[1][0], name)

@@ -113,7 +113,9 @@ def _beyond(values: Array, period: int, count: int) -> Array:
 
 
 def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), free at both ends."""
+    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), free at both
+    ends.
+    """
     free = np.zeros(len(values))
     ends = [(3, free), (4, free)]
     spline = make_interp_spline(time, values.T, k=_DEGREE, bc_type=(ends, ends))

@@ -71,7 +71,9 @@ def is_well(one: Diagnosis) -> bool:
 
 
 def amount(result: SessionResult, judged: tuple[Judged, ...]) -> str:
-    """Say what was judged: ``3 s of standing (static) and 12 s of movement (walk_1, walk_2)``; "" for nothing."""
+    """Return what was judged in words: ``3 s of standing (static) and 12 s of movement (walk_1, walk_2)``; "" for
+    nothing.
+    """
     static = {one.trial.name for one in result.trials if one.trial.role == "static"}
     parts = []
     for quiet, what in ((True, "standing"), (False, "movement")):

@@ -105,7 +105,9 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
 
 
 def lab_text(earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrection, ...]) -> str:
-    """Return the lab.toml that holds what was corrected ``earlier`` and lasts of the ``accepted``; "" for nothing."""
+    """Return the lab.toml that holds what was corrected ``earlier`` and what lasts of what was ``accepted``; "" for
+    nothing.
+    """
     lasting = tuple(one for one in accepted if one.effect in LASTING)
     return corrections_text(joined_corrections(earlier, lasting))
 

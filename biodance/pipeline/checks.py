@@ -84,7 +84,9 @@ def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[
 
 
 def trial_checks(result: TrialResult, mass: float) -> list[Check]:
-    """Check marker distances, gaps, measured frames and forces of one trial; ``mass`` kg of the body."""
+    """Check marker distances, gaps, measured frames and forces of one trial; ``mass`` kg of the body, for the body
+    weight.
+    """
     name, limits, found = result.trial.name, result.trial.settings.checks, []
     if result.fit:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"

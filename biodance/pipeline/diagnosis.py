@@ -251,7 +251,9 @@ def _cannot_tell(checks: tuple[Gate, ...], *notes: str) -> Diagnosis:
 
 
 def _disbelieved(one: Diagnosis) -> Diagnosis:
-    """Return the diagnosis without its names, which are only resembled: their tolerances do not hold here."""
+    """Return the diagnosis without its names, which are only resembled: the tolerances under which they were found do
+    not hold here.
+    """
     alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.resembles)
     if not alike:
         return one
@@ -259,7 +261,9 @@ def _disbelieved(one: Diagnosis) -> Diagnosis:
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
-    """Return what an earlier session lets expect of the body, or the body it started from; None without."""
+    """Return what an earlier session lets expect of the body, or the body that the session started from; None without
+    either.
+    """
     if reference is None or result.identification is None or reference.identification.status == "failed":
         return result.prior
     return expect_unloaded(reference.identification, result.identification.identification)
@@ -282,7 +286,9 @@ def _reasons(result: SessionResult) -> str:
 
 
 def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
-    """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify."""
+    """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify
+    from.
+    """
     before = result.identification.identification if result.identification else None
     if not examined.diagnosis.findings or before is None:
         return SessionDiagnosis(examined.diagnosis, examined, before)

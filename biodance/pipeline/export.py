@@ -236,7 +236,9 @@ def body_of_result(result: SessionResult) -> tuple[Body, str]:
 
 @contextmanager
 def replaceable(out: Path, *, force: bool) -> Iterator[Path]:
-    """Yield the path to write to: ``out``, or with ``force`` a path beside it that replaces ``out`` once written."""
+    """Yield the path to write to: ``out``, or with ``force`` a path beside it that replaces an existing ``out`` once
+    all is written.
+    """
     if not (force and out.is_file()):
         yield out
         return

@@ -257,7 +257,9 @@ def examined_visit(
     lab: str | Path | None = None,
     tell: _Tell = _silent,
 ) -> SessionResult:
-    """Return the visit with all stages done; examined again only where ``body`` or ``lab`` change it."""
+    """Return the visit with all stages done; one that was examined already is examined again only where ``body`` or
+    ``lab`` change it.
+    """
     carried, known = read_lab(lab), known_body(body)
     if isinstance(session, SessionResult) and known is None and not carried.corrections:
         return session if reference is None else _beside(session, reference)

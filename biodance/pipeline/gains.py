@@ -32,7 +32,9 @@ class Accepted:
 
 @dataclass(frozen=True, eq=False)
 class _Corrected:
-    """A session corrected for causes: the ``identified`` body and what it leaves of trials ``used`` and ``kept``."""
+    """A session corrected for some causes: the body ``identified`` and what it leaves of the trials ``used`` and
+    ``kept``.
+    """
 
     identified: Identification
     used: Residuals

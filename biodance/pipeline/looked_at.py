@@ -80,7 +80,9 @@ def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Lo
 
 
 def looked_at(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
-    """Return the trials to look at: those to fit, else those kept, with quiet standing where they are short."""
+    """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are
+    short.
+    """
     roles = FITTED_ROLES if looks(results, FITTED_ROLES) else KEPT_ROLES
     moving = looks(results, roles)
     return moving if sum(map(seconds_of, moving)) >= _ENOUGH else looks(results, ("static", *roles))
@@ -230,7 +232,9 @@ _NEVER = "it holds no measured ground contact"
 
 
 def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged, ...]:
-    """Return for every trial and refused file how many seconds of it are judged in ``used``, or why it is not."""
+    """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
+    is not.
+    """
     seconds = {look.trial.name: seconds_of(look) for look in used}
     why = reasons_left_out(result.trials)
     kept = {look.trial.role for look in used if seconds[look.trial.name] > 0}

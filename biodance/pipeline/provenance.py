@@ -82,7 +82,9 @@ def _name(path: Path, folder: Path) -> str:
 
 @cache
 def commit(package: Path = PACKAGE) -> str:
-    """Return the git commit of the checkout that holds ``package``, with "+changed" if changed; else "unknown"."""
+    """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else
+    "unknown".
+    """
     if not (package.parent / ".git").exists():
         return _UNKNOWN
     try:

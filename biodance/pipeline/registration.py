@@ -143,7 +143,9 @@ def _moving(markers: Path, forces: Path, tell: Callable[[str], None]) -> _Moving
 
 
 def _chosen(session: Session, markers: Path, forces: Path) -> Trial:
-    """Return the trial of a marker file; in a folder the moving trial called as the force file, else the only one."""
+    """Return the trial of a marker file; in a folder the moving trial that is called as the force file, else the only
+    one.
+    """
     if not markers.is_dir():
         same = [trial for trial in session if trial.source.path.resolve() == markers.resolve()]
         if not same:

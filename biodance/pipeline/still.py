@@ -32,7 +32,9 @@ def _parents(body: Body) -> list[int]:
 
 
 def _tip(box: Array) -> Array:
-    """Return the end (3,) m of a segment, in the face of its ``box`` (2, 3) farthest from the origin."""
+    """Return the end (3,) m of a segment without child: the middle of the face of its ``box`` (2, 3) that lies
+    farthest from the origin.
+    """
     middle = box.mean(axis=0)
     side, axis = np.unravel_index(np.argmax(np.abs(box)), box.shape)
     middle[axis] = box[side, axis]
@@ -123,7 +125,9 @@ def posture_still(body: Body, q: Array, title: str) -> Still:
 
 
 def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
-    """Return the measured frame where the force ``body`` needs differs most from the measured one; None without any."""
+    """Return the fully measured frame in which the force that ``body`` needs differs most from the measured one;
+    None without any.
+    """
     worst: tuple[float, TrialResult, int, Array] | None = None
     for one in results:
         found, motion = one.comparison, one.motion
@@ -146,7 +150,9 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
 
 
 def load_still(body: Body, results: tuple[TrialResult, ...], search: LoadSearch) -> Still | None:
-    """Return the still of the body with the load that was found, where it sits; None without one or its place."""
+    """Return the still of the body with the load that was found, where it sits; None without one, or where its place
+    is not known.
+    """
     if not search.found or not np.isfinite(search.best.place).all():
         return None
     still, best = still_of(body, results), search.best

@@ -106,7 +106,9 @@ def _markers(rerun: Any, stream: "RecordingStream", one: TrialResult) -> None:
 
 
 def _forces(rerun: Any, stream: "RecordingStream", one: TrialResult, body: Body) -> None:
-    """Send plates, their forces at the centres of pressure, and what the body leaves unexplained at its CoM."""
+    """Send plates, their forces at the centres of pressure, and what the body leaves unexplained at its centre of
+    mass.
+    """
     assert one.motion is not None
     for plate in one.trial.plates:
         corners = [np.vstack([plate.corners, plate.corners[:1]])]
@@ -190,7 +192,9 @@ def results_into_c3d(
 
 
 def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:
-    """Yield name (``RightHip``), index and names of the axes (``flexion, adduction, rotation``) of every joint."""
+    """Yield name (``RightHip``), indices and names of the axes (``flexion, adduction, rotation``) of every joint of
+    the body.
+    """
     chain: list[int] = []
     for i, joint in enumerate(body.joints):
         chain.append(i)

@@ -131,7 +131,9 @@ class QuietStanding:
 
 @dataclass(frozen=True)
 class Check:
-    """One row of the quality table: ``value`` as text with unit, its ``limit``, and whether it is inside."""
+    """One row of the quality table: ``value`` as text with unit, the ``limit`` it is held against, and whether it is
+    inside.
+    """
 
     what: str
     where: str

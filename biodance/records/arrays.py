@@ -85,7 +85,9 @@ def rate_of(time: Array) -> float:
 
 
 def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
-    """Return the one of ``trials`` that has a ``name``; UnknownName says the ``kind`` and lists all names."""
+    """Return the one of ``trials`` that has a ``name``; UnknownName says what it is no ``kind`` of and lists all
+    names.
+    """
     found = {one.name: one for one in trials}
     if name not in found:
         raise UnknownName.of(kind, name, tuple(found))

@@ -92,7 +92,9 @@ def _covered(motion: Motion, time: Array) -> bool:
 
 
 def _foot(trial: Trial, contact: Contact, soles: Soles, number: int, time: Array) -> int | None:
-    """Return the foot (0 right, 1 left) that stands on a plate alone and whole in the middle of a step; else None."""
+    """Return the foot (0 right, 1 left) that stands on a plate alone and whole in the middle of a step; None
+    otherwise.
+    """
     length = time[-1] - time[0]
     middle = (contact.time > time[0] + 0.25 * length) & (contact.time < time[0] + 0.75 * length)
     over = contact.on_plate[middle, :, number].mean(axis=0)

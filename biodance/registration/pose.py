@@ -55,7 +55,9 @@ class FramePose:
         return wrench_about_origin(turned, self.shift)
 
     def changed(self, change: Array, about: Array) -> "FramePose":
-        """Return the pose after a ``change`` (4,): x, y m, yaw rad about the vertical at ``about`` (3,) m, delay s."""
+        """Return the pose after a ``change`` (4,): x, y m, yaw rad about the vertical through ``about`` (3,) m, delay
+        s.
+        """
         x, y, yaw, delay = change
         turned = axis_rotation(_UP, np.array([yaw]))[0] @ (self.shift - about) + about
         return FramePose(self.delay + delay, self.yaw + yaw, turned + np.array([x, y, 0.0]))

@@ -215,7 +215,9 @@ def write_angles(dance: Dance, path: Path) -> None:
 
 
 def angle_sheet(dance: Dance, angles: Array) -> str:
-    """Return the postures as a Markdown table of joint angles, degrees: ``angles`` (P, n) rad of all postures."""
+    """Return the postures as a Markdown table of joint angles, degrees: ``angles`` (P, n) rad of all postures of the
+    dance.
+    """
     joints = [joint.name for joint in dance.body.joints]
     lines = [
         "# The dance, posture by posture",

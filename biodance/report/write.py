@@ -132,7 +132,9 @@ def write_diagnosis(
 def _accepted(
     result: SessionResult, found: SessionDiagnosis, folder: Path, earlier: tuple[PlateCorrection, ...]
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """Write the corrected trials; return what acceptance gave, and the texts of the files that are left to write."""
+    """Write the corrected trials; return what acceptance gave in words, and the texts of the files that are left to
+    write.
+    """
     name, findings, files = result.session.folder.name, found.diagnosis.findings, {}
     if found.accepted is not None and found.accepted.status == "solved":
         named = ", ".join(f"{one.effect} {one.target}".strip() for one in findings)

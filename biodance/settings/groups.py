@@ -12,7 +12,9 @@ GENERAL = "general"
 
 
 def number_field(default: float, low: float, high: float, unit: str, meaning: str, *, word: str = "") -> Any:
-    """Return the field of a number from ``low`` to ``high``; a ``word``, if any, is the default and legal."""
+    """Return the field of a number from ``low`` to ``high``; where there is a ``word``, it is the default and legal,
+    too.
+    """
     return field(
         default=word or default, metadata={"legal": (low, high), "unit": unit, "meaning": meaning, "word": word}
     )
@@ -24,7 +26,9 @@ def word_field(default: str, legal: tuple[str, ...], meaning: str) -> Any:
 
 
 class Setting(NamedTuple):
-    """One setting: its dotted ``key``, ``value``, ``unit`` (or ""), ``meaning``, and the ``legal`` values in words."""
+    """One setting: its dotted ``key``, ``value``, ``unit`` ("" without one), ``meaning``, and the ``legal`` values
+    in words.
+    """
 
     key: str
     value: Value
@@ -35,7 +39,9 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """Settings that belong together; every value is checked at birth, whole numbers meant as float become one."""
+    """Settings that belong together; every value is checked at birth, a whole number where a float is meant becomes
+    one.
+    """
 
     name: ClassVar[str]
 

@@ -45,11 +45,15 @@ class Bands:
         return 1 if np.isinf(self.rate) else max(1, round(rate / self.rate))
 
     def at(self, rate: float) -> "Bands":
-        """Return the same bands for a recording at ``rate`` Hz, at the rate of its thinned samples (120 Hz: 24 Hz)."""
+        """Return the same bands for a recording at ``rate`` Hz, at the rate that its thinned samples really have (120
+        Hz: 24 Hz).
+        """
         return self if np.isinf(self.rate) else replace(self, rate=rate / self.stride(rate))
 
     def of(self, count: int) -> NDArray[np.intp]:
-        """Return the band (count,) of every coefficient of a run of ``count`` samples; -1: does not count."""
+        """Return the band (count,) of every coefficient of a run of ``count`` samples; -1 for those that do not
+        count.
+        """
         if self.white:
             return np.zeros(count, dtype=np.intp)
         frequency = np.arange(count) * self.rate / (2 * count)

@@ -208,7 +208,9 @@ def _turn_slope(phi: Array) -> Array:
 
 
 def _displacement(phi: Array, own: Array) -> Array:
-    """Second moment (10, 10) of m (|d|² 1 - d d') for the CoM's error d ~ N(0, its covariance): mean and variance."""
+    """Return the second moment (10, 10) of m (|d|² 1 - d d') for the CoM's error d ~ N(0, its covariance): its mean
+    and its variance.
+    """
     mass, com = phi[0], phi[1:4] / phi[0]
     slope = np.zeros((3, 10))
     slope[:, 0], slope[:, 1:4] = -com / mass, np.eye(3) / mass

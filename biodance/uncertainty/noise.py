@@ -58,7 +58,9 @@ class Noise:
         return inverse[band[keep]] @ self.bands.coefficients(shifted)[keep]
 
     def weighted(self, rows: Array) -> Array:
-        """S^-1 rows (T, 6, n) of samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and its transpose."""
+        """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and
+        its transpose.
+        """
         white = self.whiten(rows)
         if self.bands.white:
             return np.asarray(self.shift.T @ np.linalg.solve(np.linalg.cholesky(self.covariance[0]).T, white))

@@ -26,7 +26,9 @@ class Plates:
 
 
 def plate_sources() -> Plates:
-    """Return plates with one fault of one sd each: 36 gains and cross-talks, 3 turns, 3 shifts, 6 offsets, a delay."""
+    """Return plates with one fault of one standard deviation each: 36 gains and cross-talks, 3 turns, 3 shifts, 6
+    offsets, a delay.
+    """
     mixing, offset, delay = np.zeros((PLATE_SOURCES, 6, 6)), np.zeros((PLATE_SOURCES, 6)), np.zeros(PLATE_SOURCES)
     rows, columns = np.divmod(np.arange(36), 6)
     mixing[np.arange(36), rows, columns] = [
@@ -44,7 +46,9 @@ def plate_sources() -> Plates:
 
 
 def around_zero(key: str, parameter: str = "") -> float:
-    """Return the RMS of what ``key`` of the shipped tolerances can be, its mean in sessions without fault included."""
+    """Return the root mean square of what ``key`` of the shipped tolerances can be, its mean in sessions without
+    fault included.
+    """
     known = shipped()
     return float(np.hypot(known.size(key), known.mean(f"{key} {parameter}")))
 

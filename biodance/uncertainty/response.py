@@ -131,7 +131,9 @@ class Response:
         return value.reshape(len(functional), 6, -1)
 
     def back(self, weight: Array) -> Array:
-        """Return what ``weight`` (F, 6, p) on the wrench weighs on functionals (F, 18, p), as `wrench` transposed."""
+        """Return what ``weight`` (F, 6, p) on the wrench weighs on functionals (F, 18, p): the transpose of
+        `wrench`.
+        """
         second, first = derivatives(self.motion.time.size)
         frames, rate = len(weight), self.motion.rate
         flat = weight.reshape(frames, -1)
@@ -206,7 +208,9 @@ def centres_of_mass(body: Body, pose: Poses) -> Array:
 
 
 def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
-    """Return (F, N, 3, 6, 3) twice: F2, F1, F0 of a segment's CoM displaced (m, lab) and its turn (rad, lab)."""
+    """Return (F, N, 3, 6, 3) twice: F2, F1, F0 of a displacement of a segment's CoM (m, lab) and of a turn of the
+    segment (rad, lab).
+    """
     move = segment_motion(body, motion)
     frames, count = motion.time.size, len(body.segments)
     mass = body.sip.mass[:, None, None]
@@ -259,7 +263,9 @@ class ErrorSource(ABC):
         """Return the mean residual (M, 3, K) m of every marker, model less measured, in segment axes."""
 
     def transpose(self, trial: Response, back: Array) -> Array:
-        """Return (K, p): sum over time of what ``back`` (F, 18, p) weighs on functionals, times every error's."""
+        """Return (K, p): sum over time of what ``back`` (F, 18, p) weighs on functionals, times those of every
+        error.
+        """
         return np.tensordot(self.functional(trial), back, axes=((0, 1), (0, 1)))
 
     @abstractmethod

@@ -39,7 +39,9 @@ _LEVER = 0.03
 
 
 def white_noise(samples: Array) -> Array:
-    """Return the standard deviation (...) of white noise in ``samples`` (T, ...), NaN = not seen; NaN if few."""
+    """Return the standard deviation (...) of white noise in ``samples`` (T, ...), NaN = not seen; NaN where there are
+    too few.
+    """
     change = np.abs(np.diff(samples, n=_ORDER, axis=0))
     enough = np.isfinite(change).sum(axis=0) >= _ENOUGH
     value = np.full(samples.shape[1:], np.nan)
@@ -157,5 +159,7 @@ def with_zeros(known: Tolerances, zeros: Array, mass: float) -> Tolerances:
 
 
 def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:
-    """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg."""
+    """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg: limits and adequacy
+    follow.
+    """
     return replace(known, noise=known.noise + added * (REFERENCE_PERSON / mass) ** 2)

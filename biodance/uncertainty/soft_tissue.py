@@ -146,7 +146,9 @@ class Sag(ErrorSource):
 
 @dataclass(frozen=True, eq=False)
 class Flesh(_WithAngles):
-    """Matter that moves against its segment in proportion to an angle beside it, along the segment's axes (m/rad)."""
+    """Matter that moves against its segment in proportion to an angle beside it, along the three axes of the segment
+    (m/rad).
+    """
 
     @property
     def groups(self) -> tuple[str, ...]:

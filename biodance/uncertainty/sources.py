@@ -85,7 +85,9 @@ class Errors:
 
 
 def forward(sources: tuple[ErrorSource, ...], motion: Motion) -> Errors:
-    """Return what the errors of unit size do in ``motion``, at about 25 Hz (below 6 Hz good to 1 %)."""
+    """Return what the errors of unit size do in ``motion``, at about 25 Hz (what is slower than 6 Hz is then good to
+    1 %).
+    """
     trial = Response.of(sources[0].body, motion)
     wrench = np.concatenate([trial.wrench(source.functional(trial)) for source in sources], axis=2)
     names, joints = (
@@ -95,7 +97,9 @@ def forward(sources: tuple[ErrorSource, ...], motion: Motion) -> Errors:
 
 
 def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) -> Array:
-    """Return (K, p): sum over time of ``weight`` (F, 6, p), about the lab origin, times the wrench of every error."""
+    """Return (K, p): sum over time of ``weight`` (F, 6, p), wrench about the lab origin, times what every error adds
+    to the wrench.
+    """
     back, sums = trial.back(weight), np.zeros((sum(len(source.groups) for source in sources), weight.shape[2]))
     for frames, part in trial.parts():
         sums += np.concatenate([source.transpose(part, back[frames]) for source in sources])
@@ -103,7 +107,9 @@ def transpose(sources: tuple[ErrorSource, ...], trial: Response, weight: Array) 
 
 
 def _patterns(body: Body) -> tuple[Array, ...]:
-    """Return per segment the rigid displacements (m, 3, P) of its markers: three translations, and non-null turns."""
+    """Return per segment the rigid displacements (m, 3, P) of its markers: three translations, and turns that are not
+    null.
+    """
     worn, found = np.array(body.markers.segment), []
     for s in range(len(body.segments)):
         places = body.markers.position[worn == s]

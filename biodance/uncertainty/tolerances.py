@@ -108,7 +108,9 @@ class Tolerances:
         return self.means.get(key, 0.0)
 
     def unlike(self, effect: str) -> float:
-        """Return the share of its size by which ``effect`` errs beyond noise; else that of "other" ones."""
+        """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other"
+        ones.
+        """
         return self.accuracy.get(effect, self.accuracy.get("other", 0.0))
 
     def knows(self, effect: str) -> bool:
@@ -122,7 +124,9 @@ class Tolerances:
 
 @cache
 def shipped() -> Tolerances:
-    """Return the tolerances of biodance, learned from virtual subjects (``null_sessions.toml`` says which)."""
+    """Return the tolerances that come with biodance, learned from virtual subjects (``null_sessions.toml`` says
+    which).
+    """
     rest = read_tolerances(locate("anthropometry/uncertainty", "null_sessions").read_text(encoding="utf-8"))
     return without_habits(replace(rest, sizes=table_sizes()))
 
@@ -244,7 +248,9 @@ def in_state(key: str, joint: str, body: Body) -> str:
 
 
 def mean_key(name: str, target: str, parameter: str) -> str:
-    """Return the key of what is expected of one parameter of an effect: each side its own, as signs may be mirrored."""
+    """Return the key of what is expected of one parameter of an effect: sides of the body each have their own, as
+    signs may be mirrored.
+    """
     plate, colon, rest = target.partition(":")
     return " ".join(filter(None, (name, rest if colon and plate.startswith("plate") else target, parameter)))
 

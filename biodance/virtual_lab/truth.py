@@ -94,7 +94,9 @@ def _plate(corners: Array, plate: Any) -> dict[str, Any]:
 
 
 def _static_pose(person: Person, instruments: Instruments, performances: list[Performance]) -> dict[str, Any] | None:
-    """Return where the 12 true frames were in mid static trial (cameras' axes, marker time); None without one."""
+    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time); None
+    without such a trial.
+    """
     static = next((p for p in performances if p.plan.role == "static"), None)
     if static is None:
         return None

@@ -66,7 +66,9 @@ class FootPath:
         return x * ahead[:, 0] + y * ahead[:, 1], x * out[:, 0] + y * out[:, 1], length
 
     def _lines(self, time: Array) -> tuple[Array, Array, Array, Array]:
-        """Return the heel (n, 2) m, directions ahead and outwards (n, 2) and the length (n,) m of the foot."""
+        """Return the heel (n, 2) m, the directions ahead and outwards (n, 2) and the length (n,) m of the foot; kept,
+        like the places.
+        """
         key = time.tobytes()
         if key not in self._ways:
             if len(self._ways) >= _KEPT:
@@ -123,7 +125,9 @@ def path_at(known: Array, path: Array, time: Array) -> Array:
 
 
 def feet_of(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ...]:
-    """Return both feet by heel and toe of the first of the ``known`` marker sets that has all four; or ()."""
+    """Return both feet by the landmarks heel and toe of the first of the ``known`` marker sets that has all four; ()
+    without.
+    """
     if markers is None or not markers.time.size:
         return ()
     for name in known:

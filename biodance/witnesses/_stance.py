@@ -87,7 +87,9 @@ class _Look:
 
 
 def by_step(look: Callable[[_Witness, SeenTrial, FootStep], _Seen]) -> Callable[[_Witness, SeenTrial, FootStep], _Seen]:
-    """Keep what a witness sees of a step, asked again of recordings with other plates altered (`traces`)."""
+    """Keep what a witness sees of a step: it is asked about one recording after another in which other plates are
+    altered (`traces`).
+    """
 
     @lru_cache(maxsize=_KEPT)
     def known(asked: _Look) -> _Seen:

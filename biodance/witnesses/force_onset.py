@@ -51,7 +51,9 @@ class ForceOnset(Witness):
 
 
 def heel_strike(foot: FootPath, middle: float, near: float) -> float:
-    """Return when, s, a heel strikes within 0.08 s of ``near``; ``middle`` s the foot stands. NaN without peak."""
+    """Return the time s at which a heel strikes within 0.08 s of ``near``; ``middle`` s the foot stands. NaN where
+    no peak shows it.
+    """
     height = foot.heel[:, 2]
     rise = np.full(height.size, np.nan)
     rise[1:-1] = (height[2:] - 2 * height[1:-1] + height[:-2]) * foot.rate**2

@@ -58,7 +58,9 @@ def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
 
 
 def refuse_impossible(body: Body) -> None:
-    """Raise BiodanceError if a segment's parameters belong to no mass distribution (no positive pseudo-inertia)."""
+    """Raise BiodanceError if a segment's parameters belong to no mass distribution (pseudo-inertia not positive, no
+    mass).
+    """
     for name in body.segments:
         phi = body.sip.of(name)
         if not np.isfinite(phi).all():

@@ -52,7 +52,9 @@ def shape_boxes(skeleton: Skeleton) -> Array:
 
 
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
-    """Return where the CoM may be, (12, 2, 3) m: the prior CoM +- three standard deviations, inside the shape box."""
+    """Return where the CoM may be, (12, 2, 3) m: three prior standard deviations around the prior CoM, inside the
+    shape box.
+    """
     half = COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
     around = np.stack([sip.com - half, sip.com + half], axis=1)
     return np.clip(around, boxes[:, :1], boxes[:, 1:])
@@ -205,7 +207,9 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
 
 
 def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers:
-    """Return the markers of a set at their usual places (offset times normaliser); others are left out."""
+    """Return the markers of a set at their usual places (offset times normaliser); markers without a usual place are
+    left out.
+    """
     shoulders = np.mean([skeleton.origins["right_shoulder"], skeleton.origins["left_shoulder"]], axis=0)
     labels, segments, positions, weights = [], [], [], []
     for marker in marker_set.markers:

@@ -57,12 +57,16 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
 
 
 def peak_torque(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
-    """Return the isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear in age between 25, 60 and 70 years."""
+    """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear in age between 25, 60 and 70
+    years.
+    """
     return _coefficient(anderson, subject, joint, direction) * subject.mass * STANDARD_GRAVITY * subject.stature
 
 
 def age_factor(anderson: AnthropometricTable, subject: Subject) -> float:
-    """Return strength at the subject's age against 18-25 years, mean over Anderson's six torques of the same sex."""
+    """Return the strength at the subject's age against 18-25 years, mean over Anderson's six torques of the same
+    sex.
+    """
     ratios = [
         _coefficient(anderson, subject, joint, direction) / _groups(anderson, subject.sex, joint, direction)[0]
         for joint, direction in _ANDERSON
@@ -140,7 +144,9 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
 
 
 def with_tracking_limits(body: Body) -> Body:
-    """Return a body without a known static trial, with the limits for tracking counted from the neutral posture."""
+    """Return a body of which no static trial is known, with the limits for tracking counted from the neutral
+    posture.
+    """
     return replace(body, limits=widen_limits(body, body.neutral)[0])
 
 

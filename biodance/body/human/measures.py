@@ -92,7 +92,9 @@ def elbow(shoulder_centre: Array, lateral: Array, mid_wrist: Array, distance: fl
 
 
 def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, side: float) -> Array:
-    """Return the wrist centre (3,) m under a wrist bar : square to the bar and to the forearm (plug-in gait)."""
+    """Return the wrist centre (3,) m under a wrist bar on the back of the wrist: square to the bar and to the
+    forearm (plug-in gait).
+    """
     middle = (radial + ulnar) / 2
     back = side * np.cross(radial - ulnar, elbow_centre - middle)
     return np.asarray(middle - distance * unit(back))

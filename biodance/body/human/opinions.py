@@ -25,7 +25,9 @@ def usual_outline(length: float, sex: Sex) -> FootSizes:
 
 
 def sole_corners(outline: FootSizes, sex: Sex) -> Array:
-    """Return corners (6, 2) m of a sole, ahead of the heel and to the right (counter-clockwise): heel, ball, toes."""
+    """Return the corners (6, 2) m of a sole, ahead of the heel and to the right, counter-clockwise from above: heel,
+    ball, toes.
+    """
     length, wide, narrow = outline.length, outline.breadth / 2, outline.heel_breadth / 2
     ball = proportion("ball_from_heel", sex) * length
     return np.array([(0.0, narrow), (ball, wide), (length, narrow), (length, -narrow), (ball, -wide), (0.0, -narrow)])

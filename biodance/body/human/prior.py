@@ -54,7 +54,9 @@ class Spread:
 
 @functools.cache
 def table_spread(kind: str) -> Spread:
-    """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head ...)."""
+    """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm,
+    forearm_hand).
+    """
     alike = kind not in TRUNK
     people = _by_sex([[_in_lengths(one, kind) for one in published_people(who.sex)] for who in _BOTH], alike)
     masses = _by_sex([published_fractions(kind, who) for who in _BOTH], alike)
@@ -273,13 +275,17 @@ def primitive_covariance(
 
 
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
-    """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people, joint centres."""
+    """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people and misplaced
+    joint centres.
+    """
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     return np.hypot(table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
 
 def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
-    """Return the sd (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of one segment about its true joint centre."""
+    """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of one segment about its true joint
+    centre.
+    """
     kind, own = table_spread(kind_of(segment)), lump.inertia / lump.mass
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))

@@ -42,7 +42,9 @@ _COM_SD = 0.010
 
 
 def hoap3() -> Body:
-    """Return the robot in configuration B: free-flyer root, nq = 28, nv = 27, no markers."""
+    """Return the robot in configuration B (no battery, no wireless card): free-flyer root, nq = 28, nv = 27, no
+    markers.
+    """
     joints = _joints()
     turns = _zero_posture(joints)
     lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]

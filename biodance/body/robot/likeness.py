@@ -124,7 +124,9 @@ def _turn_at_zero(body: Body, segment: int) -> Array:
 
 
 def _ankle(body: Body, segment: int) -> Array:
-    """Return the point (3,) m, segment frame, on the axis of its joint that is nearest to the axis before it."""
+    """Return the point (3,) m, in the segment's frame, on the axis of its joint that is nearest to the axis before
+    it.
+    """
     last = body.joints[body.segment_joint[segment]]
     if last.parent < 0:
         return np.zeros(3)

@@ -36,12 +36,16 @@ def is_point(lump: RigidInertia) -> bool:
 
 
 def extended(lump: RigidInertia, box: Array) -> RigidInertia:
-    """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: omissions are not known."""
+    """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: what is left out is not
+    known exactly.
+    """
     return solid(lump, box) if is_point(lump) else lump
 
 
 def solid(lump: RigidInertia, box: Array) -> RigidInertia:
-    """Return a body of uniform density that fills a ``box`` (2, 3) m about its middle, of the lump's mass and CoM."""
+    """Return a body of uniform density that fills a ``box`` (2, 3) m about its own middle, with the lump's mass and
+    centre of mass.
+    """
     square = np.square(box[1] - box[0])
     return RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square))
 
@@ -53,5 +57,7 @@ def is_possible(lump: RigidInertia) -> bool:
 
 
 def com_deviation(lump: RigidInertia) -> float:
-    """Return the standard deviation m, per axis, of the centre of mass of a lump known from a data sheet only."""
+    """Return the standard deviation m, per axis, of the centre of mass of a lump of which only the data sheet is
+    known.
+    """
     return float(_COM_SD * np.sqrt(np.trace(lump.inertia) / (2 * lump.mass)))

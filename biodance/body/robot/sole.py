@@ -115,7 +115,9 @@ def match_faces(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
-    """Return the outward normal (3,) of the face that is nearest to horizontal; of meshes, the largest near it."""
+    """Return the outward normal (3,) of the face that is nearest to horizontal; of meshes, of the largest face
+    within the limit.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     if not hulls:

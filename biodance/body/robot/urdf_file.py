@@ -182,7 +182,9 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
 
 
 def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
-    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; ``unread`` names the others."""
+    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; what cannot be read is said in
+    ``unread``.
+    """
     found = []
     for element in elements:
         mesh = element.find("geometry/mesh")

@@ -58,14 +58,18 @@ TableRow = Mapping[str, str]
 
 @dataclass(frozen=True, eq=False)
 class AnthropometricTable:
-    """One table: ``rows`` as text by column name; ``provenance``: title, source, doi, population, units, sha256 ..."""
+    """One table: ``rows`` as text by column name; ``provenance``: title, source, doi, page, population, n, sex,
+    units, sd, sha256 ...
+    """
 
     name: str
     rows: tuple[TableRow, ...]
     provenance: Mapping[str, Any]
 
     def where(self, **wanted: str) -> tuple[TableRow, ...]:
-        """Return the rows whose columns equal the wanted texts: ``where(segment="foot", sex="F")``; may be empty."""
+        """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``; may
+        be empty.
+        """
         return _rows_where(self, tuple(wanted.items()))
 
     def row(self, **wanted: str) -> TableRow:

@@ -186,7 +186,9 @@ def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
 
 
 def own_joint(part: str, joint: str) -> str:
-    """Return the body's joint of a word's angle: ``right_arm``, ``shoulder_flexion`` -> ``right_shoulder_flexion``."""
+    """Return the name of the body's joint of a word's angle: ``right_arm``, ``shoulder_flexion`` ->
+    ``right_shoulder_flexion``.
+    """
     side = part.partition("_")[0]
     return f"{side}_{joint}" if side in SIDES else joint
 

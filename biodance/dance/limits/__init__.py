@@ -55,7 +55,9 @@ class Margins:
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
-    """Return a limit's number: ``default`` and the range from ``low`` to ``high`` in ``unit`` it may have."""
+    """Return a number of a limit: its ``default`` and the range from ``low`` to ``high`` in ``unit`` that a protocol
+    may give it.
+    """
     return field(default=default, metadata={"low": low, "high": high, "unit": unit})
 
 

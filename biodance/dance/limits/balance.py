@@ -67,7 +67,9 @@ def _left(copy: Copied) -> Remaining:
 
 
 def _inside(point: Array, corners: Array, share: float) -> Array:
-    """Return (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), shrunk to ``share`` about its middle."""
+    """Return the distance (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), drawn together to ``share``
+    about its middle.
+    """
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(corners)

@@ -20,7 +20,9 @@ class Grip(Limit):
     name, unit, scale, suspicion = "grip", "m", 0.05, 40
 
     def margins(self, state: State) -> Margins:
-        """Return how much further each holding palm may be from its grip, (T, holding hands) m; none without."""
+        """Return how much further each holding palm may be from its grip, (T, holding hands) m; none where nothing is
+        held.
+        """
         holding = [side for side in (0, 1) if np.isfinite(state.stance.hands[side, 0])]
         if not holding:
             return unconcerned(state)

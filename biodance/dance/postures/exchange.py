@@ -58,7 +58,9 @@ def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Postur
 
 
 def alike(x: Array) -> NDArray[np.bool_]:
-    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate."""
+    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate; a posture is like
+    itself.
+    """
     return np.asarray(np.abs(x[:, None] - x[None]).max(axis=2) < APART)
 
 
@@ -170,7 +172,9 @@ def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
 
 
 def mirror_posture(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
-    """Return the image (n,) on the feet ``there`` of a posture with coordinates ``x`` (n,) on the feet ``here``."""
+    """Return the coordinates (n,) of the image, on the feet ``there``, of a posture with coordinates ``x`` (n,) on the
+    feet ``here``.
+    """
     across, sense = _joints([joint.name for joint in chain.body.joints])
     out = np.concatenate([x[:ROOT] * [1, -1, 1, -1, -1, 1], sense * x[ROOT:][across]])
     gap = there.ankle - here.ankle[::-1] * [1, -1, 1]

@@ -72,7 +72,9 @@ def choose(chain: Chain, x: Array, stances: tuple[str, ...], plan: Plan) -> Choi
 
 
 def _cost(plan: Plan, stance: str, last: dict[str, int]) -> float:
-    """Return seconds of one more posture; feet that were not used yet cost two moves through postures in between."""
+    """Return the seconds of one more posture; feet that were not used yet cost two moves through postures in
+    between.
+    """
     return plan.move + plan.hold + (2 * plan.move if stance not in last else 0.0)
 
 
@@ -84,7 +86,9 @@ def learned(belief: Array, rows: Array) -> Array:
 
 
 class _Told:
-    """What standing in a posture and going there tells: rows of the regressor, whitened by error and table."""
+    """What standing in a posture and going there tells: rows of the regressor, whitened by the error and by the
+    table.
+    """
 
     def __init__(self, chain: Chain, x: Array, stances: tuple[str, ...], move: float, S: Array) -> None:
         self.chain, self.x, self.stances, self.S = chain, x, stances, S
@@ -122,7 +126,9 @@ METRE = 3.0
 
 
 def order_postures(x: Array, groups: list[list[int]]) -> list[int]:
-    """Return the rows of ``x`` (P, n) coordinates, ordered so that neighbours are near; groups stay together."""
+    """Return the rows of ``x`` (P, n) coordinates in an order in which neighbours are near; groups stay together, one
+    after the other.
+    """
     scaled = x.copy()
     scaled[:, :3] *= METRE
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
@@ -214,7 +220,9 @@ def _over(feet: Stance, side: int) -> Stance:
 
 
 def weight_shifts(last: Stance, goal: Stance) -> list[Stance]:
-    """Return the postures that lead from one stance to another: set down, shift, step with the right foot, shift."""
+    """Return the postures in between that lead from one stance to another: set down, shift, step with the right foot,
+    shift.
+    """
     over = last.planted[0] if len(last.planted) == 1 else None
     out = [_over(last, over)] if over is not None and goal.planted != last.planted else []
     if not np.array_equal(last.ankle, goal.ankle):

@@ -137,7 +137,9 @@ def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit
 
 @dataclass(frozen=True, eq=False)
 class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and ease."""
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the
+    performer's ease.
+    """
 
     blocks: Blocks
     others: Array
@@ -207,7 +209,9 @@ def describe(state: State, limit: Limit) -> str:
 
 @dataclass(frozen=True)
 class Excess:
-    """Objective of a posture that breaks one ``limit`` as little as it can: squares of what lacks, in its scale."""
+    """Objective of a posture that breaks one ``limit`` as little as it can: sum of squares of what is missing, in its
+    scale.
+    """
 
     limit: Limit
 

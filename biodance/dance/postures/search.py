@@ -121,7 +121,9 @@ class _Search:
         return posture or refuse(self.chain, stance, begin, self.limits)
 
     def with_images(self, kept: list[list[Posture]], found: list[list[Posture]]) -> list[list[Posture]]:
-        """Return the postures ``kept`` of every place and mirror images of ``found`` (`mirror`) of a symmetric body."""
+        """Return the postures ``kept`` of every place and the mirror images of ``found`` (`mirror`), of a body whose
+        sides are alike.
+        """
         out, body = [[*some] for some in kept], self.chain.body
         for here, some in zip(self.stances, found if symmetric(body) else [], strict=False):
             goal = image_feet(here, self.stances)
@@ -148,7 +150,9 @@ class _Search:
     def sweep(
         self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int
     ) -> list[Posture]:
-        """Return the postures of the places ``order``, by place, found in turn from ``begin``, all others held."""
+        """Return the postures of the places ``order``, found one after the other from ``begin`` while all others are
+        held, by place.
+        """
         now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
         for p in order:
             others = np.array([one.up for k, one in enumerate(now) if k != p]).reshape(-1, *now[p].up.shape)

@@ -26,7 +26,9 @@ from biodance.spatial import cross, skew
 
 
 def condition(gram: Array) -> tuple[Array, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k) and its gradient (..., k, k)."""
+    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k,
+    k).
+    """
     value, vector = _spectrum(gram)
     cond = np.sqrt(value[..., -1] / value[..., 0])
     by = np.zeros_like(value)
@@ -73,7 +75,9 @@ class Blocks:
 
 
 def excitation_blocks(body: Body) -> Blocks:
-    """Return the base columns of every segment, weighted by its mass in the table (docs/derivations.md)."""
+    """Return the base columns of every segment, weighted by its mass in the table (structural base:
+    docs/derivations.md).
+    """
     columns = structural_base(body).columns
     first, second = (
         tuple(

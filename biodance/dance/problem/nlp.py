@@ -233,7 +233,9 @@ def quadratic_step(
 
 
 def update(hessian: Array, step: Array, change: Array) -> Array:
-    """Return the BFGS update, damped after Powell to stay positive definite; the identity where it would not."""
+    """Return the BFGS update, damped after Powell so that it stays positive definite; the identity where it would
+    not.
+    """
     curved = hessian @ step
     bend = float(step @ curved)
     if bend < 1e-14:

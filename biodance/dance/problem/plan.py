@@ -149,7 +149,9 @@ class Plan:
         return min((limit.support_share for limit in self.limits), default=1.0)
 
     def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
-        """Return the plan with ``more`` limits, objects or classes; one of a known name takes its place."""
+        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its
+        place.
+        """
         return replace(self, limits=join_limits(self.limits, more))
 
     def emphasis(self, segments: tuple[str, ...]) -> Array:

@@ -25,7 +25,9 @@ _KINDS = {
 
 
 def capsule_pairs(body: Body) -> list[tuple[int, int]]:
-    """Return the pairs of limbs (segment indices) that must not touch: the paper's and others a dance could join."""
+    """Return the pairs of limbs (segment indices) that must not touch: the paper's and others that a dance could bring
+    together.
+    """
     kinds = [s.removeprefix("right_").removeprefix("left_") for s in body.segments]
     side = [s.split("_")[0] for s in body.segments]
     near = {
@@ -50,7 +52,9 @@ def box_pairs(body: Body) -> list[tuple[int, int]]:
 
 
 def pairs_of(body: Body) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Return the pairs of limbs, or limb and box, that must not touch: by name in a person's body, else by the tree."""
+    """Return the pairs of limbs, and of a limb and a box, that must not touch: by name in a person's body, else by the
+    tree.
+    """
     return (capsule_pairs(body), box_pairs(body)) if _is_named(body) else tree_pairs(body)[:2]
 
 
@@ -88,7 +92,9 @@ class Solids:
 
 
 def palm(body: Body, side: str) -> tuple[int, Array]:
-    """Return a hand's segment and the middle of its palm (3,) m in it: 0.85 of the way to the fingertips."""
+    """Return the segment of a hand and the middle of its palm (3,) m in that segment: 0.85 of the way to the
+    fingertips.
+    """
     segment = body.segment_index(f"{side}_forearm_hand")
     low, high = body.boxes[segment]
     return segment, np.array([(low[0] + high[0]) / 2, 0.85 * low[1], (low[2] + high[2]) / 2])
@@ -104,7 +110,9 @@ Pairs = list[tuple[int, int]]
 
 
 def capsule(body: Body, segment: int) -> tuple[Array, float]:
-    """Return the ends (2, 3) m of the axis, segment frame, and the radius m of a limb's capsule: its box's widest."""
+    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of a limb's capsule: the widest in
+    its box.
+    """
     low, high = body.boxes[segment]
     half, centre = (high - low) / 2, (high + low) / 2
     axis = int(np.argmax(half))
@@ -114,7 +122,9 @@ def capsule(body: Body, segment: int) -> tuple[Array, float]:
 
 
 def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
-    """Return the pairs of limbs, or limb and box, (segment indices) to keep apart, and in words those not checked."""
+    """Return the pairs of limbs and of a limb and a box (segment indices) to keep apart, and the pairs that cannot be
+    checked, in words.
+    """
     above = [_carrier(body, i) for i in range(len(body.segments))]
     boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
     legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}

@@ -71,7 +71,9 @@ class Stance(Sendable):
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support (bounding box); with the weight over one foot: deepest in both."""
+        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both
+        bases.
+        """
         if self.over is not None:
             from scipy.optimize import linprog
 
@@ -180,7 +182,9 @@ def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
 
 
 def hip_width(body: Body) -> float:
-    """Return the distance (m) sideways between the ankles at zero angles: that of the hips where legs are straight."""
+    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where
+    legs are straight.
+    """
     from biodance.motion.kinematics import poses
 
     place = poses(body, body.neutral[None]).position[0]
@@ -222,7 +226,9 @@ def stance_words(stance: Stance) -> str:
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s with the feet unchanged; ``posture`` is held, or moved to."""
+    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
+    to.
+    """
 
     start: float
     end: float

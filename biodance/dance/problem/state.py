@@ -135,7 +135,9 @@ class State:
         return np.asarray(np.linalg.solve(self.twists[None, :, :ROOT], inner))
 
     def moved_twists(self, columns: list[int], wrench: Array) -> Array:
-        """Return (T, k, n) derivative of J_k' F by x for the coordinates ``columns`` and a fixed wrench (T, 6)."""
+        """Return (T, k, n) derivative of J_k' F with respect to x for the coordinates ``columns`` and a fixed wrench
+        (T, 6).
+        """
         swept = self.chain.ancestors[columns] - np.eye(self.chain.size)[columns]
         pairs = spatial_cross(self.twists[:, None], self.twists[:, columns, None])
         return np.einsum("tkic,tc->tki", pairs, wrench) * swept
@@ -191,7 +193,9 @@ _TINY = 1e-30
 
 
 def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
-    """Return wrenches (T, 2, 6) of right and left foot and the derivative (T, 2, 6, 6) by the total (T, 6)."""
+    """Return the wrenches (T, 2, 6) of the right and left foot and their derivative (T, 2, 6, 6) with respect to the
+    total (T, 6).
+    """
     if len(stance.planted) == 1:
         chosen = np.eye(2)[stance.planted[0]]
         return total[:, None] * chosen[:, None], np.broadcast_to(

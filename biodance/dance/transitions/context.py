@@ -57,7 +57,9 @@ class Checkpoint:
 
 @cache
 def code() -> str:
-    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those of newer code."""
+    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code
+    finds.
+    """
     package = Path(__file__).parents[2]
     files = sorted(file for file in package.rglob("*.py") if file.relative_to(package).parts[0] in ROOMS)
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

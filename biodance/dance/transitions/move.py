@@ -54,7 +54,9 @@ def straight_way(start: Array, end: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``."""
+    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the
+    ``limits``.
+    """
 
     chain: Chain
     blocks: Blocks
@@ -65,7 +67,9 @@ class Task:
 
     @property
     def excited(self) -> list[int]:
-        """Coordinates that excite: trunk and arms, the free leg on one foot (paper Table I), all joints when seated."""
+        """Coordinates that excite: trunk and arms with both feet down, the free leg with one (paper Table I), all
+        joints when seated.
+        """
         legs = [self.chain.leg_columns[side] for side in (0, 1) if side not in self.stance.planted]
         return sorted([*([] if len(legs) == 1 else self.chain.upper), *(c for leg in legs for c in leg)])
 
@@ -122,7 +126,9 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class MoveObjective:
-    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6) x ``share``, and the ZMP's distance."""
+    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and the distance of the
+    ZMP.
+    """
 
     task: Task
     history: Array
@@ -214,7 +220,9 @@ def improved_way(
 
 
 def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
-    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants, s."""
+    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where
+    one is broken.
+    """
     time = task.grid(CHECK)
     problem = task.problem(via, [], time, reserve=BETWEEN, objective=_nothing)
     found = Evaluation(problem, problem.state(np.empty(0)).judged)

@@ -68,7 +68,9 @@ def _doubted(task: Task, way: Way) -> str:
 
 
 def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
-    """Return the two moves by way of ``stop`` (n,), slow as the direct way was impossible; none if one is."""
+    """Return the two moves by way of ``stop`` (n,), slow ones since the direct way was impossible even so, none if one
+    is not possible.
+    """
     parts: list[Move] = []
     for ends in ((task.ends[0], stop), (stop, task.ends[1])):
         slow = replace(task, ends=np.array(ends), duration=task.duration * SLOWER[-1])

@@ -159,7 +159,9 @@ def _exchanged(work: DesignContext, course: Course, places: list[int], attempt: 
 
 
 def _another(work: DesignContext, course: Course, place: int, rng: np.random.Generator) -> Array:
-    """Return the most exciting posture (n,) beside all others from fresh starts; the old one if none is feasible."""
+    """Return the most exciting posture (n,) beside all others from a few fresh starts; the old one where none is
+    feasible.
+    """
     chain, blocks, stance = work.chain, work.blocks, course.stances[place]
     pairs = zip(course.stances, course.x, range(len(course.x)), strict=True)
     others = [posture_at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]

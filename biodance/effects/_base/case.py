@@ -60,7 +60,9 @@ class Case:
         return self.needed(self.phi)
 
     def needed(self, phi: Array) -> Array:
-        """Return (T, 6) N, N·m the wrench about the lab origin the motion needs of parameters ``phi`` (10N,)."""
+        """Return (T, 6) N, N·m the wrench about the lab origin that the motion needs of the parameters ``phi``
+        (10N,).
+        """
         return wrench_of_segments(self.body, self.segments, phi)
 
     def needed_by(self, load: Array, segment: int) -> Array:
@@ -100,7 +102,9 @@ class Case:
 
     @cached_property
     def marker_residual(self) -> Array:
-        """(K, 3) m mean over time of measured minus model marker, in its segment's axes; zero for one never seen."""
+        """(K, 3) m mean over time of measured minus model marker, in the axes of the marker's segment; zero for a
+        marker never seen.
+        """
         columns = list(self.marker_columns)
         segment = [self.body.markers.segment[c] for c in columns]
         apart = self.measured_markers - self.poses.points(segment, self.body.markers.position[columns])
@@ -110,7 +114,9 @@ class Case:
 
     @cached_property
     def memory(self) -> dict[str, object]:
-        """What was computed of the motion and the markers , by name; nothing that depends on forces or parameters."""
+        """What was computed of the motion and the markers and serves again, by name; nothing that depends on forces
+        or parameters.
+        """
         return {}
 
     @cached_property
@@ -158,7 +164,9 @@ class Case:
         return self._known(replace(self, trial=changed_trial), *OF_MOTION, "predicted", "geometry")
 
     def with_parameters(self, phi: Array) -> "Case":
-        """Return the case with the parameters ``phi`` (10N,) in use; moved joints' stays while masses are `ALIKE`."""
+        """Return the case with the parameters ``phi`` (10N,) in use; what moved joints would do stays while the
+        masses are `ALIKE`.
+        """
         known = self.__dict__.get("geometry")
         used = self.body.link_parameters(self.phi) if known is None else known.phi
         before, now = (np.asarray(p)[::10] for p in (used, self.body.link_parameters(phi)))

@@ -105,7 +105,9 @@ class Effect:
         return case.with_added(self.plate_of(case), self.columns(case) @ np.asarray(theta, dtype=float))
 
     def added(self, case: Case, theta: Array) -> Array:
-        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden where quicker."""
+        """Return (T, 6): what ``transform`` adds to measured minus predicted wrench; overridden only where that is
+        quicker.
+        """
         return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
 
     def local(self, case: Case) -> Array | None:
@@ -169,7 +171,9 @@ class Effect:
         return self.possible(theta)
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
-        """Return name, value, sd and unit of what a report prints for ``theta`` (p,) with ``sd`` (p,)."""
+        """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd``
+        (p,).
+        """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
 
     def origin(self, case: Case) -> Array:

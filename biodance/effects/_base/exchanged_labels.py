@@ -108,7 +108,9 @@ def _farther(markers: Markers, static: Markers, pair: Pair) -> bool:
 
 
 def rigid_groups(markers: Markers, marker_set: MarkerSet) -> Iterator[tuple[str, ...]]:
-    """Yield the labels in the file of at least four markers on the same bone: those of the head, of the pelvis."""
+    """Yield the labels in the file of at least four markers that sit on the same bone: those of the head, of the
+    pelvis.
+    """
     match = marker_set.match(markers.names)
     heads = {
         label for name in ("head_front", "head_back") for way in marker_set.landmarks.get(name, ()) for label in way

@@ -31,14 +31,18 @@ class Gate:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none without a scaled body)."""
+    """What the checks look at: the ``session`` as read, and the tracked ``cases`` (none where no body could be
+    scaled).
+    """
 
     session: Session
     cases: tuple[Case, ...] = ()
 
 
 class DiscreteEffect(ABC):
-    """One cause that is there or not; its ``look`` checks; a file without it is refused when found."""
+    """One cause that is there or not; the checks that find it are its ``look``, and a file without it is refused
+    when it is found.
+    """
 
     name: ClassVar[str] = ""
     separated_by: ClassVar[str] = ""
@@ -80,7 +84,9 @@ def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
 
 
 def overruled(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
-    """Return a failed ``check`` for each different decision the reader took against the files, caused by ``effect``."""
+    """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect``
+    as its cause.
+    """
     return tuple(
         Gate(check, False, sentence, effect, target, float(number) if number else float("nan"))
         for target, sentence, number in decided(session, patterns)

@@ -51,7 +51,9 @@ class MissingJoint(Effect, ABC):
         return ("",) if cls.loosened(case) is not None else ()
 
     def columns(self, case: Case) -> Array:
-        """Return (T, 6, 2) the wrench that the joint's motion adds, per radian of the angle shown and of more."""
+        """Return (T, 6, 2) the wrench that the joint's motion adds, per radian: of the angle shown, and of more than
+        that.
+        """
         found = _movement(case, self)
         if found is None:
             return np.zeros((case.motion.time.size, 6, 2))
@@ -131,7 +133,9 @@ def _movement(case: Case, effect: MissingJoint) -> Movement | None:
 
 @dataclass(frozen=True, eq=False)
 class _Slow:
-    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the segments' motion."""
+    """A trial at about `RATE`: ``markers`` low-passed, postures ``q`` (F, nq) as tracked, and the motion of the
+    segments in them.
+    """
 
     markers: Markers
     q: Array
@@ -168,7 +172,9 @@ def _tracked(case: Case, body: Body) -> Movement:
 
 
 def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:
-    """Return (K, 3) m: the mean step of the model's markers from postures without to those with it, in segment axes."""
+    """Return (K, 3) m: the mean step of the model's markers from the postures without to those with the joint, in
+    segment axes.
+    """
     columns = list(case.marker_columns)
     places, markers = case.body.markers, body.markers
     before, after = poses(case.body, stiff), poses(body, loose)
@@ -187,6 +193,8 @@ def _parameters(case: Case, body: Body) -> Array:
 
 
 def doubting(body: Body, names: Iterable[str]) -> Body:
-    """Return the body whose markers ``names`` hardly count: they show skin or another joint."""
+    """Return the body whose markers ``names`` hardly count: what they show is not this joint, but skin or another
+    joint.
+    """
     weight = np.where(np.isin(body.markers.names, list(names)), _SLACK, 1.0) * body.markers.weight
     return replace(body, markers=replace(body.markers, weight=weight))

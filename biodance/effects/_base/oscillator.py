@@ -49,6 +49,8 @@ def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
 
 
 def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array], *, gravity: Array) -> Array:
-    """Return (T, 6) per kilogram about the lab origin: what relative motion ``moved`` (x, x'') adds at (T, 3)."""
+    """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point
+    (T, 3).
+    """
     x, relative = moved
     return np.concatenate([relative, cross(place, relative) + cross(x, acceleration - gravity)], axis=1)

@@ -44,7 +44,9 @@ def turned_wrists(markers: Markers, others: Iterable[Markers]) -> tuple[tuple[st
 
 
 def travels(markers: Markers) -> bool:
-    """Return whether the person goes from place to place: only then, and in a static trial, do both arms hang alike."""
+    """Return whether the person goes from one place to another: only then, and in a static trial, do both arms hang
+    alike.
+    """
     if not (markers.time.size and markers.seen.any(axis=1).all()):
         return False
     first, last = np.nanmean(markers.xyz[[0, -1], :, :2], axis=1)

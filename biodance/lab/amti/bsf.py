@@ -173,7 +173,9 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
 
 
 def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
-    """Return (6,) from ADC counts to lbf and in·lbf: 1e6 / (sensitivity * gain * excitation * counts per volt)."""
+    """Return the factors (6,) from ADC counts to lbf and in·lbf: 1e6 / (sensitivity * gain * excitation * counts per
+    volt).
+    """
     product = np.prod(
         [header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0
     )

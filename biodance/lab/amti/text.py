@@ -23,7 +23,9 @@ _EVEN = 0.02  # share by which a time step may differ from the others (times are
 
 @dataclass(frozen=True, eq=False)
 class AmtiText:
-    """``load`` (S, 6) as written, plate axes; ``rate`` Hz; ``size`` (x, y) m; ``sensor_depth`` m below the surface."""
+    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y) m; ``sensor_depth`` m below the
+    surface.
+    """
 
     load: Array
     rate: float

@@ -52,7 +52,9 @@ class Layout:
 
 
 def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
-    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if none."""
+    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if
+    missing or text.
+    """
     found = parameters.get(group, {})
     family = [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
     arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
@@ -139,7 +141,9 @@ def _field(parameters: Parameters, name: str) -> float:
 
 
 def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:
-    """Return the believable pairs (channels, samples per frame): those that at most one statement contradicts."""
+    """Return the believable pairs (channels, samples per frame): those that at most one of the file's statements
+    contradicts.
+    """
     used, values, samples = scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
     ratio = scalar(parameters, "ANALOG", "RATE") / (scalar(parameters, "POINT", "RATE") or math.nan)
     ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
@@ -213,7 +217,9 @@ def _counts(
 
 
 def _all_told_twice(header: Header, parameters: Parameters) -> bool:
-    """Return whether header and parameters both tell every count, without contradiction: the rest is padding."""
+    """Return whether header and parameters both tell every count, without contradiction: then bytes behind the data
+    are padding.
+    """
     points = not header.points or "USED" in parameters.get("POINT", {})
     channels = scalar(parameters, "ANALOG", "USED")
     analog = (header.analog_values > 0) == (channels > 0)
@@ -221,7 +227,9 @@ def _all_told_twice(header: Header, parameters: Parameters) -> bool:
 
 
 def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str]) -> tuple[float, float]:
-    """Return point and analog rate in Hz: what two of header, POINT:RATE, ANALOG:RATE / samples tell, else NaN."""
+    """Return point and analog rate in Hz; the value that two of header, POINT:RATE and ANALOG:RATE / samples tell,
+    NaN if none is > 0.
+    """
     analog = scalar(parameters, "ANALOG", "RATE")
     witnesses = {"POINT:RATE": scalar(parameters, "POINT", "RATE"), "the header": header.rate}
     witnesses["ANALOG:RATE / samples per frame"] = analog / samples if samples else math.nan
@@ -241,7 +249,9 @@ def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str
 def _analog_transform(
     parameters: Parameters, channels: int, unsigned: bool, where: str, notes: list[str]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return gain (C,) and offset (C,) of the analog channels; a channel without a scale has gain NaN, no numbers."""
+    """Return gain (C,) and offset (C,) of the analog channels; a channel without a scale has gain NaN, and so no
+    numbers.
+    """
     general, gain, offset = (parameter_numbers(parameters, "ANALOG", name) for name in ("GEN_SCALE", "SCALE", "OFFSET"))
     if channels and not general.size:
         general = np.ones(1)

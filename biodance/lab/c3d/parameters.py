@@ -51,7 +51,9 @@ def integers(content: bytes | memoryview, processor: int, kind: str = "u2") -> N
 
 
 def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
-    """Return the bytes as 32-bit floats (n,) from the processor's format; DEC (VAX F) values are converted to IEEE."""
+    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are
+    converted to IEEE.
+    """
     if processor != DEC:
         return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
@@ -185,7 +187,9 @@ def text_rows(content: bytes, header: Header, where: str, *, group: str, name: s
 
 
 def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, ParameterValue | None]:
-    """Return the next record's position (0 = none), group number, name and value (None = a group) at ``at``."""
+    """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at
+    ``at``.
+    """
     length, group = (int(byte) for byte in np.frombuffer(section[at : at + 2], dtype=np.int8))
     body = at + 2 + abs(length)
     name = section[at + 2 : body].decode("utf-8", "replace").strip().upper()

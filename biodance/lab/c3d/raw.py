@@ -262,7 +262,9 @@ def _smells(
 
 
 def _leaps(points: Array, parameters: Parameters) -> int:
-    """Return how often a marker moves by more than a metre between two seen frames; 0 if the unit is not known."""
+    """Return how often a marker moves by more than a metre between two frames in which it is seen; 0 if the unit is
+    not known.
+    """
     try:
         metre = 1.0 / metres_per_unit(parameters, points, where="")[0]
     except FileRefused:

@@ -91,7 +91,9 @@ def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array
 
 
 def _in_lab(raw: RawC3d, labels: MarkerLabels) -> tuple[Markers | None, float, Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the markers in m in the lab frame, m per unit, lab_R_file (3, 3), decisions and doubts."""
+    """Return the markers in m in the lab frame, the file's unit of length in m, lab_R_file (3, 3), what was decided
+    and what is doubtful.
+    """
     points = raw.points[:, list(labels.columns)]
     metres, units, doubts = metres_per_unit(raw.parameters, points, where=str(raw.path))
     own = _markers(raw, labels, points)

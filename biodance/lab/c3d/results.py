@@ -243,7 +243,9 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
 
 
 def _gathered(group: dict[str, Any], name: str) -> list[str]:
-    """Return a list of texts with its continuations NAME2, NAME3 ..., taken out of the group: ezc3d writes them."""
+    """Return a list of texts with its continuations NAME2, NAME3 ..., which are taken out of the group: ezc3d writes
+    them anew.
+    """
     rest = [text for tail in range(2, 100) for text in group.pop(f"{name}{tail}", {"value": []})["value"]]
     return [*group[name]["value"], *rest]
 

@@ -79,7 +79,9 @@ def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:
 
 @dataclass(frozen=True)
 class MarkerLabels:
-    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``) and is suspicious."""
+    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``), what is
+    suspicious (``warnings``).
+    """
 
     columns: tuple[int, ...]
     names: tuple[str, ...]
@@ -94,7 +96,9 @@ def subjects_of(raw: RawC3d) -> tuple[str, ...]:
 
 
 def poses_only(raw: RawC3d) -> str:
-    """Return the sentence for a file with segment poses (group ROTATION) and no point ever seen; "" for others."""
+    """Return the sentence for a file with segment poses (group ROTATION) and no point that was ever seen; "" for
+    others.
+    """
     poses = [label.removesuffix("_4X4") for label in texts(raw.parameters, "ROTATION", "LABELS") if label]
     if not poses or np.isfinite(raw.points).any():
         return ""
@@ -159,7 +163,9 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
 def _without_repeats(
     raw: RawC3d, columns: list[int], history: list[str], warnings: list[str]
 ) -> tuple[list[int], list[str]]:
-    """Return columns and names without repeated names: unseen or equal repetitions go, others get a number."""
+    """Return columns and names without repeated names: an unseen or equal repetition goes, a different one keeps
+    both apart by number.
+    """
     places: dict[str, list[int]] = {}
     for column in columns:
         places.setdefault(split_label(raw.labels[column])[1], []).append(column)
@@ -258,7 +264,9 @@ def _written(raw: RawC3d) -> dict[str, float]:
 
 
 def _scale(written: dict[str, float]) -> float:
-    """Return metres per unit of length: the unit that makes stature, else leg length, a person's; else mm."""
+    """Return metres per unit of the lengths: the unit that makes stature, else leg length, a person's; mm if neither
+    is there.
+    """
     for name, (low, high) in (("Height", STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG)):
         if name in written:
             fitting = [scale for scale in _SCALES if low <= written[name] * scale <= high]

@@ -29,7 +29,9 @@ CLOSURE = 0.02
 
 @dataclass(frozen=True)
 class MarkerGaps:
-    """How often a marker was hidden: ``percent`` of all frames, ``longest`` gap in s (ends of the recording count)."""
+    """How often a marker was not seen: ``percent`` of all frames, ``longest`` gap in s (the ends of the recording
+    count).
+    """
 
     label: str
     percent: float
@@ -38,7 +40,9 @@ class MarkerGaps:
 
 @dataclass(frozen=True)
 class Gap:
-    """Frames ``start`` to ``stop`` (excluded) of one marker that were not seen; ``how`` it was dealt with, in words."""
+    """Frames ``start`` to ``stop`` (excluded) of one marker that were not seen; ``how`` it was dealt with, one plain
+    sentence.
+    """
 
     label: str
     start: int
@@ -136,7 +140,9 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
 
 
 def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[str]:
-    """Return the labels on the same segment, seen all over the gap, whose distance to the marker varies least."""
+    """Return the labels on the same segment, seen from before to after the gap, whose distance to the marker varies
+    least.
+    """
     own = markers[gap.label]
     spread = {}
     for label in markers.names:

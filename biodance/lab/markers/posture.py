@@ -122,7 +122,9 @@ def _pairs(
 
 
 def _across(outer: tuple[str, str], inner: tuple[str, str], stand: Standing) -> Array:
-    """Return (2, 3) where inner markers of both sides lie from the outer ones: out, ahead, up; share of stature."""
+    """Return (2, 3) where the inner markers of both sides lie from the outer ones: out, ahead, up; shares of the
+    stature.
+    """
     step = (from_the_middle(inner, stand) - from_the_middle(outer, stand)) / stand.stature
     return np.array([step[k] * [1.0 if side == "right" else -1.0, 1.0, 1.0] for k, side in enumerate(SIDES)])
 

@@ -152,7 +152,9 @@ def _guessed(name: str) -> MarkerSet:
 
 
 def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
-    """Return the marker set of a file's contents; in a map, landmarks give their usual places and weights."""
+    """Return the marker set of a file's contents; where it is a map, markers on landmarks get the usual places and
+    weights of these.
+    """
     markers = {label: SetMarker(label, **fields) for label, fields in contents.markers.items()}
     if usual:
         on = {labels[0][0]: place for place, labels in contents.landmarks.items() if len(labels[0]) == 1}

@@ -84,7 +84,9 @@ def _ending(names: Sequence[str]) -> str:
 
 
 def tokens_of(label: str) -> tuple[str, ...]:
-    """Return the words of a label in small letters without accents: split at separators and capitals."""
+    """Return the words of a label in small letters without accents: split at separators and where a word begins with a
+    capital.
+    """
     spoken = "".join(_SPOKEN.get(sign, sign) for sign in label)
     flat = "".join(sign for sign in unicodedata.normalize("NFKD", spoken) if not unicodedata.combining(sign))
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", flat)

@@ -75,7 +75,9 @@ def _segments(labels: tuple[str, ...]) -> dict[str, str]:
 
 
 def clear_axis(direction: Array) -> Array | None:
-    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or not finite."""
+    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or the direction is not
+    finite.
+    """
     size = np.sort(np.abs(direction))
     if not np.isfinite(size).all() or size[2] <= _CLEAR * size[1]:
         return None

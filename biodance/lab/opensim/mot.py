@@ -85,7 +85,9 @@ def read_mot(path: str | Path) -> TimeTable:
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
-    """Return the column labels of a .mot or .sto file without ``time``; FileRefused for a wrong header."""
+    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a
+    wrong header.
+    """
     return tuple(_parts(Path(path))[1][1:])
 
 
@@ -121,7 +123,9 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
 
 
 def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
-    """Return the header (lower-case keys, the table's name under ""), column labels, and numbered rows below."""
+    """Return the header (keys in lower case, the name of the table under ""), the column labels, and the numbered
+    rows below them.
+    """
     rows = read_text(path).splitlines()
     start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
     if start is None:

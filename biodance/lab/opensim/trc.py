@@ -206,7 +206,9 @@ def _spread(values: Array) -> float:
 def _equal_steps(
     number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path
 ) -> tuple[Array, Array, list[str]]:
-    """Return time (T,) with equal steps and the coordinates on it, NaN where a frame is left out, and warnings."""
+    """Return time (T,) with equal steps and the coordinates on it, NaN where the file leaves a frame out, and the
+    warnings.
+    """
     if np.isnan(raw).any() or np.any(np.diff(raw) <= 0):
         frame = int(np.argmax(np.isnan(raw))) if np.isnan(raw).any() else int(np.argmax(np.diff(raw) <= 0)) + 1
         raise FileRefused(

@@ -148,7 +148,9 @@ def _refuse_size(lab: Array, corners: Array) -> None:
 
 
 def _skew(lab: Array) -> float:
-    """Return by how many metres the worst side's end misses its place because its corner is no right angle."""
+    """Return by how many metres the end of a side misses its place because the angle at the corner is not a right
+    one (the worst).
+    """
     sides = np.roll(lab, -1, axis=0) - lab
     lengths = np.linalg.norm(sides, axis=1)
     cosines = np.abs(np.sum(sides * np.roll(sides, -1, axis=0), axis=1)) / (lengths * np.roll(lengths, -1))

@@ -102,7 +102,9 @@ def oriented(
 def _origin_under_feet(
     reading: PlateReading, time: Array, axes: Array, markers: Markers | None
 ) -> tuple[PlateReading, Said]:
-    """Return the reading with ORIGIN x, y turned round where only that puts the load under the feet, and why."""
+    """Return the reading with ORIGIN x, y turned round where only that puts the load under the feet, and what was
+    decided.
+    """
     x, y = 1000 * reading.vector[:2]
     if markers is None or reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < 1000 * LEAST_BESIDE:
         return reading, ()
@@ -153,7 +155,9 @@ def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Marker
 def _under_feet(
     reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers
 ) -> tuple[Array, Said, Said]:
-    """Return the axes after asking the foot markers: by quarter turns where only that puts the load under them."""
+    """Return the axes after asking the foot markers: as they are, or by quarter turns where only that puts the load
+    under them.
+    """
     distance = _distance(reading, time, axes, markers)
     if distance is None:
         return axes, (), ()
@@ -203,7 +207,9 @@ def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
 
 
 def _upwards_said(reading: PlateReading) -> tuple[str, Said]:
-    """Return the sentence about a plate whose z points up; a warning where the maker's have z down (eight channels)."""
+    """Return the sentence about a plate whose z points up, and a warning where the maker's own axes have z down
+    (eight channels).
+    """
     said = "CORNERS make the plate's z point up; the file's axes were used as they are"
     if reading.plate.type not in (3, 7):
         return f"{said}.", ()

@@ -61,7 +61,9 @@ def read_plates(
 
 
 def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
-    """Return the summed wrench of plates that share one time base; TrialRefused without plates or one time base."""
+    """Return the summed wrench of plates that share one time base; TrialRefused without plates or with different
+    time bases.
+    """
     if not plates or any(not np.array_equal(p.wrench.time, plates[0].wrench.time) for p in plates):
         raise TrialRefused(
             "The total wrench needs at least one plate and one time base for all of them. Read the plates from one "
@@ -120,7 +122,9 @@ def _two_signs(readings: list[PlateReading], votes: list[float]) -> tuple[str, .
 
 
 def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None) -> ReadPlates:
-    """Return the plates in the lab frame; unloaded ones take the majority's sign, +1 (reaction) if all are."""
+    """Return the plates in the lab frame; an unloaded plate takes the sign of the majority, +1 (reaction) if nobody
+    stood on any.
+    """
     axes = [plate_axes(r.corners) for r in readings]
     signs = [gravity_sign(r.at_surface(a)[0], a, r.rate) for r, a in zip(readings, axes, strict=True)]
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign

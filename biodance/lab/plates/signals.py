@@ -215,7 +215,9 @@ def _vertical(plate: PlateParameters, forces: Array) -> Array:
 
 
 def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> Array:
-    """Return the mean of each channel over the window; 0 for an empty window and both point channels of TYPE 1."""
+    """Return the mean of each channel over the window; 0 for an empty window and for the two point channels of TYPE
+    1.
+    """
     if stop <= start:
         return np.zeros(channels.shape[1])
     mean = channels[start:stop].mean(axis=0)
@@ -225,7 +227,9 @@ def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> 
 def _moments_in_sense(
     plate: PlateParameters, sensor: Array, vector: Array, corners: Array, *, rate: float, unsure: bool
 ) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the wrench with moments in N·m, decisions and warnings: the declared unit, or the only one that fits."""
+    """Return the wrench with moments in N·m, decisions and warnings: the declared unit, or the only one that puts
+    the load on the plate.
+    """
     axes, half = plate_axes(corners), half_sides(corners)
     loaded = loaded_samples(sensor, rate)
     if not loaded.any():

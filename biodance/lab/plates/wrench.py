@@ -52,7 +52,9 @@ def sensor_wrench(plate: PlateParameters, signals: Array, origin: Array) -> Arra
 
 
 def surface_vector(plate: PlateParameters, origin: Array) -> Array:
-    """Return the vector (3,) m from the point of reference of ``sensor_wrench`` to the surface's centre, by ORIGIN."""
+    """Return the vector (3,) m from the point of reference of ``sensor_wrench`` to the centre of the surface, as
+    ORIGIN (3,) m has it.
+    """
     x, y, z = origin
     if plate.type == 1:
         return np.array([x, y, 0.0])
@@ -156,7 +158,9 @@ def loaded_samples(wrench: Array, rate: float) -> NDArray[np.bool_]:
 
 
 def gravity_sign(wrench: Array, axes: Array, rate: float) -> int:
-    """Return +1 if the recorded wrench pushes up while loaded (it acts on the subject), -1 if down, 0 if unloaded."""
+    """Return +1 if the recorded wrench pushes up on average while loaded (it acts on the subject), -1 if down, 0 if
+    never loaded.
+    """
     loaded = loaded_samples(wrench, rate)
     return int(np.sign((wrench[loaded, :3] @ axes[2]).sum())) if loaded.any() else 0
 
@@ -189,7 +193,9 @@ def sway_sign(wrench: Array, rate: float) -> int:
 
 
 def _standing(vertical: Array, rate: float) -> slice | None:
-    """Return the longest run of half-seconds with the vertical force near the trial's median; None below 2.5 s."""
+    """Return the longest run of whole half-seconds in which the vertical force stays near the trial's median; None
+    below 2.5 s.
+    """
     size = round(0.5 * rate)
     middle = float(np.median(vertical))
     if size < 4 or abs(middle) < 5 * TOUCH_FORCE:

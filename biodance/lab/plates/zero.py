@@ -21,7 +21,9 @@ FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 @dataclass(frozen=True)
 class Baseline:
-    """Samples ``start`` to ``stop`` (exclusive) over which channels are averaged, both 0 for none; ``said`` says it."""
+    """Samples ``start`` to ``stop`` (exclusive) over which each channel is averaged, both 0 for none; ``said`` is
+    the sentence about it.
+    """
 
     start: int
     stop: int
@@ -74,7 +76,9 @@ def is_unloaded(level: float, vertical: Array) -> bool:
 
 
 def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:
-    """Return the means of ``values`` (S,) over whole blocks of ``length`` s (at least one), and samples per block."""
+    """Return the means of ``values`` (S,) over whole blocks of ``length`` s, and the samples per block (at least one
+    block).
+    """
     size = min(max(1, round(length * rate)), values.size)
     count = values.size // size
     return values[: count * size].reshape(count, size).mean(axis=1), size

@@ -48,7 +48,9 @@ FAMILY: Family[Reader] = Family(
 
 
 def readers(chosen: Chosen[Reader] = None) -> tuple[Reader, ...]:
-    """Return the readers in the order of asking; ``chosen`` names choose from the family, objects join it."""
+    """Return the readers in the order in which they are asked; ``chosen`` names choose from the family, objects join
+    it.
+    """
     return tuple(sorted(FAMILY.choose(chosen).values(), key=lambda reader: (reader.PREFERENCE, reader.NAME)))
 
 

@@ -87,7 +87,9 @@ class TrialEntry(_Entry):
 
 
 class MarkersEntry(_Entry):
-    """The table ``[markers]``: the ``file`` (or name) of a marker set, or the ``map`` from label to place."""
+    """The table ``[markers]``: the ``file`` (or name) of a marker set, or the ``map`` of labels to landmarks and
+    segments.
+    """
 
     file: str | None = None
     map: dict[str, str] | None = None
@@ -126,13 +128,17 @@ class SessionFile:
     visit: VisitEntry = field(default_factory=VisitEntry)
 
     def role(self, name: str) -> Role | None:
-        """Return the role of a trial: by its exact name, else by the first pattern that fits; case does not count."""
+        """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case
+        count the same.
+        """
         exact = [entry.role for key, entry in self.trials if key.lower() == name.lower()]
         similar = [entry.role for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
         return next((role for role in exact + similar if role), None)
 
     def unused(self, names: list[str]) -> list[str]:
-        """Return the keys of ``[trials]`` that fit no trial, each with the closest name: mostly slips of the pen."""
+        """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the
+        pen.
+        """
         said = []
         for key, _ in self.trials:
             if not any(fnmatchcase(name.lower(), key.lower()) for name in names):
@@ -216,7 +222,9 @@ def _beside(path: Path, found: _Contents) -> _Contents:
 
 
 def _whole_numbers_are_numbers(raw: Any) -> Any:
-    """Return the tables with ``70`` read as ``70.0`` (strict pydantic keeps text and truth values apart)."""
+    """Return the tables with ``70`` read as ``70.0`` (strict pydantic keeps text and truth values apart from
+    numbers).
+    """
     if isinstance(raw, dict):
         return {key: _whole_numbers_are_numbers(value) for key, value in raw.items()}
     return float(raw) if isinstance(raw, int) and not isinstance(raw, bool) else raw

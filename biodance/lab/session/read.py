@@ -218,7 +218,9 @@ def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
 def _settle_static(
     trials: list[Trial], settings: SessionFile, reasons: dict[str, str], notes: list[str]
 ) -> list[Trial]:
-    """Return the trials with one of them as static where nobody told which; note one that moves, or none."""
+    """Return the trials with one of them as static where nobody told which; note a static that moves, or that there
+    is none.
+    """
     for trial in trials:
         if trial.role == "static" and trial.markers is not None and not is_still(trial):
             notes.append(

@@ -123,14 +123,18 @@ def _same_bytes(one: Path, other: Path) -> bool:
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
-    """Return the files directly in a folder whose extension or content says that they are recordings, by name."""
+    """Return the files directly in a folder whose extension or content says that they are recordings, sorted by
+    name.
+    """
     legal = extensions(readers)
     files = (path for path in sorted(folder.iterdir()) if not path.is_dir() and not path.name.startswith("."))
     return [path for path in files if path.suffix.lower() in legal and _is_data(path, readers)]
 
 
 def recordings_below(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
-    """Return the recordings in a folder and all folders below it, sorted by path, without tables of a .trc file."""
+    """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file
+    are left out.
+    """
     folders = [folder, *(path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.name.startswith("."))]
     return sorted(_without_companions([file for place in folders for file in recordings_in(place, readers)], readers))
 

@@ -113,7 +113,9 @@ def _typed(value: float | None) -> list[Declared]:
 def _declared(
     sources: Mapping[str, Mapping[str, float]], names: Iterable[str], legal: tuple[float, float]
 ) -> list[Declared]:
-    """Return what the sources declare under one of the names, in order; illegal values count as not declared."""
+    """Return what the sources declare under one of the names, in order; values outside the legal range count as not
+    declared.
+    """
     found = []
     for source, values in sources.items():
         lower = {key.lower(): value for key, value in values.items()}
@@ -139,7 +141,9 @@ def _choose(quantity: str, unit: str, declared: list[Declared], notes: list[str]
 
 
 def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> float:
-    """Return the declared mass, else the one on the plates; note the guess, and what contradicts the mass used."""
+    """Return the declared mass, else the one on the plates; note the guess, and what contradicts the mass that is
+    used.
+    """
     if not on_plates:
         return mass
     first = on_plates[0]

@@ -178,7 +178,9 @@ def speeds(soles: Soles, plates: tuple[Plate, ...] = (), moving: Array | None = 
 
 
 def resting(speed: Array, time: Array, *, still: float, lasting: float) -> Mask:
-    """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for ``lasting`` s (or the trial)."""
+    """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for at least ``lasting`` s (or the
+    whole trial).
+    """
     slow = np.asarray((speed < still).all(axis=2))
     least = 1 if time.size < 2 else min(time.size, int(np.ceil(lasting / np.median(np.diff(time)))))
     found = np.zeros_like(slow)
@@ -196,7 +198,9 @@ def dilate(mask: Mask, frames: int) -> Mask:
 
 
 def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight: float) -> Surfaces:
-    """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N or NaN."""
+    """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N (NaN =
+    unknown).
+    """
     plates = sorted({round(plate.height, 3) for plate in trial.plates})
     offset = _offsets(trial, soles, rests, load)
     low = (soles.outline[..., 2] - offset).min(axis=2)

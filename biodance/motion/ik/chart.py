@@ -15,7 +15,9 @@ from biodance.spatial import continuous_quaternion, unit_quaternion
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """G ball joints: ``first`` (G,) index of the first joint, ``sign`` (G, 1) of their axes' handedness."""
+    """G ball joints: ``first`` (G,) index of the first of the three joints, ``sign`` (G, 1) of their axes'
+    handedness.
+    """
 
     first: np.ndarray
     sign: Array
@@ -99,7 +101,9 @@ def _turned_near(angles: Array, middle: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """B postures: ``place`` (3, B) m, ``root`` (4 or 0, B) quaternion, ``ball`` (4, G, B), ``angle`` (m, B) rad."""
+    """B postures: ``place`` (3, B) m and ``root`` (4, B) quaternion, (0, B) for a fixed root; ``ball`` (4, G, B);
+    ``angle`` (m, B) rad.
+    """
 
     place: Array
     root: Array
@@ -117,7 +121,9 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Maps q to smooth coordinates and back: ball ``joints``, ``single`` (m,) others, limits (3, G, 1) rad."""
+    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G,
+    1) rad of the balls.
+    """
 
     joints: Balls
     single: Index
@@ -136,7 +142,9 @@ class Chart:
         return self.joint_count + (7 if self.n_root else 0)
 
     def smooth(self, q: Array) -> Smooth:
-        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and turns continued)."""
+        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and full turns are continued
+        along them).
+        """
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
         ball = continued(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
@@ -149,7 +157,9 @@ class Chart:
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
     def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B), normalised; ``near`` (n, B) rad decides between equal sets of Cardan angles."""
+        """Return q (nq, B); quaternions are normalised here; ``near`` (n, B) rad decides between equal sets of
+        Cardan angles.
+        """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
         ball = ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper)

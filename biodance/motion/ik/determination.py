@@ -20,7 +20,9 @@ posture to be determined.
 
 @dataclass(frozen=True, eq=False)
 class Determination:
-    """Per frame: ``determined`` (T,); ``open_coordinates`` names what the best-seen frame leaves open (or none)."""
+    """Per frame: ``determined`` (T,); ``open_coordinates`` names what the best-seen frame leaves open (empty if it
+    is determined).
+    """
 
     determined: NDArray[np.bool_]
     open_coordinates: tuple[str, ...]

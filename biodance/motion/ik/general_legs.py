@@ -138,7 +138,9 @@ def _meeting(rotation: Array, translation: Array, axis: Array) -> Array:
 
 
 def _length_terms(rotation: Array, translation: Array, axis: Array, hip: Array, low: Array, high: Array) -> Array:
-    """Return a, b, c (3, K) of the squared hip-ankle distance, mid-range and in K - 1 postures of hip and ankle."""
+    """Return a, b, c (3, K) of the squared hip-ankle distance, in the middle of the ranges and in K - 1 postures of
+    hip and ankle.
+    """
     angles = np.random.default_rng(0).uniform(low, high, (_POSTURES, 6))
     angles[0] = (low + high) / 2
     squares = []

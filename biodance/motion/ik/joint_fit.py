@@ -138,7 +138,9 @@ class CalibrationState:
 
 
 def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:
-    """Return ``POSTURES`` frames, or as many as there are, evenly from all trials; NaN where a trial lacks a marker."""
+    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
+    marker.
+    """
     parts = [
         np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials
     ]

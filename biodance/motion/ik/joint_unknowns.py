@@ -49,7 +49,9 @@ def centre_sd(joint: str, *, contradicted: bool = False) -> float:
 
 
 def hinge_sd() -> float:
-    """Return the sd (m per axis) of the centre of a knee or elbow about where lateral marker and axis place it."""
+    """Return the standard deviation (m per axis) of the centre of a knee or elbow about where lateral marker and
+    axis place it.
+    """
     return error_size("hinge_centre", "hinge", state="before")
 
 

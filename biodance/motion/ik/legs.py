@@ -18,7 +18,9 @@ LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_do
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One leg: columns of its six angles, sign of the mirrored axes, and the constant placements between its joints."""
+    """One leg of a body: columns of its six angles, sign of the mirrored axes, and the constant placements between
+    its joints.
+    """
 
     columns: tuple[int, ...]
     sign: float
@@ -48,7 +50,9 @@ class Leg:
 
     @staticmethod
     def fits(body: Body, side: str) -> bool:
-        """Return whether the ``side`` leg of a body has this closed form: joints' names, order, axes, hip and ankle."""
+        """Return whether the ``side`` leg of a body has the joints of this closed form: names, order, axes, meeting
+        in hip and ankle.
+        """
         names, s = [joint.name for joint in body.joints], -1.0 if side == "left" else 1.0
         index = [names.index(name) if (name := f"{side}_{movement}") in names else -2 for movement in LEG]
         if min(index) < 0 or any(body.joints[j].parent != p for j, p in zip(index, [-1, *index[:-1]], strict=True)):
@@ -110,7 +114,9 @@ class Leg:
 
 
 def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
-    """Return ``value`` unchanged below ``limit - width`` and smoothly (3 derivatives) approaching ``limit`` above."""
+    """Return ``value`` unchanged below ``limit - width`` and smoothly (three derivatives) approaching ``limit``
+    above.
+    """
     over = np.maximum(value - (limit - width), 0.0) / width
     return np.where(over > 0, limit - width + width * (over / (1 + over**4) ** 0.25), value)
 

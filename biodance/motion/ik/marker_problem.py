@@ -37,7 +37,9 @@ class MarkerProblem:
 
 
 class Minimum(NamedTuple):
-    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, projected gradient; ``steps`` (B,) tried."""
+    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, largest projected gradient; ``steps``
+    (B,) steps tried.
+    """
 
     q: Array
     cost: Array
@@ -70,7 +72,9 @@ def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: flo
 
 
 def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, steps: int = _STEPS) -> Minimum:
-    """Return the minima (F frames) of ``frames`` (F,) reached from ``start`` (F, nq) in at most ``steps`` steps."""
+    """Return the minima (F frames) of ``frames`` (F,) reached from the postures ``start`` (F, nq) in at most
+    ``steps`` steps.
+    """
     count, joints = len(frames), len(problem.chain.lower)
     q = np.array(start, order="C")
     angles = q[:, q.shape[1] - joints :]

@@ -18,7 +18,9 @@ _OTHERS = 0.01
 
 
 def guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
-    """Return q (F, nq): angles at a ``share`` of their range (None: zero), the root where its markers say."""
+    """Return q (F, nq): the angles at a ``share`` of their range between the limits (None: zero), the root where its
+    markers say.
+    """
     lower, upper = problem.chain.lower, problem.chain.upper
     angles = np.clip(np.zeros(len(lower)), lower, upper)
     if share is not None:
@@ -104,14 +106,18 @@ def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | No
 
 
 def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
-    """Return the minima reached from the postures ``guess`` (F, nq), roots first put by the markers if nearer."""
+    """Return the minima reached from the postures ``guess`` (F, nq), each root first put where the markers say if
+    that is nearer.
+    """
     moved = place_root(problem, frames, guess[:, guess.shape[1] - len(problem.chain.lower) :])
     own, other = (minimise_markers(problem, frames, q, steps=0) for q in (guess, moved))
     return retry(problem, frames, minimise_markers(problem, frames, better(own, other).q))
 
 
 def retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
-    """Return ``found``, doubtful frames tried again: from markers, and from the nearest sound frames on both sides."""
+    """Return ``found`` with the doubtful frames tried again: from their markers, and from the nearest sound frames
+    on both sides.
+    """
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
     doubtful = rms > DOUBT[0] * median_filter(rms, min(NEIGHBOURS, len(rms)), mode="mirror") + DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)

@@ -54,7 +54,9 @@ def methods_text(document: Mapping[str, Any]) -> str:
 
 
 def _value(document: Mapping[str, Any], path: _Path) -> Any:
-    """Return the value at a path; None where there is none; identification tops its own results.json."""
+    """Return the value at a path; None where there is none. What identification found stands at the top of its own
+    results.json.
+    """
     whole = document.get("identification") is None and path[0] == "identification"
     found: Any = document
     for key in path[1:] if whole else path:

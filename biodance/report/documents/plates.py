@@ -10,7 +10,9 @@ from biodance.pipeline.plates import PlatesJudged
 
 
 def plates_document(found: PlatesJudged) -> dict[str, Any]:
-    """Return all that was found: a card per plate, persons, what all share, and what was left out; null if unknown."""
+    """Return all that was found: a card per plate, persons, what all share, and what was left out; null where nothing
+    tells a quantity.
+    """
     judged = found.judgement
     return {
         "archive": found.archive.resolve().name,

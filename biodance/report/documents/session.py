@@ -90,7 +90,9 @@ def _average(values: Any) -> float | None:
 
 
 def plain_values(value: object) -> Any:
-    """Return ``value`` made of dict, list, str, int, float, bool and None only; not finite becomes None."""
+    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes
+    None.
+    """
     if isinstance(value, float) and not isinstance(value, np.generic):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -198,7 +200,9 @@ def _optional_joints(shown: ShownJoints) -> dict[str, Any]:
 
 
 def results_document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
-    """Return all of ``result`` as one JSON document; null where a step was refused or is not in this version."""
+    """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this
+    version.
+    """
     subject, found = result.subject, result.identification
     return {
         "session": result.session.folder.name,

@@ -68,7 +68,9 @@ def criterion_figure(values: Array, bound: float) -> "Figure":
 
 
 def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
-    """Draw the zero-moment point of every move, below on the straight way, above in the dance; a column a stance."""
+    """Draw the zero-moment point of every move, below on the straight way between the postures, above in the dance;
+    a column a stance.
+    """
     names = list(dict.fromkeys(path.stance.name for path in paths))
     with look():
         drawn = figure(4.0)

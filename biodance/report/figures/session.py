@@ -102,7 +102,9 @@ def _square(middle: Array, reach: float, labels: tuple[str, str]) -> tuple[Axis,
 
 
 def standing_figure(standing: QuietStanding) -> str:
-    """Return centre of pressure, centre of mass, feet and plates in the subject's axes, the middle enlarged beside."""
+    """Return centre of pressure, centre of mass, feet and plates in the subject's own axes, and beside it the middle,
+    enlarged.
+    """
     tracked = bool(standing.com.size)
     labels = ("to the subject's right (mm)", "ahead (mm)") if tracked else ("along lab −y (mm)", "along lab x (mm)")
     shown = _turned(np.concatenate([standing.feet, standing.cop]), standing)

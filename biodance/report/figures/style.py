@@ -55,7 +55,9 @@ def figure(height: float, *, width: float = FIGURE_WIDTH) -> "Figure":
 
 
 def svg_address(drawn: "Figure") -> str:
-    """``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same characters."""
+    """Return ``drawn`` as the address of an image (``data:image/svg+xml``): the same figure gives the same
+    characters.
+    """
     stream = BytesIO()
     with look():
         drawn.savefig(stream, format="svg", metadata={"Date": None})

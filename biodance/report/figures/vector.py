@@ -90,7 +90,9 @@ def round_ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
 
 
 def envelope(values: Array) -> NDArray[np.int64]:
-    """Return the indices (n,) of ``values`` (T,) that a curve needs: all, or the lowest and highest of every place."""
+    """Return the indices (n,) of ``values`` (T,) that a curve needs: all, or of every place along a long one the
+    lowest and the highest.
+    """
     if values.size <= 2 * _PLACES:
         return np.arange(values.size)
     edges = np.linspace(0, values.size, _PLACES + 1).astype(int)

@@ -27,7 +27,9 @@ from biodance.report.wording import format_number, named, sized, trial_and_subje
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
-    """Return measured minus simulated wrench of the first kept trial in six channels: body in use, and findings."""
+    """Return measured minus simulated wrench of the first kept trial in six channels: with the body in use, and with
+    the findings.
+    """
     before, after = (one.left[0] for one in left)
     rate, use = left[0].rate[0], left[0].use[0]
     time = np.arange(len(before)) / rate
@@ -78,7 +80,9 @@ def adequacy_table(rows: tuple[Adequacy, ...]) -> str:
 
 
 def limits_figure(rows: tuple[Unobservable, ...]) -> str:
-    """Return per kind of cause from which size on this session sees it, in typical sizes: best and worst place."""
+    """Return per kind of cause from which size on this session sees it, in typical sizes: the best and the worst of
+    its places.
+    """
     kinds: dict[str, list[float]] = {}
     for row in rows:
         kinds.setdefault(row.effect, []).append(row.limit / row.typical)

@@ -43,7 +43,9 @@ _PANELS = (("mass", 1.0, "mass (kg)"), ("com y", 1000.0, "centre of mass along t
 
 
 def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference, ...]") -> str:
-    """Return what changed in every segment, later less earlier, with 95 % intervals: red ``certain``, open unknown."""
+    """Return what changed in every segment, later less earlier, with 95 % intervals: red what is ``certain``, open
+    where nothing is known.
+    """
     names = list(dict.fromkeys(row.segment for row in changes))
     ticks = tuple((len(names) - 1.0 - i, name.replace("_", " ")) for i, name in enumerate(names))
     y, drawn = Axis(-0.6, len(names) - 0.4, "", ticks), []

@@ -126,7 +126,9 @@ def _dates(found: PlatesJudged) -> str:
 
 
 def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
-    """Write ``report.html``, ``results.json`` and ``plates.csv`` into ``folder`` (it exists); return the numbers."""
+    """Write ``report.html``, ``results.json`` and ``plates.csv`` into ``folder`` (which exists) and return the
+    numbers.
+    """
     document = plates_document(found)
     texts = {
         "results.json": to_text(document),

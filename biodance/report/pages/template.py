@@ -86,7 +86,9 @@ def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
 
 
 def print_sheet(title: str, visit: Mapping[str, str], made: str) -> str:
-    """Return the style of the printed page's margins: what it is above; when, by whom and page number below."""
+    """Return the style of the printed page's margins: what it is above, when and by whom it was made and the page's
+    number below.
+    """
     about = " · ".join(f"{what} {said}" for what, said in visit.items() if said)
     boxes = {
         "top-left": _css_text(title),

@@ -50,7 +50,9 @@ class Hidden:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a cause may change: the ``visit``, and the ``loads`` of the ``person`` in the trials of ``protocol``."""
+    """What a cause may change: the ``visit``, and the ``loads`` that the ``person`` carries through the trials of
+    ``protocol``.
+    """
 
     person: Person
     protocol: Protocol
@@ -160,7 +162,9 @@ def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidde
 
 
 def _longer(cause: Hidden, scene: Scene) -> Scene:
-    """Make a thigh or shank ``error`` m longer than its markers say: its end and all that hangs on it lie lower."""
+    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower, with all that
+    hangs on it.
+    """
     ends = {
         f"{side}_{upper}": f"{side}_{joint}"
         for side in SIDES

@@ -35,7 +35,9 @@ def decoding(plate: PlateRecording) -> Array:
 
 
 def on_plate(target: str, change: PlateChange) -> Fault:
-    """Return the fault that applies ``change`` to the plate in the target (``plate2:Fz``), or to the first one."""
+    """Return the fault that applies ``change`` to the plate that the target names (``plate2:Fz``), or to the first
+    one.
+    """
 
     def fault(recording: Recording) -> Recording:
         index = _plate_index(target, len(recording.plates))
@@ -99,7 +101,9 @@ def plate_crosstalk(target: str, ratio: float) -> Fault:
 
 
 def plate_drift(target: str, drift: float, clock: dict[str, tuple[float, float]]) -> Fault:
-    """Let the zero of a channel wander by ``drift`` over the session; ``clock``: from and to where each trial lies."""
+    """Let the zero of a channel wander by ``drift`` over the session; ``clock`` says from and to where in the
+    session each trial lies.
+    """
     unit = np.eye(6)[fault_channel(target)]
 
     def change(wrench: Array, recording: Recording) -> Array:

@@ -60,7 +60,9 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
 
 
 def external_contact(target: str, force: float) -> AppliedForce:
-    """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part; one in every 4 s."""
+    """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part of the body; one
+    in every 4 s.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         rng = stream(performance.person.seed, "touch", target, performance.plan.name)
@@ -106,7 +108,9 @@ def slack_harness(target: str, stiffness: float) -> AppliedForce:
 
 
 def table_edge(target: str, force: float) -> AppliedForce:
-    """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in 2 s, either sign."""
+    """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in every 2 s, of
+    either sign.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         rng = stream(performance.person.seed, "table", performance.plan.name)
@@ -122,7 +126,9 @@ def table_edge(target: str, force: float) -> AppliedForce:
 
 
 def spinning_wheel(target: str, momentum: float) -> AppliedForce:
-    """Carry a wheel that spins in a rucksack about the chest's right-left axis, of angular ``momentum`` (N·m·s)."""
+    """Carry a wheel that spins in a rucksack about the right-left axis of the chest: its angular ``momentum``
+    (N·m·s) resists turning.
+    """
 
     def act(performance: Performance, time: Array) -> Array:
         turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
@@ -191,7 +197,9 @@ def wobbling_mass(person: Person, target: str, mass: float) -> AppliedForce:
 
 
 def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> tuple[AddedLoad, AppliedForce]:
-    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move."""
+    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, and what
+    sloshing adds.
+    """
     segment = _carrier(target)
     place = person.body.sip.com[TRUE_SEGMENTS.index(segment)] + np.array([-0.16, 0.0, 0.0])
     return AddedLoad(segment, mass, place, np.full(3, 0.05)), loose(segment, place, sloshing, LIQUID)

@@ -48,7 +48,9 @@ def dropped_frames(target: str, count: float) -> Fault:
 
 
 def swaying_cameras(target: str, sway: float) -> Fault:
-    """Swing the frame that carries the cameras at 1.7 Hz with an amplitude of ``sway`` (m): markers seem to move."""
+    """Swing the frame that carries the cameras at 1.7 Hz with an amplitude of ``sway`` (m): all markers seem to
+    move.
+    """
 
     def fault(recording: Recording) -> Recording:
         markers = recording.markers
@@ -64,7 +66,9 @@ _SLACK = (10.0, 20.0, 40.0)
 
 
 def filter_mismatch(target: str, cutoff: float) -> Fault:
-    """Smooth all channels at ``cutoff`` Hz (second order, twice, without lag), as an amplifier may before storing."""
+    """Smooth all channels at ``cutoff`` Hz (second order, twice, without lag), as an amplifier may before they are
+    stored.
+    """
 
     def fault(recording: Recording) -> Recording:
         from scipy.signal import butter, sosfiltfilt
@@ -81,7 +85,9 @@ def filter_mismatch(target: str, cutoff: float) -> Fault:
 
 
 def plate_hysteresis(target: str, width: float) -> Fault:
-    """Let a channel follow its load in a loop of half ``width`` (N or N·m): joints with play carry part (`SLACK`)."""
+    """Let a channel follow its load in a loop of half ``width`` (N or N·m): part of the load passes through joints
+    with play (`SLACK`).
+    """
     index = fault_channel(target)
     slacks = np.array(_SLACK) * (1.0 if index < 3 else 0.33)
 
@@ -136,7 +142,9 @@ def plate_bending(target: str, size: float) -> Fault:
 
 
 def loose_connection(target: str, gain: float) -> Fault:
-    """Shake a plug of bad contact: for some tenths of a second a channel reads ``gain`` too much, about once in 3 s."""
+    """Shake a plug with bad contact: for some tenths of a second a channel reads ``gain`` too much, about once in 3
+    s and at least once.
+    """
     index = fault_channel(target)
 
     def change(wrench: Array, recording: Recording) -> Array:
@@ -151,7 +159,9 @@ def loose_connection(target: str, gain: float) -> Fault:
 
 
 def trigger_jitter(target: str, jitter: float) -> Fault:
-    """Start every trial's forces at another time: late by a standard deviation of ``jitter`` (s), drawn per trial."""
+    """Start the forces of every trial at another time: late by a standard deviation of ``jitter`` (s), drawn per
+    trial.
+    """
     return lambda recording: all_late(recording, np.asarray(jitter * stream(3, "trigger", recording.name).normal()))
 
 
@@ -168,7 +178,9 @@ def object_on_plate(target: str, weight: float) -> Fault:
 
 
 def saturating(target: str, ratio: float) -> Fault:
-    """Let a channel read less the more it is loaded: ``ratio`` less at 1000 N or 300 N·m, growing with its square."""
+    """Let a channel read less the more it is loaded: ``ratio`` less at 1000 N or 300 N·m, growing with the square of
+    the load.
+    """
     index = fault_channel(target)
     full = 1000.0 if index < CHANNELS.index("Mx") else 300.0
 

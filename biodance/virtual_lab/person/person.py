@@ -162,7 +162,9 @@ def _box(phi: Array) -> Array:
 
 
 def _sole(size: Proportions, side: str) -> Foot:
-    """Return a foot's outline on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al. 2017)."""
+    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al.
+    2017).
+    """
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
     corners = [
         (back, 0.6 * half),

@@ -139,7 +139,9 @@ class _Builder:
         self.joints: list[Joint] = []
 
     def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
-        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent; return its index."""
+        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its
+        last index.
+        """
         rotations = ROTATIONS[joint]
         row = TRUE_SEGMENTS.index(segment) if segment else -1
         for k, (motion, axis) in enumerate(rotations):

@@ -94,7 +94,9 @@ class Laboratory:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One trial as the instruments deliver it, unwritten; ``parameters`` of the C3D file. Faults map this record."""
+    """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are
+    functions of this record.
+    """
 
     name: str
     role: Role
@@ -139,7 +141,9 @@ FIRST_VISIT = LabVisit()
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """A visit's true instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, skin under markers."""
+    """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under
+    the markers.
+    """
 
     visit: LabVisit
     plates: tuple[TruePlate, ...]
@@ -185,7 +189,9 @@ def _places(laboratory: Laboratory) -> list[tuple[str, Array, Array]]:
 
 
 def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
-    """Let the person perform a trial where the plates are, with the forces and the moved markers of the visit."""
+    """Let the person perform one trial where the laboratory's plates are, with the forces and the moved markers of
+    the visit.
+    """
     visit = instruments.visit
     lab = visit.laboratory
     if plan.role != "static":
@@ -233,7 +239,9 @@ def record(performance: Performance, instruments: Instruments) -> Recording:
 def measurements(
     person: Person, session: int, tolerances: LabTolerances
 ) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
-    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with their errors."""
+    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of
+    tape and calliper.
+    """
     rng = stream(person.seed, "measurements", str(session))
     size = person.size
     sided = {

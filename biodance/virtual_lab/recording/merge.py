@@ -34,7 +34,9 @@ TrueFrames = dict[str, tuple[Array, Array]]
 
 
 def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[TrueFrames, TrueFrames]:
-    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), else as at the gluing."""
+    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as the
+    markers were glued.
+    """
     if q is None:
         q = body.neutral
         q[7:] = reference_angles(person)

@@ -149,7 +149,9 @@ def place(chain, q, at):
 
 @compiled
 def add_up(chain, xyz, weight, q, at):
-    """Fill the sums of ``at`` for markers xyz (K, 3) m of ``weight`` (K,) at posture q; return the cost, m²."""
+    """Fill the sums of ``at`` for markers xyz (K, 3) m of ``weight`` (K,) at a placed posture q; return the cost,
+    m².
+    """
     S, cost = at.below, 0.0
     S[:] = 0.0
     x, y, z = (q[0], q[1], q[2]) if chain.roots else (0.0, 0.0, 0.0)

@@ -22,7 +22,9 @@ def slope_at(before, at, after, one, two):
 
 @compiled
 def smooth_at(known, values, k, frame, out):
-    """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between ``known`` frames k and k + 1."""
+    """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between the ``known`` frames k and k +
+    1.
+    """
     last, width = known.shape[0] - 1, float(known[k + 1] - known[k])
     share = (frame - known[k]) / width
     h0, h1 = (1 + 2 * share) * (1 - share) ** 2, share * share * (3 - 2 * share)
@@ -39,7 +41,9 @@ def smooth_at(known, values, k, frame, out):
 
 @compiled
 def posture_of(chain, smooth, near, single, q):
-    """Fill q (nq,) from ``smooth`` coordinates (see ``chart``); ``near`` (nq,) decides between equal Cardan angles."""
+    """Fill q (nq,) from ``smooth`` coordinates (see ``chart``); ``near`` (nq,) decides between equal sets of Cardan
+    angles.
+    """
     first, c = q.shape[0] - chain.parent.shape[0], 0
     if chain.roots:
         for c in range(3):

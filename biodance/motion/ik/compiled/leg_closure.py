@@ -159,7 +159,9 @@ def solve_step(s, damping):
 
 @compiled
 def reach_for(leg, angles, turn, place, rounds, s):
-    """Improve ``angles`` (6,) until the foot has the pose ``turn``, ``place``; return how far it is from it then."""
+    """Improve ``angles`` (6,) until the foot has the pose ``turn``, ``place``; return how far it is from it in the
+    end.
+    """
     away = np.inf
     for _ in range(rounds):
         place_foot(leg, angles, s)

@@ -123,7 +123,9 @@ def shorten(chain, x):
 
 @compiled
 def centred_squares(chain, xyz, weight):
-    """Return weighted squared distances of markers from their mean, m² (from the lab's origin for a fixed root)."""
+    """Return the weighted squared distances of the markers from their mean, m² (from the lab's origin for a fixed
+    root).
+    """
     total, square = 0.0, 0.0
     mean = np.zeros(3)
     for k in range(xyz.shape[0]):
