@@ -7,6 +7,8 @@ import sqlite3
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from pathlib import Path
 
@@ -15,6 +17,7 @@ import pandas as pd
 import pytest
 
 import biodance
+from biodance.batch.engines import TRIES, _submitted
 from biodance.batch.rows import ROW_TYPES, rows_of
 from biodance.batch.run import LEDGER, Ledger, run_batch
 from biodance.batch.summary import outliers, summary_table
@@ -31,9 +34,9 @@ def archive_of(folder: Path, count: int) -> Path:
     return folder
 
 
-def worked(archive: Path) -> dict[str, int]:
+def worked(archive: Path, log: str = "worked.log") -> dict[str, int]:
     """Return how many times each session was worked on."""
-    return {path.parent.name: len(path.read_text().splitlines()) for path in archive.rglob("worked.log")}
+    return {path.parent.name: len(path.read_text().splitlines()) for path in archive.rglob(log)}
 
 
 def test_every_session_once_and_a_second_call_does_nothing(tmp_path: Path) -> None:
@@ -69,6 +72,21 @@ def test_a_session_that_kills_its_process_takes_nobody_along(tmp_path: Path) -> 
         known = dict(book.execute("SELECT name, status FROM sessions"))
     assert known == {"s0": "done", "s1": "done", "s2": "failed", "s3": "done", "s4": "done"}
     assert worked(archive) == {"s0": 1, "s1": 1, "s3": 1, "s4": 1}
+
+
+def test_what_is_at_work_beside_a_process_that_dies_is_not_begun_again(tmp_path: Path) -> None:
+    archive = archive_of(tmp_path / "a", 4)
+    found = run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_beside_slow)
+    assert found.counts == {"done": 3, "failed": 1}
+    assert worked(archive, "begun.log") == {"s0": 1, "s1": 1, "s2": TRIES, "s3": 1}
+
+
+def test_a_process_killed_between_two_sessions_is_a_lost_process() -> None:
+    with ProcessPoolExecutor(1) as pool:
+        assert isinstance(pool.submit(os._exit, 1).exception(), BrokenProcessPool)
+        assert isinstance(
+            _submitted(pool, batch_work.count, SessionTask("s", "", "", "")).exception(), BrokenProcessPool
+        )
 
 
 def test_processes_that_die_once_are_replaced(tmp_path: Path) -> None:

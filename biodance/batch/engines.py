@@ -3,7 +3,7 @@
 import multiprocessing
 import os
 import threading
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -27,51 +27,56 @@ _FRESH = 50
 def run_here(tasks: Iterable[SessionTask], work: Work, *, workers: int) -> Iterator[tuple[SessionTask, Outcome]]:
     """Yield every task with its outcome, worked on by processes of this machine, as they are finished.
 
-    A process that dies (killed, out of memory) is replaced; the sessions that may have been its cause are tried again
-    one at a time, and given up when alone they lose their process `TRIES` times.
+    A process that dies (killed, out of memory) is replaced and takes no other along; its session is tried again when
+    all others are finished, one at a time, and given up when it has lost its process `TRIES` times.
     """
-    waiting, lost = deque(tasks), Counter[str]()
-    while waiting:
-        pool, flying = _pool(workers), dict[Future[Outcome], SessionTask]()
-        try:
-            yield from _until_broken(pool, work, workers, waiting, flying, lost)
-        except BrokenProcessPool:
-            gone = tuple(flying.values())
-            for task in gone:
-                lost[task.name] += 1 if len(gone) == 1 or not lost[task.name] else 0
-                if lost[task.name] < TRIES:
-                    waiting.append(task)
+    lost = deque[SessionTask]()
+    yield from _beside(deque(tasks), work, workers, lost)
+    for _ in range(TRIES - 1):
+        again, lost = lost, deque[SessionTask]()
+        yield from _beside(again, work, 1, lost)
+    for task in lost:
+        yield task, _killed(task)
+
+
+def _beside(
+    waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask]
+) -> Iterator[tuple[SessionTask, Outcome]]:
+    """Yield what is finished until all is; the tasks whose process died go to ``lost``.
+
+    Each worker is a pool of one process: the death of a process ends every process of its pool.
+    """
+    free = [_process() for _ in range(min(workers, len(waiting)))]
+    flying = dict[Future[Outcome], tuple[SessionTask, ProcessPoolExecutor]]()
+    try:
+        while waiting or flying:
+            while waiting and free:
+                task, pool = waiting.popleft(), free.pop()
+                flying[_submitted(pool, work, task)] = task, pool
+            for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                task, pool = flying.pop(future)
+                try:
+                    outcome = future.result()
+                except BrokenProcessPool:
+                    pool.shutdown()
+                    free.append(_process())
+                    lost.append(task)
                 else:
-                    yield task, _killed(task)
-        finally:
+                    free.append(pool)
+                    yield task, outcome
+    finally:
+        for pool in (*free, *(pool for _, pool in flying.values())):
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _until_broken(
-    pool: ProcessPoolExecutor,
-    work: Work,
-    workers: int,
-    waiting: deque[SessionTask],
-    flying: dict[Future[Outcome], SessionTask],
-    lost: Counter[str],
-) -> Iterator[tuple[SessionTask, Outcome]]:
-    """Yield what is finished until all is, or until a process dies: then ``flying`` are the tasks that may be why.
-
-    A task that lost a process before is worked on alone.
-    """
-    while waiting or flying:
-        while waiting and (not flying or _together(waiting[0], flying, workers, lost)):
-            flying[pool.submit(work, waiting[0])] = waiting[0]
-            waiting.popleft()
-        finished, _ = wait(flying, return_when=FIRST_COMPLETED)
-        for future in sorted(finished, key=lambda one: one.exception() is not None):
-            outcome = future.result()
-            yield flying.pop(future), outcome
-
-
-def _together(task: SessionTask, flying: dict[Future[Outcome], SessionTask], workers: int, lost: Counter[str]) -> bool:
-    """Return whether a task may be worked on beside those that are."""
-    return len(flying) < workers and not any(lost[one.name] for one in (task, *flying.values()))
+def _submitted(pool: ProcessPoolExecutor, work: Work, task: SessionTask) -> Future[Outcome]:
+    """Return the outcome to come of a task; broken already where the idle process was killed."""
+    try:
+        return pool.submit(work, task)
+    except BrokenProcessPool as dead:
+        future = Future[Outcome]()
+        future.set_exception(dead)
+        return future
 
 
 def _killed(task: SessionTask) -> Outcome:
@@ -80,11 +85,11 @@ def _killed(task: SessionTask) -> Outcome:
     return untold(task.name, task.fingerprint, SessionStatus.FAILED, why)
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
-    """Return processes that end with us, even when we are killed."""
+def _process() -> ProcessPoolExecutor:
+    """Return one process that ends with us, even when we are killed."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["biodance.pipeline.front", "biodance.report.write"])
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
+    return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
 
 
 def end_with_parent() -> None:
