@@ -65,10 +65,17 @@ def test_nothing_moved_in_a_body_that_exchanged_labels_placed(pair: str) -> None
     [
         (JointError("right_knee", 0.007, 0.1, moved=0.15, spared="RKNE"), CLEAN, None),
         (JointError("right_hip", 0.012, 0.0, moved=0.02), CLEAN, None),
+        (HIP._replace(reach=0.03, reach_sd=0.02), CLEAN, None),
         (HIP, replace(CLEAN, verdict="unexplained"), None),
         (HIP, CLEAN, ("plate_gain", "marker_misplaced")),
     ],
-    ids=["wrong in the static trial, too", "within what the static trial knows", "more is wrong", "not asked for"],
+    ids=[
+        "wrong in the static trial, too",
+        "within what the static trial knows",
+        "its size is hardly known",
+        "more is wrong",
+        "not asked for",
+    ],
 )
 def test_nothing_is_named_that_does_not_explain_it(error, diagnosis, chosen) -> None:
     assert named(error, diagnosis, chosen) == diagnosis

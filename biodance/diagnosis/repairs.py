@@ -53,13 +53,16 @@ def with_repairs(
 
 def repairs(cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Effect]) -> Iterator[Finding]:
     """Yield what was put right in the body of ``cases``: a marker that has moved with how far it lies from its place
-    in postures that do not follow it, a joint with how far the movement puts it from the static trial's place.
+    in postures that do not follow it, a joint with how far the movement puts it from the static trial's place, if that
+    is more than it may be wrong by (the body's own warning stays).
     """
     for error in cases[0].body.joint_errors:
         if error.spared and "marker_misplaced" in family:
             yield from _marker(family["marker_misplaced"], error, cases, known)
         elif error.contradicted and "joint_centre" in family:
-            yield _joint(family["joint_centre"], error, cases[0].body.markers.names)
+            found = _joint(family["joint_centre"], error, cases[0].body.markers.names)
+            if any(one.known for one in found.parameters):
+                yield found
 
 
 def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
