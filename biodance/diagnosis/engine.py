@@ -161,7 +161,7 @@ def judged(examined: Examined) -> Examined:
         (cause, replace(_finding(cause, r, known, put.cases[0]), hangs_on=hung.get(named_of(cause), "")))
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
-    large = [pair for pair in every if _counts(naming.found, *pair)]
+    large = [pair for pair in every if _counts(naming.found, pair[0])]
     strange = _strange(naming.found, named=bool(large))
     told = verdict(len(large), alarming(left), one.gates, strained=bool(strange))
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
@@ -193,11 +193,12 @@ def judged(examined: Examined) -> Examined:
     return Examined(found, naming, tuple(cause for cause, _ in trusted or large))
 
 
-def _counts(found: Model, cause: NamedCause, finding: Finding) -> bool:
-    """Return whether a cause is large enough to be told; one that is only resembled must also change the wrench by
-    what matters.
+def _counts(found: Model, cause: NamedCause) -> bool:
+    """Return whether a cause is large enough to be told: its size matters, and what it changes in this session's wrench
+    does (5 % of a shear of 2 N is a tenth of a newton, however well it is seen). One that comes and goes is felt while
+    it is there.
     """
-    return matters(cause.effect, cause.theta) and (not finding.hangs_on or felt(found, cause))
+    return matters(cause.effect, cause.theta) and (bool(cause.course) or felt(found, cause))
 
 
 def _hangs(one: Finding) -> str:
