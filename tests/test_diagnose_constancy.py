@@ -8,14 +8,18 @@ from diagnosed_sessions import about_plate, body, known, looks
 
 from biodance.diagnosis import heard
 from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_as_loud
+from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.constancy import departures, felt
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.engine import HANGS, diagnose_trials
+from biodance.diagnosis.engine import _counts as told
 from biodance.diagnosis.evidence import Belief
 from biodance.diagnosis.joined import with_witnesses
+from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import built
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.testimony import Verdicts
+from biodance.effects import effects
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
 
@@ -69,12 +73,18 @@ def test_a_zero_that_the_reader_took_off_in_one_trial_is_the_zero_of_the_others(
     assert found.parameters[0].value == pytest.approx(25.0, abs=1.0)
 
 
-def test_what_is_only_resembled_must_move_something_that_matters() -> None:
+def test_what_is_told_must_move_something_that_matters() -> None:
+    """A leak of 1 % of a shear of some newtons is large for a plate, and a tenth of a newton."""
     some = looks(1, trials=1, hidden=about_plate(zero))
     found = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).naming.found
     (named,) = found.named
+    leak = NamedCause(effects()["plate_crosstalk"].at("Fy->Fz", found.problem.cases[0]), np.array([0.01]), np.eye(1))
     assert felt(found, named)
+    assert told(found, named)
     assert not felt(found, replace(named, theta=np.array([0.2])))
+    assert matters(leak.effect, leak.theta)
+    assert not told(found, leak)
+    assert told(found, replace(leak, course={"some trial": np.ones(3)}))
 
 
 def a_finding(value: float, hangs_on: str = "") -> Finding:
