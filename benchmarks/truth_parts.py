@@ -73,6 +73,7 @@ def _removed(column: str, effect: str, said: str, session) -> tuple[str, Hits]: 
     hits = {
         "one file removed: an innocent named": [blamed],
         "one file removed: ... and called complete": [blamed and without.verdict == "named, complete"],
+        "one file removed: nothing wrong": [without.verdict == "nothing wrong"],
     }
     if effect == bench_removed.UNKNOWN:
         hits["no file describes it: unexplained"] = [whole.verdict == "unexplained"]
