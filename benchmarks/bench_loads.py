@@ -75,12 +75,12 @@ def foreign(person: int, session: int, load: tuple[str, float] | None) -> Seen:
 _LABS = {"own": own, "foreign": foreign}
 
 
-def loaded(lab: str, person: int, segments: tuple[str, ...]) -> Iterator[Row]:
-    """Yield every search of one person with loads on ``segments``, declared either way."""
+def loaded(lab: str, person: int, segments: tuple[str, ...], kilograms: tuple[float, ...] = KILOGRAMS) -> Iterator[Row]:
+    """Yield every search of one person with loads of ``kilograms`` on ``segments``, declared either way."""
     make = _LABS[lab]
     reference = identify_body(*make(person, 1, None))
     mass = float(reference.body.sip.mass.sum())
-    for kg, segment in product(KILOGRAMS, segments):
+    for kg, segment in product(kilograms, segments):
         body, fits = make(person, 2, (segment, kg))
         for way, declared in (("with", mass + kg), ("without", mass)):
             one = identify_body(replace(body, sip=weighing(body.sip, declared)), fits)

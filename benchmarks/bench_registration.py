@@ -140,15 +140,18 @@ def measured(one: Cut, forces: Path) -> dict[str, Any]:
     }
 
 
+def simulated(seed: int, work: Path) -> list[Path]:
+    """Return the recordings of a person of the own laboratory, squats or a short dance."""
+    protocol, sex = ("squat", "short")[seed % 2], "FM"[seed // 2 % 2]
+    subject = Subject(55.0 + 3.0 * seed, 1.60 + 0.02 * seed, sex, 25.0 + seed)
+    folder = biodance.simulate(subject, protocol, work / f"own{seed}", seed=seed)
+    return [path for path in sorted(folder.glob("*.c3d")) if path.stem != "static"]
+
+
 def sources(arguments: argparse.Namespace, work: Path) -> Iterator[tuple[Path, str]]:
     """Yield every recording and its laboratory."""
     for seed in range(1, arguments.own + 1):
-        protocol, sex = ("squat", "short")[seed % 2], "FM"[seed // 2 % 2]
-        subject = Subject(55.0 + 3.0 * seed, 1.60 + 0.02 * seed, sex, 25.0 + seed)
-        folder = biodance.simulate(subject, protocol, work / f"own{seed}", seed=seed)
-        for path in sorted(folder.glob("*.c3d")):
-            if path.stem != "static":
-                yield path, "own"
+        yield from ((path, "own") for path in simulated(seed, work))
     if arguments.foreign:
         for number, person in enumerate(sorted(Path(arguments.foreign).glob("P4[0-9][0-9]"))[: arguments.people]):
             for name in (f"dance0{1 + number % 6}", f"squat0{1 + number % 2}"):

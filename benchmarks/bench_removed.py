@@ -151,7 +151,7 @@ def _person(index: int, first: int) -> int:
     return (index + (first - 601) // 100) % 4
 
 
-def _kept(key: str, session: Callable[[Path], SessionResult]) -> SessionResult:
+def kept_session(key: str, session: Callable[[Path], SessionResult]) -> SessionResult:
     """Return an examined session, made once."""
 
     def made() -> SessionResult:
@@ -268,7 +268,7 @@ def main() -> None:
     for column, effect, said, session in jobs(asked.first):
         if column not in asked.only or asked.match not in said or (column, said) in known:
             continue
-        result = _kept(f"{column}-{said}", session)
+        result = kept_session(f"{column}-{said}", session)
         ways = (False,) if asked.whole else (True, False)
         both = [answered(column, effect, said, result, without=without) for without in ways]
         with kept.open("a") as stream:

@@ -75,17 +75,18 @@ def real_session(name: str) -> SessionResult:
 
 def foreign_session(seed: int, room: str) -> SessionResult:
     """Return a clean session of the foreign laboratory with the noise of a room, tracked once."""
+    return _kept(f"foreign-{room.replace(' ', '_')}-{seed}", lambda: foreign_folder(seed, room))
+
+
+def foreign_folder(seed: int, room: str) -> Path:
+    """Return the folder of a clean session of the foreign laboratory, written once."""
     folder = CACHE / "foreign" / room.replace(" ", "_") / f"P{seed}"
-
-    def written() -> Path:
-        if not folder.is_dir():
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
-            told = [*person_of(seed), *ROOMS[room][0], "--out", str(folder)]
-            subprocess.run([sys.executable, str(script), *told], check=True, stdout=subprocess.DEVNULL)
-        return folder
-
-    return _kept(f"foreign-{room.replace(' ', '_')}-{seed}", written)
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        script = Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py"
+        told = [*person_of(seed), *ROOMS[room][0], "--out", str(folder)]
+        subprocess.run([sys.executable, str(script), *told], check=True, stdout=subprocess.DEVNULL)
+    return folder
 
 
 def family_session(number: int, hidden: str = "") -> SessionResult:

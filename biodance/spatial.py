@@ -7,6 +7,7 @@ The virtual laboratory keeps its own algebra ON PURPOSE: a bug in a formula that
 """
 
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,10 +62,16 @@ def _about(*axis: float) -> tuple[_Array, _Array, _Array]:
     return parts
 
 
-def rotation_about_z(angle: float) -> _Array:
-    """Return the rotation matrix (3, 3) about the vertical by ``angle`` rad."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+def elementary_rotation(axis: Literal["x", "y", "z"], angle: ArrayLike) -> _Array:
+    """Return the rotation matrices (..., 3, 3) about one ``axis`` of the frame by ``angle`` (...) rad."""
+    k = "xyz".index(axis)
+    i, j = (k + 1) % 3, (k + 2) % 3
+    out = np.zeros((*np.shape(angle), 3, 3))
+    out[..., k, k] = 1.0
+    out[..., i, i] = out[..., j, j] = np.cos(angle)
+    out[..., j, i] = np.sin(angle)
+    out[..., i, j] = -out[..., j, i]
+    return out
 
 
 def zxy_angles(turn: _Array) -> tuple[_Array, _Array, _Array]:

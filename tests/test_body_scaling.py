@@ -14,7 +14,7 @@ from biodance.body.human.measures import (
     Measures,
 )
 from biodance.body.human.scaling import chain_angles, measure_static
-from biodance.body.human.static_centres import arm_centres, turn
+from biodance.body.human.static_centres import arm_centres
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.prepare import prepare
@@ -22,6 +22,7 @@ from biodance.lab.session.read import read_session
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.records import Markers, Source, Subject, Trial
+from biodance.spatial import elementary_rotation
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
 DATA = os.environ.get("BIODANCE_DATA")
@@ -159,7 +160,7 @@ def test_the_angles_of_a_chain_give_its_rotation_back() -> None:
         angles = rng.uniform(-1.2, 1.2, count)
         rotation = np.eye(3)
         for letter, sign, angle in zip(order, signs, angles, strict=True):
-            rotation = rotation @ turn("xyz".index(letter), sign * angle)
+            rotation = rotation @ elementary_rotation(letter, sign * angle)
         np.testing.assert_allclose(chain_angles(rotation, axes), angles, atol=1e-12)
 
 

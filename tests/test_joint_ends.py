@@ -3,9 +3,11 @@ that end every label of a set.
 """
 
 import numpy as np
+import pytest
 from test_marker_guess import OWN, stand
 
 from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.names import meanings_of
 from biodance.lab.markers.spelling import plain_labels
 from biodance.records import Markers
 
@@ -58,6 +60,29 @@ def test_the_only_marker_of_a_joint_is_its_outer_one_and_that_is_said() -> None:
     assert guess.name
     assert [guess.map[f"AnkleM {side}"] for side in "RL"] == ["right_ankle_lateral", "left_ankle_lateral"]
     assert "AnkleM R is the only marker there: taken for the right ankle lateral, against its name." in guess.doubts
+
+
+@pytest.mark.parametrize("said", ["Knee {}", "KneeMed {}"])
+def test_a_marker_with_a_nameless_one_across_the_joint_outside_is_the_inner_one(said: str) -> None:
+    both = renamed(with_inner(stand(OWN), "knee_lateral", {said: 1.0}), {"Outer_Knee": "Gx"})
+    guess = guess_set(both)
+    assert guess.name
+    assert [guess.map[f"Gx {side}"] for side in "RL"] == ["right_knee_lateral", "left_knee_lateral"]
+    assert [guess.map[said.format(side)] for side in "RL"] == ["right_knee_medial", "left_knee_medial"]
+    assert any(doubt.startswith("Gx R lies across the right knee from Knee") for doubt in guess.doubts)
+
+
+@pytest.mark.parametrize("share", [0.15, 2.5])
+def test_a_nameless_marker_nearer_or_farther_than_a_joint_is_wide_is_no_end_of_it(share: float) -> None:
+    both = renamed(with_inner(stand(OWN), "knee_lateral", {"Plate {}": -share}), {"Outer_Knee": "Knee"})
+    guess = guess_set(both)
+    assert [guess.map[f"Knee {side}"] for side in "RL"] == ["right_knee_lateral", "left_knee_lateral"]
+    assert "Plate R" not in guess.map
+
+
+def test_a_known_word_is_not_cut_into_letters() -> None:
+    names = ("OLE1D", "OLE1G", "EIASD", "EIASG", "CALCD", "CALCG")
+    assert [one.place for one in meanings_of(names)["OLE1D"]] == ["right_forearm_hand"]
 
 
 def test_a_word_that_ends_every_label_says_nothing() -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.frames import written_in
 from biodance.body.inertia import (
     PSEUDO_INERTIA,
     RigidInertia,
@@ -33,21 +34,7 @@ def recentre_joint(body: Body, joint: int, shift: Array) -> Body:
     neutral posture matter, markers and all other joints stay where they are.
     """
     segment, back = carried_by(body, joint), -neutral_turn(body, joint) @ np.asarray(shift)
-    moved = move_joint(body, joint, shift)
-    last = body.segment_joint[segment]
-    joints = tuple(replace(j, translation=j.translation + back) if j.parent == last else j for j in moved.joints)
-    on = np.array(body.markers.segment) == segment
-    markers = replace(body.markers, position=body.markers.position + np.where(on[:, None], back, 0.0))
-    ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
-    table[ten, ten] = shift_matter(back)
-    sip = Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T)
-    here = (np.arange(len(body.segments)) == segment)[:, None, None]
-    boxes, com_boxes = (np.where(here, box + back, box) for box in (body.boxes, body.com_boxes))
-    feet = {
-        side: replace(foot, outline=foot.outline + back) if foot.segment == segment else foot
-        for side, foot in body.feet.items()
-    }
-    return replace(moved, joints=joints, markers=markers, sip=sip, boxes=boxes, com_boxes=com_boxes, feet=feet)
+    return written_in(move_joint(body, joint, shift), segment, np.eye(3), -back)
 
 
 def move_marker(body: Body, name: str, shift: Array) -> Body:

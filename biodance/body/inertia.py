@@ -78,12 +78,12 @@ PSEUDO_INERTIA = _pseudo_inertia_map()
 """(16, 10): the pseudo-inertia is linear in the ten parameters."""
 
 
-def shift_matter(shift: Array) -> Array:
-    """Return the map (10, 10) of the ten parameters when all matter moves by ``shift`` (3,) m in the segment's
-    frame.
+def shift_matter(shift: Array, turn: Array | None = None) -> Array:
+    """Return the map (10, 10) of the ten parameters when all matter is turned by ``turn`` (3, 3) about the origin of
+    the segment's frame, if given, and moves by ``shift`` (3,) m in it.
     """
     move = np.eye(4)
-    move[:3, 3] = shift
+    move[:3, :3], move[:3, 3] = np.eye(3) if turn is None else turn, shift
     return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
 
 

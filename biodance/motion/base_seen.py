@@ -9,16 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.body.parts import UPRIGHT
 from biodance.errors import TrialRefused
 from biodance.records import Array, Markers
-from biodance.spatial import cross, rigid_fit
+from biodance.spatial import cross, elementary_rotation, rigid_fit, skew
 
 _LEAST = 3
 """Markers that fix a posture."""
 _FAR = 0.02
 """m RMS: markers so far from where they are said to be are not those."""
-LEFT_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Rows x forwards, y up, z right of the base in axes forwards, left, up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, floa
     if lacks or len(places) < _LEAST:
         what = f"markers {', '.join(lacks)} are missing" if lacks else f"{len(places)} markers tell no posture"
         raise TrialRefused(f"{where}: {what}; recording.toml [base] markers needs three and more of those recorded.")
-    local = np.array(list(places.values())) @ LEFT_UP.T
+    local = np.array(list(places.values())) @ UPRIGHT
     seen = markers.xyz[:, [markers.names.index(name) for name in places]]
     whole = np.isfinite(seen).all(axis=(1, 2))
     if not whole.any():
@@ -81,18 +80,11 @@ def base_of_inclinations(roll: Array, pitch: Array) -> BaseSeen:
     """Return the base of an IMU: ``roll`` (T,) rad, right side down, and ``pitch`` (T,) rad, front down, about the
     base's own axes (heading, then pitch, then roll).
     """
-    s, c = np.sin(roll), np.cos(roll)
-    sp, cp = np.sin(pitch), np.cos(pitch)
-    zero = np.zeros_like(s)
-    rows = [[cp, sp * s, sp * c], [zero, c, -s], [-sp, cp * s, cp * c]]
-    turn = np.moveaxis(np.array(rows), 2, 0)
-    return BaseSeen(turn @ LEFT_UP.T)
+    return BaseSeen(elementary_rotation("y", pitch) @ elementary_rotation("x", roll) @ UPRIGHT)
 
 
 def _onto_vertical(up: Array) -> Array:
     """Return the smallest turns (T, 3, 3) that bring unit vectors ``up`` (T, 3) upright."""
     axis = cross(up, np.array([0.0, 0.0, 1.0]))
-    x, y, z = axis.T
-    zero = np.zeros_like(x)
-    K = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), 2, 0)
+    K = skew(axis)
     return np.asarray(np.eye(3) + K + K @ K / (1 + up[:, 2])[:, None, None])

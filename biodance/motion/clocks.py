@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from biodance.errors import TrialRefused
 from biodance.records import Array, Wrench
-from biodance.spatial import rotation_about_z, wrench_about_point
+from biodance.spatial import elementary_rotation, wrench_about_point
 
 _OVERLAP = 0.5
 """Share of the shorter recording that must overlap."""
@@ -91,7 +91,7 @@ def on_motion_clock(measured: Wrench, time: Array, fit: PlateFit) -> Array:
 def from_plate(wrench: Array, place: tuple[float, float], yaw: float) -> Array:
     """Return a wrench (T, 6) about the lab origin in a frame at ``place`` m, turned by ``yaw`` rad about z."""
     near = wrench_about_point(wrench, np.array([*place, 0.0]))
-    turn = rotation_about_z(yaw)
+    turn = elementary_rotation("z", yaw)
     return np.concatenate([near[:, :3] @ turn, near[:, 3:] @ turn], axis=1)
 
 
@@ -147,6 +147,6 @@ def _peak(values: Array, k: int) -> float:
 
 def onto_plate(wrench: Array, fit: PlateFit) -> Array:
     """Return a wrench (T, 6) in the first standing sole's frame in that of the plate; the inverse of `from_plate`."""
-    turn = rotation_about_z(fit.yaw)
+    turn = elementary_rotation("z", fit.yaw)
     turned = np.concatenate([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T], axis=1)
     return wrench_about_point(turned, -np.array([*fit.place, 0.0]))

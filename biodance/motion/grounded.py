@@ -21,7 +21,7 @@ from biodance.motion.kinematics import poses
 from biodance.motion.smoothing import smooth
 from biodance.records import SIDES, Array, Motion, runs
 from biodance.records.motion import Encoders
-from biodance.spatial import rotation_about_z
+from biodance.spatial import elementary_rotation
 
 UNDER = (0.02, 0.008)
 """Of the leg's length: how far the other sole may lie under the ground of the standing one (encoders, soft soles);
@@ -235,7 +235,7 @@ def _chained(turn: Array, place: Array, foot: NDArray[np.intp]) -> tuple[Array, 
             root = yaw @ turn[before, start].T
             origin = at - root @ place[before, start]
             at, yaw = origin + root @ place[side, start], root @ turn[side, start]
-            at, yaw = at * np.array([1.0, 1.0, 0.0]), rotation_about_z(float(np.arctan2(yaw[1, 0], yaw[0, 0])))
+            at, yaw = at * np.array([1.0, 1.0, 0.0]), elementary_rotation("z", float(np.arctan2(yaw[1, 0], yaw[0, 0])))
         rotation[start:stop] = yaw @ np.swapaxes(turn[side, start:stop], 1, 2)
         position[start:stop] = at - np.einsum("tij,tj->ti", rotation[start:stop], place[side, start:stop])
     return rotation, position

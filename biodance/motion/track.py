@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from biodance.body.body import Body
+from biodance.body.parts import UPRIGHT
 from biodance.errors import TrialRefused
 from biodance.lab.filters import motion_filter
 from biodance.motion.ik.determination import determination
@@ -13,7 +14,7 @@ from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics
 from biodance.motion.kinematics import poses
 from biodance.motion.smoothing import smooth
 from biodance.records import Array, Markers, Motion, Trial
-from biodance.spatial import zxy_angles
+from biodance.spatial import elementary_rotation, zxy_angles
 from biodance.threads import one_thread
 
 _STRIDE = 1.0
@@ -32,21 +33,15 @@ def upright_trunk(body: Body, q: Array, rate: float) -> Array:
     facing = np.unwrap(np.arctan2(pelvis[:, 1, 0], pelvis[:, 0, 0]))
     width = min(len(q), max(1, round(_STRIDE * rate)))
     heading = uniform_filter1d(facing, width, mode="nearest") if len(q) > 1 else facing
-    relative = np.swapaxes(pelvis @ body.joints[chain[0]].rotation, 1, 2) @ _upright(heading)
+    relative = np.swapaxes(pelvis @ body.joints[chain[0]].rotation, 1, 2) @ (
+        elementary_rotation("z", heading) @ UPRIGHT
+    )
     out = np.array(q)
     first = body.nq - len(body.joints)
     signs = [float(body.joints[i].axis.sum()) for i in chain]
     for i, sign, angle in zip(chain, signs, zxy_angles(relative), strict=True):
         out[:, first + i] = sign * angle
     return out
-
-
-def _upright(heading: Array) -> Array:
-    """Return lab_R_trunk (T, 3, 3) of somebody upright: x ahead, y up, z to the right."""
-    zero, one = np.zeros_like(heading), np.ones_like(heading)
-    ahead = np.stack([np.cos(heading), np.sin(heading), zero], axis=1)
-    right = np.stack([np.sin(heading), -np.cos(heading), zero], axis=1)
-    return np.stack([ahead, np.stack([zero, zero, one], axis=1), right], axis=2)
 
 
 @one_thread()

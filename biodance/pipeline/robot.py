@@ -27,7 +27,7 @@ from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import cause_words, misweighed, of_file, refusals, told_of, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
-from biodance.spatial import cross, quaternion_matrix, rotation_about_z, wrench_about_point
+from biodance.spatial import cross, elementary_rotation, quaternion_matrix, wrench_about_point
 
 _KEPT = 0.2
 """Share of every trial, at its end, that is kept where no trial is."""
@@ -235,7 +235,7 @@ def _in_root(one: MatchedTrial, seen: TrialValidation) -> tuple[Agreement, Agree
     robot's root, as the paper compares: there gravity turns with the robot, and all channels move.
     """
     q = one.motion.fit.motion.q
-    on_plate = rotation_about_z(one.plate.yaw)
+    on_plate = elementary_rotation("z", one.plate.yaw)
     turn = on_plate @ quaternion_matrix(q[:, 3:7])
     arm = seen.about - [*one.plate.place, 0.0] - q[:, :3] @ on_plate.T
 

@@ -17,7 +17,7 @@ from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock
 from biodance.motion.grounded import RATE, UNDER, Grounded, even_angles, ground
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Wrench
-from biodance.spatial import rotation_about_z
+from biodance.spatial import elementary_rotation
 
 _SAME = 0.9
 """Least correlation of the paths of the centre of pressure, needed and measured, of one motion."""
@@ -143,7 +143,7 @@ def _marked(body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, ang
     rows = np.stack([np.interp(at, seen.time[whole], row[whole]) for row in rows.T], axis=1)
     near = np.interp(at, seen.time, whole, left=0.0, right=0.0) > 1 - 1e-9
     u, _, vt = np.linalg.svd(rows[:, 3:].reshape(-1, 3, 3))
-    turn = rotation_about_z(-fit.yaw)
+    turn = elementary_rotation("z", -fit.yaw)
     pose = BaseSeen(turn @ (u @ vt), (rows[:, :3] - [*fit.place, 0.0]) @ turn.T)
     out = ground(body, time, angle, lean=found.lean, base=pose, under=found.under)
     return replace(out, use=out.use & near)

@@ -16,13 +16,14 @@ from biodance.body.human.limits import widen_limits
 from biodance.body.human.measures import Measures, measures
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
 from biodance.body.human.standing import StaticPosture, standing
-from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres, turn
+from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres
 from biodance.body.human.unseen import widen_unseen, with_unseen_parts
 from biodance.body.parts import Joint, SegmentMarkers
 from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.settings import STANDARD_GRAVITY
+from biodance.spatial import elementary_rotation, zxy_angles
 
 _ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
@@ -193,8 +194,8 @@ def _turn(frames: SegmentFrames, parent: str, child: str) -> Array:
     """Return the constant part of parent_R_child: a hinge's varus about x, an ankle's torsion about y."""
     relative = frames.rotation[parent].T @ frames.rotation[child]
     if kind_of(child) == "foot":
-        return turn(1, np.arctan2(-relative[2, 0], relative[0, 0]))
-    return turn(0, np.arcsin(relative[2, 1]))
+        return elementary_rotation("y", np.arctan2(-relative[2, 0], relative[0, 0]))
+    return elementary_rotation("x", np.arcsin(relative[2, 1]))
 
 
 def _foot(
@@ -256,11 +257,7 @@ def chain_angles(relative: Array, axes: Array) -> Array:
     if len(axes) == 2:
         angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(relative[2, 1], relative[2, 2])]
     else:
-        angles = [
-            np.arctan2(-relative[0, 1], relative[1, 1]),
-            np.arcsin(relative[2, 1]),
-            np.arctan2(-relative[2, 0], relative[2, 2]),
-        ]
+        angles = [float(angle) for angle in zxy_angles(relative)]
     return axes.sum(axis=1) * np.array(angles)
 
 

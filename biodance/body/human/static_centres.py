@@ -20,6 +20,7 @@ from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array
 from biodance.settings import Hip
+from biodance.spatial import elementary_rotation
 
 SIGN = {"right": 1.0, "left": -1.0}
 UP = np.array([0.0, 0.0, 1.0])
@@ -255,13 +256,4 @@ def _chain(
     rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
     direction = rotation[upper].T @ unit(middle - end)
     flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
-    rotation[lower] = rotation[upper] @ turn(2, flexion) @ turn(0, varus)
-
-
-def turn(axis: int, angle: float) -> Array:
-    """Return the rotation (3, 3) about x, y or z (0, 1, 2) by ``angle`` rad."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    out = np.eye(3)
-    out[i, i] = out[j, j] = np.cos(angle)
-    out[j, i], out[i, j] = np.sin(angle), -np.sin(angle)
-    return out
+    rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)

@@ -8,12 +8,12 @@ trunk (x forwards, y left, z up). At zero angles the legs are straight and the a
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.static_centres import turn
 from biodance.body.inertia import RigidInertia, inertial_parameters
 from biodance.body.parts import UPRIGHT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.prior import robot_covariance
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
 from biodance.records import SIDES, Array, Sip
+from biodance.spatial import elementary_rotation
 
 _SEGMENTS = (
     "pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head",
@@ -94,8 +94,8 @@ def _joints() -> tuple[Joint, ...]:
             )
             continue
         a, alpha, d, theta = (float(row[column]) for column in ("a_m", "alpha_deg", "d_m", "theta_deg"))
-        tilt = turn(0, np.radians(alpha))
-        rotation, translation = tilt @ turn(2, np.radians(theta)), np.array([a, 0.0, reach])
+        tilt = elementary_rotation("x", np.radians(alpha))
+        rotation, translation = tilt @ elementary_rotation("z", np.radians(theta)), np.array([a, 0.0, reach])
         parent, reach = (
             len(joints) - 1,
             d,
@@ -111,9 +111,9 @@ def _joints() -> tuple[Joint, ...]:
 def _base(kind: str, side: str, joints: list[Joint]) -> tuple[int, Array, Array]:
     """Return the parent joint and the fixed frame (turn, place) at which a leg or an arm starts."""
     z = np.array([0.0, 0.0, 1.0])
-    tilt = turn(0, -np.pi / 2)
+    tilt = elementary_rotation("x", -np.pi / 2)
     if kind == "hip_yaw":
-        return -1, tilt @ turn(2, np.pi / 2), LEG_BASE
+        return -1, tilt @ elementary_rotation("z", np.pi / 2), LEG_BASE
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
     return waist, tilt, ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
 

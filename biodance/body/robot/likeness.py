@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import PSEUDO_INERTIA
+from biodance.body.frames import place_at_zero, written_in
 from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, Sip
@@ -38,7 +38,7 @@ def standing_frames(body: Body) -> Body:
     """
     for side in SIDES:
         foot = body.feet[side]
-        turn = _turn_at_zero(body, foot.segment)
+        turn, _ = place_at_zero(body, body.segment_joint[foot.segment])
         up = turn @ sole_normal(foot)
         if not up[1] > LEANS:
             away = np.degrees(np.arccos(np.clip(up[1], -1, 1)))
@@ -69,58 +69,13 @@ def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
     For segments on a joint the shift must lie along the joint's axis. The lab pose of a root that is turned changes by
     the same turn.
     """
-    carrier = body.segment_joint[segment]
-    joints = []
-    for i, joint in enumerate(body.joints):
-        if joint.parent == carrier:
-            joint = replace(joint, rotation=turn.T @ joint.rotation, translation=turn.T @ (joint.translation - shift))
-        if i == carrier:
-            place = joint.translation + joint.rotation @ shift
-            joint = replace(joint, rotation=joint.rotation @ turn, translation=place, axis=turn.T @ joint.axis)
-        joints.append(joint)
-    ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
-    table[ten, ten] = reframed_parameters(turn, shift)
-    feet = {
-        side: replace(foot, outline=(foot.outline - shift) @ turn) if foot.segment == segment else foot
-        for side, foot in body.feet.items()
-    }
-    on = (np.array(body.markers.segment, dtype=int) == segment)[:, None]
-    place = np.where(on, (body.markers.position - shift) @ turn, body.markers.position)
-    boxes, com_boxes = np.array(body.boxes), np.array(body.com_boxes)
-    for some in (boxes, com_boxes):
-        some[segment] = turned_box(some[segment] - shift, turn.T)
-    return replace(
-        body,
-        joints=tuple(joints),
-        sip=Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T),
-        markers=replace(body.markers, position=place),
-        boxes=boxes,
-        com_boxes=com_boxes,
-        feet=feet,
-    )
-
-
-def reframed_parameters(turn: Array, shift: Array) -> Array:
-    """Return the map (10, 10) of a segment's parameters into a frame with axes ``turn`` (3, 3) = old_R_new and
-    origin ``shift`` (3,) m.
-    """
-    move = np.eye(4)
-    move[:3, :3], move[:3, 3] = turn.T, -turn.T @ shift
-    return np.asarray(np.linalg.lstsq(PSEUDO_INERTIA, np.kron(move, move) @ PSEUDO_INERTIA, rcond=None)[0])
-
-
-def turned_box(box: Array, turn: Array) -> Array:
-    """Return the smallest box (2, 3) along the axes around a ``box`` (2, 3) turned by ``turn`` (3, 3) = new_R_old."""
-    corners = np.array([[box[i, 0], box[j, 1], box[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) @ turn.T
-    return np.stack([corners.min(axis=0), corners.max(axis=0)])
-
-
-def _turn_at_zero(body: Body, segment: int) -> Array:
-    """Return root_R_segment (3, 3) at zero angles."""
-    turn, joint = np.eye(3), body.segment_joint[segment]
-    while joint >= 0:
-        turn, joint = body.joints[joint].rotation @ turn, body.joints[joint].parent
-    return turn
+    body, carrier = written_in(body, segment, turn, shift), body.segment_joint[segment]
+    if carrier < 0:
+        return body
+    joints, joint = list(body.joints), body.joints[carrier]
+    place = joint.translation + joint.rotation @ shift
+    joints[carrier] = replace(joint, rotation=joint.rotation @ turn, translation=place, axis=turn.T @ joint.axis)
+    return replace(body, joints=tuple(joints))
 
 
 def _ankle(body: Body, segment: int) -> Array:

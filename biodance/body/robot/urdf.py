@@ -12,6 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.export import refuse_impossible
+from biodance.body.frames import place_at_zero
 from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters
 from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.likeness import reframed
@@ -202,7 +203,7 @@ def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[st
 
 def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     """Return the body with its soles, its root in ISB axes."""
-    place = {side: _at_zero(body, carrier.joint) for side, carrier in feet.items()}
+    place = {side: place_at_zero(body, carrier.joint) for side, carrier in feet.items()}
     below = np.mean([position for _, position in place.values()], axis=0)
     axis = int(np.argmax(np.abs(below)))
     if axis == 0 or below[axis] > 0:
@@ -253,12 +254,3 @@ def _soles(
         soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, axes)
     soles["right"], soles["left"] = match_faces(soles["right"], soles["left"])
     return soles
-
-
-def _at_zero(body: Body, joint: int) -> tuple[Array, Array]:
-    """Return turn (3, 3) and place (3,) m of a joint's frame in the root's at zero angles."""
-    turn, place = np.eye(3), np.zeros(3)
-    while joint >= 0:
-        one = body.joints[joint]
-        turn, place, joint = one.rotation @ turn, one.translation + one.rotation @ place, one.parent
-    return turn, place

@@ -16,7 +16,7 @@ from biodance.body.robot.sole import mesh_file, mesh_hull
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
 from biodance.records import Array
-from biodance.spatial import axis_rotation
+from biodance.spatial import axis_rotation, elementary_rotation
 
 _KINDS = ("revolute", "continuous", "fixed")
 """Types of joints that a body can have."""
@@ -116,16 +116,8 @@ def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
     if origin is None:
         return np.eye(3), np.zeros(3)
     roll, pitch, yaw = _row(path, origin, "rpy", what, "0 0 0")
-    (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
-    about_z, about_y, about_x = (
-        np.array(rows)
-        for rows in (
-            [[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]],
-            [[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]],
-            [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]],
-        )
-    )
-    return about_z @ about_y @ about_x, _row(path, origin, "xyz", what, "0 0 0")
+    turn = elementary_rotation("z", yaw) @ elementary_rotation("y", pitch) @ elementary_rotation("x", roll)
+    return turn, _row(path, origin, "xyz", what, "0 0 0")
 
 
 def _link(path: Path, element: Element) -> Link:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.motion.kinematics import Poses, poses
 from biodance.records import Array
 
 BOXES = ("pelvis", "trunk_head")
@@ -125,27 +126,19 @@ def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
     """Return the pairs of limbs and of a limb and a box (segment indices) to keep apart, and the pairs that cannot be
     checked, in words.
     """
-    above = [_carrier(body, i) for i in range(len(body.segments))]
+    carried = body.segment_joint[: len(body.segments)]
+    above = [body.place_on_segment(joint)[0] if joint >= 0 else -1 for joint in carried]
     boxes = [i for i in range(len(above)) if i == 0 or above.count(i) > 1]
     legs = {k for foot in body.feet.values() for k in _up(above, foot.segment)}
     limbs = [i for i in range(len(above)) if i not in boxes]
     solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > _NEAR]
     walls = [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
-    axes = {i: _axis_at_zero(body, i) for i in limbs}
+    pose = poses(body, body.neutral[None])
+    axes = {i: _axis_at_zero(body, pose, i) for i in limbs}
     free = [pair for pair in solid if _limbs_gap(body, axes, *pair) > 0]
-    clear = [pair for pair in walls if _box_gap(body, axes[pair[0]], *pair) > 0]
+    clear = [pair for pair in walls if _box_gap(body, pose, axes[pair[0]], *pair) > 0]
     left = [pair for pair in solid + walls if pair not in free and pair not in clear]
     return free, clear, tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in left)
-
-
-def _carrier(body: Body, segment: int) -> int:
-    """Return the segment on which one hangs, -1 for the root's."""
-    joint = body.segment_joint[segment]
-    while joint >= 0:
-        joint = body.joints[joint].parent
-        if joint < 0 or body.joints[joint].segment >= 0:
-            return 0 if joint < 0 else body.joints[joint].segment
-    return -1
 
 
 def _up(above: list[int], segment: int) -> list[int]:
@@ -161,12 +154,10 @@ def _apart(above: list[int], i: int, j: int) -> int:
     return len(set(one) ^ set(two))
 
 
-def _axis_at_zero(body: Body, segment: int) -> Array:
+def _axis_at_zero(body: Body, pose: Poses, segment: int) -> Array:
     """Return points (K, 3) m on the axis of a limb at zero angles, lab frame."""
-    from biodance.motion.kinematics import poses
-
     (a, b), _ = capsule(body, segment)
-    return poses(body, body.neutral[None]).points([segment] * len(_POINTS), a + _POINTS[:, None] * (b - a))[0]
+    return pose.points([segment] * len(_POINTS), a + _POINTS[:, None] * (b - a))[0]
 
 
 def _limbs_gap(body: Body, axes: dict[int, Array], i: int, j: int) -> float:
@@ -174,10 +165,7 @@ def _limbs_gap(body: Body, axes: dict[int, Array], i: int, j: int) -> float:
     return float(distance - capsule(body, i)[1] - capsule(body, j)[1])
 
 
-def _box_gap(body: Body, axis: Array, limb: int, box: int) -> float:
-    from biodance.motion.kinematics import poses
-
-    pose = poses(body, body.neutral[None])
+def _box_gap(body: Body, pose: Poses, axis: Array, limb: int, box: int) -> float:
     local = (axis - pose.position[0, box]) @ pose.rotation[0, box]
     low, high = body.boxes[box]
     beyond = np.maximum(np.maximum(low - local, local - high), 0.0)

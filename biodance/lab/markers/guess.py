@@ -31,6 +31,10 @@ _AS_USUAL = 0.5
 """Share of the way to that limit within which all places are equally usual."""
 _HALFWAY = 0.3
 """Share of the width of a joint within which of its half a marker is the middle of it."""
+_JOINT_WIDTH = (0.03, 0.09)
+"""Shares of the stature between which a knee or ankle is wide, over the skin."""
+_LEVEL = 0.5
+"""Share of that width by which its two markers may differ in height and fore and aft."""
 _APART = 0.005
 """m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
 
@@ -93,6 +97,7 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
         if one in LANDMARKS and not confirmed[label]
     ]
     _take_ends(places, stand, confirmed)
+    _take_outer(places, stand, doubts)
     _sort_pairs(places, stand, doubts)
     usual = [label for place, label in named.items() if said[label][0].rank < _USUAL]
     believed, total = sum(bool(confirmed[label]) for label in usual), len(usual)
@@ -161,6 +166,37 @@ def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, 
             elif lateral not in places and len(inner) > 1 and places.get(medial) in inner:
                 outward = [float(stand.at[label] @ out) for label in inner]
                 places[medial], places[lateral] = inner[int(np.argmin(outward))], inner[int(np.argmax(outward))]
+
+
+def _take_outer(places: dict[str, str], stand: Standing, doubts: list[str]) -> None:
+    """Take the only marker of a knee or ankle for its medial one where on both sides one that says nothing lies across
+    the joint from it, outside: a body has nothing there but its lateral marker.
+    """
+    for joint in ("knee", "ankle"):
+        ends = {side: (f"{side}_{joint}_lateral", f"{side}_{joint}_medial") for side in SIDES}
+        alone = {side: [places[end] for end in both if end in places] for side, both in ends.items()}
+        outer = {side: _across(one[0], side, places, stand) if len(one) == 1 else [] for side, one in alone.items()}
+        if any(len(found) != 1 for found in outer.values()):
+            continue
+        for side, (lateral, medial) in ends.items():
+            (places[lateral],), (places[medial],) = outer[side], alone[side]
+            doubts.append(
+                f"{places[lateral]} lies across the {side} {joint} from {places[medial]}, outside: it was taken for "
+                f"the lateral marker, {places[medial]} for the medial one."
+            )
+
+
+def _across(label: str, side: str, places: Mapping[str, str], stand: Standing) -> list[str]:
+    """Return the labels without a landmark that lie a joint's width outside a marker, as high as it."""
+    out = stand.right if side == "right" else -stand.right
+    apart = {other: at - stand.at[label] for other, at in stand.at.items() if other not in places.values()}
+    narrowest, widest = _JOINT_WIDTH
+    return [
+        other
+        for other, way in apart.items()
+        if narrowest * stand.stature < way @ out < widest * stand.stature
+        and np.linalg.norm(way - (way @ out) * out) < _LEVEL * (way @ out)
+    ]
 
 
 def _called(place: str, confirmed: Mapping[str, tuple[Meaning, ...]]) -> list[str]:

@@ -142,7 +142,8 @@ def _composed(words: _Vocabulary, rest: tuple[str, ...]) -> list[tuple[str, int]
     EpiFemInt. Words that say nothing may stand among them, but no remainder within a token.
     """
     parted = [part for token in rest for part in ([token] if token in words.words else _PARTS.findall(token))]
-    cuts = [cut for token in parted if (cut := _cuts(words.words, token))]
+    known = [part for part in parted if part in words.words or part not in words.segments]  # a word is not cut
+    cuts = [cut for token in known if (cut := _cuts(words.words, token))]
     found = []
     for way in product(*cuts) if cuts and sum(map(len, cuts)) <= _WAYS else ():
         parts = [part for cut in way for part in cut]
