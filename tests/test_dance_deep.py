@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_dances import BODY
+from small_dances import BODY, small_dance
 
 from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.vocabulary import read_vocabulary, words_for
+from biodance.dance.metrics import longest_alone
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan, read_plan
@@ -43,3 +44,20 @@ def test_whoever_asks_for_deep_postures_gets_them() -> None:
     plan = replace(read_plan("short"), deep=True)
     deepest = [_deepest(plan, one) for one in support_sequence(BODY, plan) if one.over is None]
     assert max(map(max, deepest)) > _ON_BOTH
+
+
+def test_how_long_a_foot_is_up_is_counted_until_it_is_down_again() -> None:
+    dance = small_dance()
+    assert longest_alone(dance) == 0.0
+    both, up = dance.stances[0], replace(dance.stances[0], planted=(0,))
+    other = replace(up, planted=(1,))
+
+    def longest(*stances: Stance, under: tuple[Stance, Stance]) -> float:
+        """Return it for 1 s, a move of 2 s, 1 s, another move of 2 s and 1 s on these feet."""
+        found = {what: np.repeat(getattr(dance, what), (1, 2), axis=0) for what in ("postures", "hold")}
+        found |= {what: np.repeat(getattr(dance, what), 2, axis=0) for what in ("via", "move")}
+        return longest_alone(replace(dance, **found, stances=stances, under=under))
+
+    assert longest(both, up, both, under=(up, up)) == 5.0
+    assert longest(up, both, other, under=(both, other)) == 3.0
+    assert longest(up, up, other, under=(up, other)) == 4.0

@@ -5,6 +5,7 @@ Counted again from the dance alone, so that the numbers hold for every dance, ho
 """
 
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
@@ -63,6 +64,12 @@ class DanceMetrics:
     dynamic_bound: float
     hardly: tuple[str, ...]
     paths: tuple[ZmpPath, ...]
+
+
+def longest_alone(dance: Dance) -> float:
+    """Return for how long, s, a foot is up at most before it comes down again; 0 where nobody stands on one leg."""
+    runs = groupby(dance.phases, lambda phase: phase.stance.planted)
+    return max((sum(phase.end - phase.start for phase in run) for feet, run in runs if len(feet) == 1), default=0.0)
 
 
 def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:

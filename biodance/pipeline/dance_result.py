@@ -11,7 +11,7 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import Expectation
 from biodance.dance.limits import ForImprecise
-from biodance.dance.metrics import DanceMetrics
+from biodance.dance.metrics import DanceMetrics, longest_alone
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
 from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
@@ -142,6 +142,8 @@ class DanceResult:
     def about(self) -> tuple[str, ...]:
         """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is untold."""
         out = [f"For {self.plan.whom}."] if self.plan.whom else []
+        if self.dance and (alone := longest_alone(self.dance)):
+            out.append(f"One foot is off the ground for up to {alone:.0f} s at a time.")
         if self.reason_of_person:
             out.append(f"Made for one person's limits: {self.reason_of_person}.")
         if found := self._left:
