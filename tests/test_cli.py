@@ -199,7 +199,10 @@ _STANDING = f"simulate --protocol standing {_WHO} --out x"
         ("inspect no-such-file.c3d --json", "no-such-file.c3d"),
         ("report no-such-folder --out x", "no-such-folder"),
         ("settings no-such-folder", "no such folder"),
-        ("report .", "--out"),
+        ("report .", "--out is missing: Folder for the results"),
+        ("report", "SESSION is missing. See biodance report --help."),
+        ("live static", "static: is a folder"),
+        ("report skipped --out x", "every recording (static.c3d) has the role skip"),
         ("simulate --protocol short --sex F --height 170 --mass 62 --seed 1 --out x", "stature"),
         ("simulate --protocol standing --sex F --height 1.7 --mass inf --seed 1 --out x", "mass = inf kg"),
         (f"simulate --protocol waltz {_WHO} --seed 1 --out x", "waltz"),
@@ -221,6 +224,8 @@ def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch
     (tmp_path / "empty").touch()
     (tmp_path / "static").mkdir()
     shutil.copy(session / "static.c3d", tmp_path / "static")
+    shutil.copytree(tmp_path / "static", tmp_path / "skipped")
+    (tmp_path / "skipped" / "session.toml").write_text('[trials."*"]\nrole = "skip"\n')
     (tmp_path / "loop").symlink_to("loop")
     os.mkfifo(tmp_path / "pipe")
     before = sorted(tmp_path.iterdir())

@@ -156,6 +156,10 @@ def test_repeated_label_gets_a_number(tmp_path):
         ({"rows": ["1\t0\t1\t2\t3\t4\t5\t6"], "rate": "0"}, "DataRate"),
         ({"rows": ["1\t0\t1\t2\t3\t4\t5\t6"], "unit": "inch"}, "legal are mm, cm, m"),
         ({"rows": ["1\t0\t1\t2\t3\t900\t5\t6"], "unit": "m"}, "Correct the unit"),
+        (
+            {"rows": ["1\t0" + "\t.1\t.2\t.3\t.9\t1.7\t.6" * 2], "names": "A\t\t\tB\t\t\tC\t\t\tD\t\t"},
+            "lie 0.0015 m apart in the unit 'mm' of the header. Correct the unit",
+        ),
         ({"rows": ["1\t0\t1\t2\t3\t4\t5\t6", "2\t0\t1\t2\t3\t4\t5\t6"]}, "does not increase at frame 2"),
         ({"rows": ["1\t0\t1\t2\t3\t4\t5\t6", "oops"]}, "row 7 does not begin with a frame number"),
         ({"rows": ["1\t0\t1\t2\t3\t4\t5\t6"], "names": ""}, "names no marker"),

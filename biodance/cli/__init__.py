@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from cyclopts import CycloptsError
+from cyclopts import CycloptsError, MissingArgumentError
 
 from biodance.cli import archive, dance, diagnose, files, identify, live, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
@@ -42,7 +42,7 @@ def run(tokens: Sequence[str] | None = None) -> int:
     try:
         return app(tokens, exit_on_error=False, print_error=False, result_action="return_value") or DONE
     except CycloptsError as error:
-        say(f"{' '.join(str(error).split())} See biodance --help.")
+        say(f"{_misused(error)} See {' '.join(('biodance', *(error.command_chain or ())))} --help.")
     except BiodanceError as error:
         say(str(error))
     except OSError as error:
@@ -59,6 +59,15 @@ def run(tokens: Sequence[str] | None = None) -> int:
         say("Stopped before the command was done; what was already written is complete.")
         return STOPPED
     return NOT_DONE
+
+
+def _misused(error: CycloptsError) -> str:
+    """Return in one sentence what is wrong with a command line."""
+    if not isinstance(error, MissingArgumentError) or error.argument is None:
+        return " ".join(str(error).split())
+    one, says = error.argument, error.argument.parameter.help
+    name = one.name if one.index is None else one.name.lstrip("-").upper()
+    return f"{name} is missing{f': {says}' if says else '.'}"
 
 
 def _out(tokens: Sequence[str] | None) -> str:

@@ -40,7 +40,8 @@ def body_and_stream(
         The recording is not there or was not read, or no static trial scales the body; the message says why.
     """
     if not file.is_file():
-        raise SessionRefused(f"{file}: there is no such file. Give one recording of a session's folder.")
+        what = "is a folder" if file.is_dir() else "there is no such file"
+        raise SessionRefused(f"{file}: {what}. Give one recording of a session's folder.")
     session = read_session(file.parent, subject_name=subject, markers=markers, settings=settings, tell=tell)
     trial = next((one for one in session.trials if one.source.path.resolve() == file.resolve()), None)
     if trial is None:
@@ -52,7 +53,11 @@ def body_and_stream(
         statics = (
             replace(read_trial(static, role="static", subject=subject, markers=worn), settings=session.settings),
         )
-    if worn is None or trial.markers is None:
+    if trial.markers is None:
+        raise SessionRefused(
+            f"{file}: has no markers, so no body can follow it. Give a recording of markers and plates."
+        )
+    if worn is None:
         raise SessionRefused(f"{file}: has no markers of a known set, so no body can follow it. Say --markers.")
     return _scaled(session.subject, statics, file), replace(trial, markers=canonical(trial.markers, worn))
 

@@ -23,6 +23,8 @@ _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _CLEARLY_TALLER = 1.3
 HEADER_ROWS = 4
 WIDEST = 50.0  # m, between the markers of one frame
+NARROWEST = 0.05  # m, the same of a hand
+_FEW = 4  # markers, fewer of which may lie anywhere
 TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 
 
@@ -46,9 +48,10 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     unit = _unit(header, path)
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
-    if (spread := _spread(values) * _METRES[unit]) > WIDEST:
+    spread = _spread(values) * _METRES[unit]
+    if spread > WIDEST or (0 < spread < NARROWEST and len(names) >= _FEW):
         raise FileRefused(
-            f"{path}: the markers of one frame lie {spread:.0f} m apart in the unit {unit!r} of the header. Correct "
+            f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "
             f"the unit."
         )
     time, xyz, timing = _equal_steps(numbers, raw_time, values * _METRES[unit], _rate(header, path), path)

@@ -148,7 +148,7 @@ def read_session(
         trials.append(replace(trial, name=f"{file.parent.name}_{trial.name}") if trial.name in reasons else trial)
         reasons[trials[-1].name] = reason
     if not trials:
-        raise SessionRefused(_nothing_left(folder, refused, readers))
+        raise SessionRefused(_nothing_left(folder, files, refused, readers))
     _refuse_several_people(folder, trials)
     trials = _settle_static(each_once(trials, notes), file_says, reasons, notes)
     trials, strangers = of_one_person(trials, file_says.subject)
@@ -242,13 +242,18 @@ def _settle_static(
     return [replace(trial, role="static") if trial is guess else trial for trial in trials]
 
 
-def _nothing_left(folder: Path, refused: Mapping[str, str], readers: Chosen[Reader]) -> str:
-    """Return the sentence for a folder of which no recording is left: nothing there, or nothing that can be read."""
+def _nothing_left(folder: Path, files: Sequence[Path], refused: Mapping[str, str], readers: Chosen[Reader]) -> str:
+    """Return the sentence for a folder of which no recording is left: nothing there, nothing that can be read, or that
+    is not to be skipped.
+    """
     if refused:
         name, reason = next(iter(refused.items()))
         if len(refused) == 1:
             return f"{folder}: its only file, {name}, cannot be read. {reason}"
         return f"{folder}: none of its {len(refused)} files can be read. The first, {name}: {reason}"
+    if files:
+        names = ", ".join(file.name for file in files[:3]) + (", ..." if len(files) > 3 else "")
+        return f"{folder}: every recording ({names}) has the role skip. Give one another role in session.toml."
     inside = [part.name for part in sorted(folder.iterdir()) if part.is_dir() and recordings_below(part, readers)]
     if inside:
         return (
