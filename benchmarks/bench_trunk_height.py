@@ -23,7 +23,7 @@ from biodance.identification.loads import may_carry
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.pipeline.body import placed_by_movement
 from biodance.pipeline.trial import Prepared, examine_trial, prepare_trial
-from biodance.records import Session
+from biodance.records import Array, Session
 from biodance.uncertainty.caution import widened
 
 LOWER = (-0.04, 0.04, 0.08, 0.12)
@@ -33,7 +33,7 @@ LEAST = 0.02
 
 
 def lowered(scaling: Scaling, by: float) -> tuple[Scaling, float]:
-    """Return the scaling whose trunk joint lies ``by`` m nearer to the middle of the hips, and its height (m) before."""
+    """Return the scaling whose trunk joint lies ``by`` m nearer to the mid hip, and its height (m) before."""
     place = dict(scaling.centres.place)
     hips = (place["right_hip"] + place["left_hip"]) / 2
     up = place["trunk"] - hips
@@ -59,7 +59,7 @@ def tracked(body: Body, read: Sequence[Prepared], mass: float) -> dict[str, Fit]
     }
 
 
-def log_evidence(body: Body, fits: Sequence[Fit], about: np.ndarray) -> float:
+def log_evidence(body: Body, fits: Sequence[Fit], about: Array) -> float:
     """Return the logarithm of the evidence of the trials, each band under the noise learned with this body."""
     total = statistics_together(body, fits, layout_for(about))
     noise, belief = learn_noise(total, may_carry(body, widened(body.sip, body.joint_errors)))
