@@ -163,7 +163,7 @@ _NEAR = 1.5
 """Margins (in their scale) larger than this cannot become active within one step."""
 
 
-_RADIUS, _GAIN = 0.3, 1e-3
+_RADIUS, _SETTLED = 0.3, 1e-3
 """The first step's largest change of a variable; a gain that counts as none."""
 
 
@@ -195,7 +195,7 @@ def minimise(
         new_gradient, new_jacobian = trial.slopes(rows)
         hessian = update(hessian, step, new_gradient - gradient - price @ (new_jacobian - jacobian))
         y, point = y + step, trial
-        if gained < _GAIN and worst(point.margins) < 1e-4:
+        if gained < _SETTLED and worst(point.margins) < 1e-4:
             break
     return Solution(y, point.value, float(-point.margins.min(initial=np.inf)), count)
 
