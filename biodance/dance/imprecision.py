@@ -157,11 +157,9 @@ class PlannedDance:
             tops.append(ankle[:, side, 2] + np.sqrt(np.maximum(reach**2 - across, 0.01)) - hip[:, 2] + up[:, side])
         return np.asarray(-np.log(np.exp(-_SOFT * np.array(tops)).sum(axis=0)) / _SOFT)
 
-    def performed(
-        self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision, part: slice = slice(None)
-    ) -> Copied:
-        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s; ``part`` of it."""
-        return self.performed_by(((rng, time, when, part),), how)
+    def performed(self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision) -> Copied:
+        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s."""
+        return self.performed_by(((rng, time, when, slice(None)),), how)
 
     def performed_by(
         self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
@@ -177,11 +175,11 @@ class PlannedDance:
         times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
         return self._copied(times, places, errors, sways, how)
 
-    def held_by(self, count: int, when: Array, how: Imprecision = USUAL_IMPRECISION) -> Copied:
-        """Return what ``count`` people do who stop at each of the instants ``when`` (W,) s of the plan, instant by
-        instant.
+    def held_by(self, count: int, when: Array) -> Copied:
+        """Return what ``count`` people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the
+        plan, instant by instant.
         """
-        rng, when = np.random.default_rng(0), np.repeat(when, count)
+        how, rng, when = USUAL_IMPRECISION, np.random.default_rng(0), np.repeat(when, count)
         error = how.tracking * rng.normal(size=(when.size, self.chain.size - 3))
         sway = how.sway * rng.normal(size=(when.size, 2))
         return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)

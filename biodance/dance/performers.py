@@ -87,14 +87,13 @@ def rehearse_imprecisely(
     limits: tuple[Limit, ...],
     *,
     who: Sequence[int] = range(PERFORMER_COUNT),
-    seed: int = 0,
     only: tuple[int, ...] = (),
     how: Imprecision = USUAL_IMPRECISION,
 ) -> Rehearsed:
     """Return what performers leave of the ``limits`` in ``dance``; ``who`` are their numbers, and each is the same
     whoever else dances. ``only``: neighbouring postures (indices) to or in which they are looked at.
     """
-    people = [_person(dance, k, seed, only, how) for k in who]
+    people = [_person(dance, k, only, how) for k in who]
     when = np.concatenate([when[part] for _, _, when, part in people])
     plan, postures = PlannedDance(dance, (when.min(), when.max())), len(dance.postures)
     asked = for_imprecise(limits)
@@ -125,17 +124,17 @@ _Person = tuple[np.random.Generator, Array, Array, slice]
 """What a performer's errors are drawn from, instants s of the performance and of the plan, and which of them count."""
 
 
-def _person(dance: Dance, k: int, seed: int, only: tuple[int, ...], how: Imprecision) -> _Person:
+def _person(dance: Dance, k: int, only: tuple[int, ...], how: Imprecision) -> _Person:
     """Return performer ``k``, and the instants at which he or she dances to or in the postures ``only``, and two beyond
     for differences.
     """
-    time, when = draw_clock(np.random.default_rng([seed, 7, k]), dance.duration, how)
+    time, when = draw_clock(np.random.default_rng([0, 7, k]), dance.duration, how)
     part = slice(None)
     if only:
         posture = np.array([phase.posture for phase in dance.phases])[phase_at(dance.phases, when)]
         inside = np.flatnonzero(np.isin(posture, only))
         part = slice(max(0, inside[0] - 2), inside[-1] + 3)
-    return np.random.default_rng([seed, 8, k]), time, when, part
+    return np.random.default_rng([0, 8, k]), time, when, part
 
 
 def _groups(people: list[_Person]) -> Iterator[list[_Person]]:
@@ -170,13 +169,12 @@ def perform_with(
     limits: tuple[Limit, ...],
     *,
     who: Sequence[int] = range(PERFORMER_COUNT),
-    seed: int = 0,
     only: tuple[int, ...] = (),
 ) -> Rehearsed:
     """Return what `rehearse_imprecisely` does, found by two ``workers`` side by side."""
     half = (len(who) + 1) // 2
     tasks = [
-        workers.submit(rehearse_imprecisely, dance, limits, who=part, seed=seed, only=only)
+        workers.submit(rehearse_imprecisely, dance, limits, who=part, only=only)
         for part in (who[:half], who[half:])
         if part
     ]

@@ -201,14 +201,18 @@ def robot_rows(body: Body, motion: Motion, wrench: Array) -> Array:
     return np.asarray(rows.reshape(-1, rows.shape[2]))
 
 
-def expect_robot(dance: Dance, *, steps: int = 10) -> Expectation:
-    """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures, if it is danced
+_STEPS = 10
+"""Durations of a dance after which what is expected is told."""
+
+
+def expect_robot(dance: Dance) -> Expectation:
+    """Return what is expected after ten durations of ``dance``, evenly spread over its postures, if it is danced
     exactly.
     """
     body, motion = dance.body, dance.motion(_RATE)
     rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
     ends = [phase.end for phase in dance.phases if phase.kind == "hold"]
-    chosen = [ends[k] for k in sorted({int(k) for k in np.linspace(0, len(ends) - 1, steps + 1).round()[1:]})]
+    chosen = [ends[k] for k in sorted({int(k) for k in np.linspace(0, len(ends) - 1, _STEPS + 1).round()[1:]})]
     triangle, start = np.zeros((rows.shape[1], rows.shape[1])), 0
     beliefs = [posterior(Information(triangle, 1), body.sip)]
     for end in chosen:

@@ -119,11 +119,11 @@ def worth_of(body: Body, motion: Motion, use: NDArray[np.bool_] | None = None, *
 
 
 def score_performance(
-    dance: Dance, body: Body, recorded: tuple[tuple[Motion, NDArray[np.bool_]], ...], *, proposed: int = PROPOSED
+    dance: Dance, body: Body, recorded: tuple[tuple[Motion, NDArray[np.bool_]], ...]
 ) -> PerformanceScore:
     """Return how well ``dance`` was danced in the motions ``recorded`` of ``body``, each with its usable frames (T,).
 
-    ``proposed`` transitions are chosen one after another, each the one that raises the mean share most beside those
+    `PROPOSED` transitions are chosen one after another, each the one that raises the mean share most beside those
     chosen before.
 
     Raises
@@ -145,7 +145,7 @@ def score_performance(
         for row in zip(body.segments, planned.tolist(), _shares(body, reached).tolist(), strict=True)
     )
     seconds = sum(float(use.sum()) / motion.rate for motion, use in recorded)
-    return PerformanceScore(dance.protocol, rows, _repetitions(dance, body, reached, noise, proposed), seconds)
+    return PerformanceScore(dance.protocol, rows, _repetitions(dance, body, reached, noise), seconds)
 
 
 def _same_joints(dance: Dance, body: Body) -> None:
@@ -162,7 +162,7 @@ def _shares(body: Body, known: Worth) -> Array:
     return shares(belief_after(body, known.H, known.disturbed))
 
 
-def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise, count: int) -> tuple[Repetition, ...]:
+def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise) -> tuple[Repetition, ...]:
     """Return the transitions that gain most beside what is ``known``, best first; steps to another place, which the
     feet cannot simply repeat, are left out.
     """
@@ -173,7 +173,7 @@ def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise, count: in
         and np.array_equal(dance.stances[phase.posture - 1].ankle, dance.stances[phase.posture].ankle)
     }
     out: list[Repetition] = []
-    while some and len(out) < count:
+    while some and len(out) < PROPOSED:
         before = _shares(body, known)
         gains = {phase: _shares(body, known + worth) - before for phase, worth in some.items()}
         best = max(gains, key=lambda phase: float(gains[phase].mean()))

@@ -24,6 +24,10 @@ JUMP = 1e-6
 """rad, rad/s, rad/s²: jumps of coordinates between phases: rounding."""
 
 
+_RATE = 100.0
+"""Hz at which a dance is judged."""
+
+
 @dataclass(frozen=True)
 class Margin:
     """What is left of one limit at its worst: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what``
@@ -38,17 +42,15 @@ class Margin:
 
 
 @one_thread()
-def verify(
-    body: Body, dance: Dance, limits: tuple[Limit, ...], *, rate: float = 100.0, part: slice = slice(None)
-) -> tuple[Margin, ...]:
-    """Return the margin of every limit over the whole dance, sampled at ``rate`` Hz, at the ends of all phases and
+def verify(body: Body, dance: Dance, limits: tuple[Limit, ...], *, part: slice = slice(None)) -> tuple[Margin, ...]:
+    """Return the margin of every limit over the whole dance, sampled at 100 Hz, at the ends of all phases and
     close to them.
 
     ``body`` whose limits count (usually ``dance.body``); ``limits`` with their numbers (`Plan.limits`); ``part`` only
     these phases.
     """
     chosen = range(len(dance.phases))[part]
-    return _least([_continuity(dance), *(margin for k in chosen for margin in _margins(body, dance, limits, k, rate))])
+    return _least([_continuity(dance), *(margin for k in chosen for margin in _margins(body, dance, limits, k))])
 
 
 def verify_with(workers: Executor, body: Body, dance: Dance, limits: tuple[Limit, ...]) -> tuple[Margin, ...]:
@@ -69,9 +71,9 @@ def _least(margins: Iterable[Margin]) -> tuple[Margin, ...]:
     return tuple(worst[name] for name in sorted(worst))
 
 
-def _margins(body: Body, dance: Dance, limits: tuple[Limit, ...], number: int, rate: float) -> Iterator[Margin]:
+def _margins(body: Body, dance: Dance, limits: tuple[Limit, ...], number: int) -> Iterator[Margin]:
     """Yield the worst margin of every limit in one phase."""
-    motion, held = _motion(body, dance, number, rate), dance.phases[number].kind == "hold"
+    motion, held = _motion(body, dance, number), dance.phases[number].kind == "hold"
     for limit in limits:
         left = limit.check(motion) if (limit.at_rest if held else limit.in_motion) else NOTHING
         if left.value.size:
@@ -85,10 +87,10 @@ def broken(margins: tuple[Margin, ...]) -> tuple[Margin, ...]:
     return tuple(margin for margin in margins if not margin.worst >= 0)
 
 
-def _motion(body: Body, dance: Dance, number: int, rate: float) -> CheckedMotion:
+def _motion(body: Body, dance: Dance, number: int) -> CheckedMotion:
     """Return a phase as a Motion, sampled where it is judged."""
     phase = dance.phases[number]
-    inner = np.arange(np.ceil(phase.start * rate), np.floor(phase.end * rate) + 1) / rate
+    inner = np.arange(np.ceil(phase.start * _RATE), np.floor(phase.end * _RATE) + 1) / _RATE
     instants = [phase.start, *(phase.start + EDGES), *inner, *(phase.end - EDGES), phase.end]
     time = np.unique(np.round(np.clip(instants, phase.start, phase.end), 9))
     time = time[:1] if phase.kind == "hold" else time  # nothing changes during a hold

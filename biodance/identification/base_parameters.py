@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.parts import GRAVITY
 from biodance.identification.information import Information, fold
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
@@ -20,6 +19,10 @@ from biodance.records import Array, Motion, freeze
 
 PARAMETERS = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")
 """Names of the ten parameters of a segment, in Pinocchio's order."""
+_DIGITS = 4
+"""In which relations are told."""
+_DEPENDENT, _UNEXCITED = 1e-8, 1e-10
+"""Share of a column's norm, of the largest singular value, that counts as none."""
 _PREFERENCE = (1, 2, 3, 4, 5, 7, 8, 9, 6, 0)
 """Order in which the columns of one segment are offered to the base set: YY and M last."""
 
@@ -52,25 +55,25 @@ class BaseParameters:
         """Positions (in the base set) of inertias."""
         return tuple(i for i, c in enumerate(self.columns) if c % 10 >= 4)
 
-    def relations(self, *, digits: int = 4) -> tuple[str, ...]:
+    def relations(self) -> tuple[str, ...]:
         """Return the regrouping relations as text, one per base parameter (paper eq. 13)."""
         lines = []
         for i, column in enumerate(self.columns):
             text = self.names[column]
-            for j in np.flatnonzero(np.abs(self.regroup[i]) > 10.0**-digits):
+            for j in np.flatnonzero(np.abs(self.regroup[i]) > 10.0**-_DIGITS):
                 if j == column:
                     continue
                 factor = self.regroup[i, j]
-                size = "" if abs(abs(factor) - 1) < 10.0**-digits else f"{abs(factor):.{digits}g} "
+                size = "" if abs(abs(factor) - 1) < 10.0**-_DIGITS else f"{abs(factor):.{_DIGITS}g} "
                 text += f" {'+' if factor > 0 else '-'} {size}{self.names[j]}"
             lines.append(text)
         return tuple(lines)
 
 
-def base_parameters(triangle: Array, names: tuple[str, ...], *, tolerance: float = 1e-8) -> BaseParameters:
+def base_parameters(triangle: Array, names: tuple[str, ...]) -> BaseParameters:
     """Return the base parameters of a regressor given by its R factor ``triangle`` (p, p) or any rows (m, p).
 
-    A column counts as dependent when less than ``tolerance`` of its norm is left after projection on the columns kept
+    A column counts as dependent when less than `_DEPENDENT` of its norm is left after projection on the columns kept
     before it.
     """
     order = sorted(range(triangle.shape[1]), key=lambda c: (c // 10, _PREFERENCE.index(c % 10)))
@@ -83,7 +86,7 @@ def base_parameters(triangle: Array, names: tuple[str, ...], *, tolerance: float
         rest = vector - basis @ (basis.T @ vector)
         rest = rest - basis @ (basis.T @ rest)
         size = np.linalg.norm(rest)
-        if scale[column] > tolerance * largest and size > tolerance * scale[column]:
+        if scale[column] > _DEPENDENT * largest and size > _DEPENDENT * scale[column]:
             kept.append(column)
             basis = np.column_stack([basis, rest / size])
     kept.sort()
@@ -100,7 +103,7 @@ def parameter_names(body: Body) -> tuple[str, ...]:
     return tuple(f"{p} {segment}" for segment in body.segments for p in PARAMETERS)
 
 
-def structural_base(body: Body, *, gravity: Array = GRAVITY, seed: int = 0) -> BaseParameters:
+def structural_base(body: Body, *, seed: int = 0) -> BaseParameters:
     """Return the base parameters that ``body`` has for general motion: rank found on 100 random states (not on a
     recorded trial).
     """
@@ -113,7 +116,7 @@ def structural_base(body: Body, *, gravity: Array = GRAVITY, seed: int = 0) -> B
     motion = Motion(
         np.arange(frames, dtype=float), q, rng.normal(0, 2, (frames, body.nv)), rng.normal(0, 4, (frames, body.nv))
     )
-    W = regressor_of(segment_motion(body, motion), gravity=gravity, sharing=body.sharing)
+    W = regressor_of(segment_motion(body, motion), gravity=body.gravity, sharing=body.sharing)
     return base_parameters(fold(W.reshape(-1, W.shape[2])), parameter_names(body))
 
 
@@ -144,7 +147,7 @@ class BaseEstimate:
         return tuple(int(i) for i in np.flatnonzero(self.relative_sd <= 10.0))
 
 
-def estimate_base(data: Information, base: BaseParameters, *, tolerance: float = 1e-10) -> BaseEstimate:
+def estimate_base(data: Information, base: BaseParameters) -> BaseEstimate:
     """Return the weighted least-squares estimate of the base parameters from whitened data.
 
     Directions that the data do not excite get an infinite standard deviation, never a small one.
@@ -152,9 +155,9 @@ def estimate_base(data: Information, base: BaseParameters, *, tolerance: float =
     columns = list(base.columns)
     Wb = data.triangle[:, columns]
     scale = np.linalg.norm(Wb, axis=0)
-    scale[scale <= tolerance**2 * scale.max(initial=0.0)] = 1.0  # never moved: an unknown direction, not a tiny one
+    scale[scale <= _UNEXCITED**2 * scale.max(initial=0.0)] = 1.0  # never moved: an unknown direction, not a tiny one
     U, s, Vt = np.linalg.svd(Wb / scale, full_matrices=False)
-    good = s > tolerance * s.max(initial=0.0)
+    good = s > _UNEXCITED * s.max(initial=0.0)
     rank = int(good.sum())
     inverse = np.where(good, 1 / np.where(good, s, 1.0), 0.0)
     value = (Vt.T * inverse) @ (U.T @ data.target) / scale

@@ -17,12 +17,14 @@ WORTH = 6.0
 """Coefficients' worth of the start that every band keeps."""
 
 
+_SETTLED = 1e-3
+"""Share by which a covariance may still change when learning ends."""
+
+
 @one_thread()
-def learn_noise(
-    data: Statistics, prior: Sip, *, rounds: int = 12, tolerance: float = 1e-3, start: Array = START
-) -> tuple[Noise, Posterior]:
+def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, start: Array = START) -> tuple[Noise, Posterior]:
     """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
-    beyond ``tolerance``; ``start`` (6, 6) N², N·m, N²·m² as for people by default.
+    beyond a thousandth; ``start`` (6, 6) N², N·m, N²·m² as for people by default.
     """
     data = replace(data)  # a copy of its own: what that keeps in order to learn (12 MB) goes with it
 
@@ -33,5 +35,5 @@ def learn_noise(
         )
 
     first = Noise(np.tile(start, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
-    noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=tolerance)
+    noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=_SETTLED)
     return noise, posterior(data.information(noise), prior)

@@ -44,12 +44,12 @@ class PaperFit:
     cause: str = ""
 
 
-def directions(count: int = DIRECTIONS) -> Array:
-    """Return ``count`` unit vectors (count, 3), spread evenly over the half sphere (golden spiral; v and -v say the
+def directions() -> Array:
+    """Return `DIRECTIONS` unit vectors (D, 3), spread evenly over the half sphere (golden spiral; v and -v say the
     same).
     """
-    z = (np.arange(count) + 0.5) / count
-    angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
+    z = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+    angle = np.arange(DIRECTIONS) * np.pi * (3 - np.sqrt(5))
     radius = np.sqrt(1 - z**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 

@@ -80,7 +80,13 @@ def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialVa
     )
 
 
-def residual_ratio(trials: tuple[TrialValidation, ...], *, draws: int = 1000, seed: int = 0) -> ResidualRatio:
+_DRAWS = 1000
+"""Of the bootstrap."""
+
+
+def residual_ratio(
+    trials: tuple[TrialValidation, ...],
+) -> ResidualRatio:
     """Return the ratio of RMS residuals table / identified over all ``trials`` with a block-bootstrap interval.
 
     Raises
@@ -101,7 +107,7 @@ def residual_ratio(trials: tuple[TrialValidation, ...], *, draws: int = 1000, se
             f"longer."
         )
     a, b = np.array(first), np.array(second)
-    drawn = np.random.default_rng(seed).integers(0, len(a), (draws, len(a)))
+    drawn = np.random.default_rng(0).integers(0, len(a), (_DRAWS, len(a)))
     ratio = np.sqrt(a[drawn].sum(axis=1) / b[drawn].sum(axis=1))
     low, high = np.percentile(ratio, [2.5, 97.5], axis=0)
     force, moment = np.sqrt(a.sum(axis=0) / b.sum(axis=0))

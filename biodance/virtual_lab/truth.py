@@ -110,18 +110,17 @@ def _static_pose(person: Person, instruments: Instruments, performances: list[Pe
     return {"trial": static.plan.name, "time_s": time, "segments_12": segments}
 
 
-def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array, *, key: str = "segments_12") -> Sip:
+def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array) -> Sip:
     """Return the true parameters of the 12 segments in ANOTHER model's frames: what a perfect identification of that
     model would find.
 
     ``document`` is a truth; ``rotation`` (12, 3, 3), ``position`` (12, 3) m are the lab poses of the other model's
-    segments, in the same order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial; ``key``
-    "segments_12" or "segments_12_with_loads". Joint centres and axes differ between truth and model, so the numbers do;
-    the body is the same.
+    segments, in the same order, at the marker time ``document["static_pose"]["time_s"]`` of the static trial. Joint
+    centres and axes differ between truth and model, so the numbers do; the body is the same.
     """
     phi = []
     for segment, pose, turn, place in zip(
-        document[key], document["static_pose"]["segments_12"], rotation, position, strict=True
+        document["segments_12"], document["static_pose"]["segments_12"], rotation, position, strict=True
     ):
         own = np.array(
             [segment["mass_kg"], *(segment["mass_kg"] * np.array(segment["com_m"])), *segment["inertia_kgm2"]]
@@ -129,7 +128,7 @@ def sip_in_frames(document: dict[str, Any], rotation: Array, position: Array, *,
         there = turn.T @ np.array(pose["rotation"]), turn.T @ (np.array(pose["position_m"]) - place)
         phi.append(parameters_of_inertia(place_inertia(of_parameters(own), *there)))
     flat = np.concatenate(phi)
-    return Sip(tuple(segment["name"] for segment in document[key]), flat, np.zeros((flat.size, flat.size)))
+    return Sip(tuple(segment["name"] for segment in document["segments_12"]), flat, np.zeros((flat.size, flat.size)))
 
 
 def _load(person: Person, load: AddedLoad) -> dict[str, Any]:

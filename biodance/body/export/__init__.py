@@ -16,7 +16,7 @@ from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.inertia import pseudo_inertia
 from biodance.body.solids import SegmentSolids
-from biodance.discovery import Chosen, Family, missing_of
+from biodance.discovery import Family, missing_of
 from biodance.errors import BiodanceError
 from biodance.lab.plain_text import write_new
 
@@ -52,9 +52,9 @@ def _lacking(member: object) -> tuple[str, ...]:
 FAMILY: Family[ModelFormat] = Family("model format", "biodance.exports", __name__, "", _lacking, lambda one: one.FORMAT)
 
 
-def formats(chosen: Chosen[ModelFormat] = None) -> Mapping[str, ModelFormat]:
-    """Return the formats by name; ``chosen`` names choose from the family, objects join it."""
-    return FAMILY.choose(chosen)
+def formats() -> Mapping[str, ModelFormat]:
+    """Return the formats by name."""
+    return FAMILY.choose(None)
 
 
 def refuse_impossible(body: Body) -> None:

@@ -163,18 +163,20 @@ _NEAR = 1.5
 """Margins (in their scale) larger than this cannot become active within one step."""
 
 
+_RADIUS, _SETTLED = 0.3, 1e-3
+"""The first step's largest change of a variable; a gain that counts as none."""
+
+
 def minimise(
     evaluate: Callable[[Array], Point],
     start: Array,
     *,
     iterations: int = 30,
-    radius: float = 0.3,
-    tolerance: float = 1e-3,
 ) -> Solution:
     """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
     y, n = start.copy(), start.size
     point, hessian = evaluate(y), np.eye(n)
-    count = 0
+    count, radius = 0, _RADIUS
     for count in range(1, iterations + 1):  # noqa: B007
         rows = np.flatnonzero(point.margins < _NEAR)
         gradient, jacobian = point.slopes(rows)
@@ -193,7 +195,7 @@ def minimise(
         new_gradient, new_jacobian = trial.slopes(rows)
         hessian = update(hessian, step, new_gradient - gradient - price @ (new_jacobian - jacobian))
         y, point = y + step, trial
-        if gained < tolerance and worst(point.margins) < 1e-4:
+        if gained < _SETTLED and worst(point.margins) < 1e-4:
             break
     return Solution(y, point.value, float(-point.margins.min(initial=np.inf)), count)
 

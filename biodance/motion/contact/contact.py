@@ -110,9 +110,7 @@ class FeetOnGround:
     weight: float
 
 
-def ground_contact(
-    trial: Trial, soles: Soles, *, mass: float = float("nan"), rules: ContactRules | None = None
-) -> Contact:
+def ground_contact(trial: Trial, soles: Soles, *, mass: float = float("nan")) -> Contact:
     """Return the ground contact of a prepared trial: `feet_on_ground`, then `contact_with_plates`.
 
     Raises
@@ -122,17 +120,15 @@ def ground_contact(
     BiodanceError
         Plates and soles have different times: the trial was not prepared.
     """
-    return contact_with_plates(trial, soles, feet_on_ground(trial, soles, mass=mass, rules=rules))
+    return contact_with_plates(trial, soles, feet_on_ground(trial, soles, mass=mass))
 
 
-def feet_on_ground(
-    trial: Trial, soles: Soles, *, mass: float = float("nan"), rules: ContactRules | None = None
-) -> FeetOnGround:
+def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) -> FeetOnGround:
     """Return what touches the ground in a prepared trial.
 
     ``mass`` kg of the body, NaN = unknown: a foot that rests away from all known heights while the plates carry at
-    least nine tenths of the weight is held in the air; without the mass it counts as standing on something. ``rules``
-    None: those of ``trial.settings``.
+    least nine tenths of the weight is held in the air; without the mass it counts as standing on something. The rules
+    are those of ``trial.settings``.
 
     Raises
     ------
@@ -141,7 +137,7 @@ def feet_on_ground(
     BiodanceError
         Plates and soles have different times: the trial was not prepared.
     """
-    rules = rules or trial.settings.contact
+    rules = trial.settings.contact
     if not trial.plates:
         raise TrialRefused(
             f"Trial {trial.name}: no force plate was recorded, so no frame is measured. Record with the plates on."

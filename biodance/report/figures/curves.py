@@ -1,7 +1,7 @@
 """Curves over time as light figures that zoom, are read, and whose curves are switched on and off (``curves.js``)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -72,7 +72,6 @@ class CurveFigure:
     trial: str = ""
     label: str = "time (s)"
     band: str = "95 % interval"
-    heights: tuple[float, float] = field(default=(_TALL, _NARROW))
 
     def html(self) -> str:
         """Return the figure as HTML: legend of switches, panels, and a line that tells the values at the cursor."""
@@ -108,7 +107,7 @@ class CurveFigure:
                     low, high = one.values - one.half_width, one.values + one.half_width
                     marks.append(band(x, y, self.time, low, high, one.look.colour, name=one.name))
                 marks.append(curve_line(x, y, self.time, one.values, one.look, name=one.name, kind=one.kind))
-            height, last = self.heights[1 if strip.even else 0], i == len(strips) - 1
+            height, last = _NARROW if strip.even else _TALL, i == len(strips) - 1
             about = f"{strip.title}: {', '.join(dict.fromkeys(one.name for one in strip.curves))}"
             out.append(panel(x, y, marks, about, frame=Frame(height=height), numbers=last))
         return "".join(out)
