@@ -132,11 +132,10 @@ def prior(
     )
     opinions = body_opinions(reference, skeleton, subject) if opinions is None else opinions
     least = error_size("segment_mass", "floor") if opinions else 0.0
-    covariance, apart = (
-        child_widening(subject) ** 2 * primitive_covariance(lumps, skeleton, tables, least=least)
-        for tables in (others, ())
-    )
+    wider = child_widening(subject) ** 2
+    covariance = wider * primitive_covariance(lumps, skeleton, others, least=least)
     if opinions:
+        apart = wider * primitive_covariance(lumps, skeleton, (), least=least)
         lumps, covariance = _weigh(lumps, covariance, apart, opinions)
     jacobian = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, lump in enumerate(lumps):

@@ -1,11 +1,10 @@
 """What identification found, under keys whose unit is their suffix; channels in the order Fx Fy Fz Mx My Mz."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biodance.dance.scoring import PerformanceScore
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS, Known, known_together
@@ -15,6 +14,9 @@ from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import ResidualRatio, TrialValidation
 from biodance.motion.regressor import Agreement
 from biodance.pipeline.identification import SessionIdentification
+
+if TYPE_CHECKING:
+    from biodance.dance.scoring import PerformanceScore
 
 _TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
 ASKED = ("mass", "com x", "com y", "com z")
@@ -183,7 +185,7 @@ def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
     return {"trial": bands.trial, "joints": rows}
 
 
-def performance_document(found: PerformanceScore | None) -> dict[str, Any] | None:
+def performance_document(found: "PerformanceScore | None") -> dict[str, Any] | None:
     """Return how well a dance was danced: share of the table's variance removed, planned and reached; ``repeat`` the
     transitions to dance once more, by number (n leads from cue n to the next); None where no dance was named.
     """
