@@ -55,7 +55,8 @@ def _draw(axes: "Axes", plate: str, one: History) -> None:
     strange = [i for i, v in enumerate(at) if any(s.visit == series.visits[v].name for s in one.strangers)]
     axes.plot(at[strange], value[strange], "o", markersize=9, markerfacecolor="none", markeredgecolor=RED)
     level = factor * one.level_over_time(plate)
-    axes.step(np.arange(level.size), level, where="mid", color=BLACK, linewidth=1.2)
+    during = np.arange(at.min(), at.max() + 1)  # elsewhere this plate was not
+    axes.step(during, level[during], where="mid", color=BLACK, linewidth=1.2)
     for change in one.changes:
         if change.plate in (plate, ALL):
             first, last = (series.visits.index(v) for v in (change.earliest, change.latest))
