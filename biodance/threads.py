@@ -18,8 +18,8 @@ def one_thread() -> Iterator[None]:
 
     Stages of long work carry it as a decorator, ``@one_thread()``. Matrices here have 10 to 500 rows, where a second
     thread costs more than it brings: a diagnosis took 45 s of processor time with two threads and 7 s with one
-    (docs/decisions). More cores are used by whole processes instead. What the environment says (OMP_NUM_THREADS, ...)
-    is left alone, and so are threads of programs that call us.
+    (docs/decisions/2026-11-22-processing-time.md). More cores are used by whole processes instead. What the
+    environment says (OMP_NUM_THREADS, ...) is left alone, and so are threads of programs that call us.
     """
     with _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
         yield

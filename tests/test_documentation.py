@@ -39,10 +39,18 @@ def test_a_decision_is_a_dated_record(path: Path) -> None:
     assert max(len(line) for line in text.splitlines()) <= LONGEST
 
 
-def test_every_decision_stands_in_the_list() -> None:
-    page = hook("decisions").contents(DOCS / "decisions")
+def test_every_decision_stands_in_the_index() -> None:
+    page = (DOCS / "decisions" / "README.md").read_text()
     assert len(RECORDS) >= 75
     assert all(f"({path.name})" in page for path in RECORDS)
+    assert page == hook("decisions").indexed(page, DOCS / "decisions"), "run python docs/hooks/decisions.py"
+
+
+def test_every_link_between_pages_leads_to_a_file() -> None:
+    made = ("reference/", "tutorials/")
+    for page in [*DOCS.rglob("*.md"), *DOCS.parent.glob("*.md")]:
+        for target in re.findall(r"\]\(([^)#\s:]+)[^):]*\)", page.read_text()):
+            assert any(part in target for part in made) or (page.parent / target).exists(), f"{page}: {target}"
 
 
 def test_every_example_is_a_tutorial() -> None:

@@ -83,5 +83,5 @@ WHITE = Bands((0.0, np.inf), np.inf)
 """White noise per sample."""
 BANDS = Bands((0.0, 0.04, 0.3, 1.0, 2.5, 6.0), 25.0)
 """The bands of identification and diagnosis, Hz: rest (the mean of a trial alone), slow, and three of movement. Above
-6 Hz soft tissue and filters rule: with bands up to 10 Hz identification errs more (docs/decisions/, 2026-11-22). 25
-Hz: more than twice the last edge."""
+6 Hz soft tissue and filters rule: with bands up to 10 Hz identification errs more
+(docs/decisions/2026-11-22-frequency-bands.md). 25 Hz: more than twice the last edge."""

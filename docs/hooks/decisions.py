@@ -1,15 +1,17 @@
-"""The list of all decisions, newest first in each topic, made from the dated records in docs/decisions/."""
+"""The index of the decision records, by topic, newest first: in the navigation and in docs/decisions/README.md.
+
+After a record is added or its title changes, ``python docs/hooks/decisions.py`` writes the index anew.
+"""
 
 import re
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import Files
-from mkdocs.structure.pages import Page
 
 FOLDER = Path(__file__).parents[1] / "decisions"
 RECORD = re.compile(r"(\d{4}-\d{2}-\d{2})-[a-z0-9-]+\.md")
-PLACE = "<!-- the list of all decisions -->"
+START, END = "<!-- index: made by docs/hooks/decisions.py -->", "<!-- end of the index -->"
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
@@ -18,11 +20,6 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     topics = [{topic: [f"decisions/{path.name}" for path in paths]} for topic, paths in by_topic(FOLDER).items()]
     entry["Decisions"] = ["decisions/README.md", *topics]
     return files
-
-
-def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Put the list into the page of the folder."""
-    return markdown.replace(PLACE, contents(FOLDER)) if page.file.src_uri == "decisions/README.md" else markdown
 
 
 def by_topic(folder: Path) -> dict[str, list[Path]]:
@@ -39,11 +36,20 @@ def by_topic(folder: Path) -> dict[str, list[Path]]:
 
 
 def contents(folder: Path) -> str:
-    """Return the list as Markdown."""
+    """Return the index as Markdown."""
     lines: list[str] = []
     for topic, paths in by_topic(folder).items():
         lines += ["", f"## {topic}", ""]
-        lines += [
-            f"- {path.name[:10]} [{path.read_text().splitlines()[0].removeprefix('# ')}]({path.name})" for path in paths
-        ]
+        lines += [f"- [{path.read_text().splitlines()[0].removeprefix('# ')}]({path.name})" for path in paths]
     return "\n".join(lines) + "\n"
+
+
+def indexed(page: str, folder: Path) -> str:
+    """Return the page of the folder with its index made anew."""
+    before, rest = page.split(START)
+    return f"{before}{START}\n{contents(folder)}\n{END}{rest.split(END)[1]}"
+
+
+if __name__ == "__main__":
+    readme = FOLDER / "README.md"
+    readme.write_text(indexed(readme.read_text(), FOLDER))
