@@ -1,4 +1,5 @@
-"""The truth in any laboratory: every demand of issue 14 in one table, real, foreign, own and drawn laboratories apart.
+"""The truth in any laboratory: every demand on a diagnosis in one table, real, foreign, own and drawn laboratories
+apart.
 
     BIODANCE_DATA=folder BIODANCE_FOREIGN_LAB=folder PYTHONPATH=tests python benchmarks/bench_truth.py --run NAME
         [--part clean removed ...] [--column real own ...] [--first N] [--minutes M]

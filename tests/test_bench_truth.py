@@ -1,5 +1,4 @@
-"""The one table of issue 14's demands (benchmarks/bench_truth.py): what is counted where, and that a stopped run goes
-on."""
+"""The table of all demands on a diagnosis (benchmarks/bench_truth.py): what is counted where, and how it resumes."""
 
 import sys
 

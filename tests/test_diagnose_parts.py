@@ -112,6 +112,17 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     assert all(row.told_from >= row.limit > 0 for row in rows)
 
 
+def test_no_limit_lies_below_what_changes_the_wrench(put) -> None:
+    causes = candidates(put, ("plate_gain",))
+    seen = visibility(model(put, causes, known()), causes)
+    limits = {row.target: row.limit for row in detection_limits(seen, put.cases[0].body, 1e-9)}
+    for one in causes:
+        size = np.array([limits[one.effect.target]])
+        added = np.concatenate([one.effect.added(case, size) for case in put.cases])
+        root = np.sqrt(np.mean(added**2, axis=0))
+        assert max(root[:3].max() / 1.0, root[3:].max() / 0.3) > 0.99, one.names
+
+
 def test_thirty_targets_are_charged_as_thirty_chances(put) -> None:
     (one,) = candidates(put, ("time_delay",))
     found = model(put, (one,), known())

@@ -55,15 +55,13 @@ def _beside(
                 flying[_submitted(pool, work, task)] = task, pool
             for future in wait(flying, return_when=FIRST_COMPLETED).done:
                 task, pool = flying.pop(future)
-                try:
-                    outcome = future.result()
-                except BrokenProcessPool:
+                if isinstance(future.exception(), BrokenProcessPool):
                     pool.shutdown()
                     free.append(_process())
                     lost.append(task)
                 else:
                     free.append(pool)
-                    yield task, outcome
+                    yield task, future.result()
     finally:
         for pool in (*free, *(pool for _, pool in flying.values())):
             pool.shutdown(wait=False, cancel_futures=True)

@@ -13,7 +13,6 @@ import numpy as np
 
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
-from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import named_of
 from biodance.diagnosis.problem import Problem
@@ -65,14 +64,8 @@ def hanging(found: Model) -> dict[tuple[str, str], Departure]:
 
 
 def felt(found: Model, named: NamedCause) -> bool:
-    """Return whether what a cause adds to the wrench matters in any channel (root mean square over all trials):
-    `LEAST_FORCE`, `LEAST_MOMENT`.
-    """
-    put = found.problem
-    rows = removed(put, named.effect, named.theta)[: put.wrench_rows].reshape(-1, 6)
-    frames = max(1, sum(pick.size for picks in put.spectrum.picks for pick in picks))
-    size = np.sqrt(np.sum(rows**2, axis=0) / frames)
-    return bool(np.any(size >= np.repeat([LEAST_FORCE, LEAST_MOMENT], 3)))
+    """Return whether a cause changes the wrench by what matters in any channel, or the markers show it."""
+    return bool(found.problem.felt(removed(found.problem, named.effect, named.theta)[:, None])[0] >= 1.0)
 
 
 def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:

@@ -53,6 +53,16 @@ class Visibility:
             return size
         return _really_seen(self.found, one, size, threshold)
 
+    def felt(self, index: int) -> float:
+        """Return the size, in units of the first parameter, from which cause ``index`` changes the wrench by what
+        matters; 0 for one that the markers show. Several forces or masses as in `seen`.
+        """
+        if self.found is None:
+            return 0.0
+        rows = self.causes[index].basis @ np.stack(unit_directions(self.causes[index]), axis=1)
+        with np.errstate(divide="ignore"):
+            return float((1.0 / self.found.problem.felt(rows)).max())
+
     def separation(self, index: int) -> tuple[Array, Array]:
         """Return ``fixed``, ``growth`` (C,): log Bayes factor of cause ``index`` less that of every other one at size a
         (first parameter, its own unit) is expected to be fixed + growth a².
@@ -166,7 +176,7 @@ def placing_leaves(error: JointError) -> float:
 
 def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Unobservable, ...]:
     """Return from which size on every cause is seen and told from the others, by who looks at ``body`` with its
-    joints where they are; never less than what matters (`consequence.least`).
+    joints where they are; never less than what matters (`consequence.least`, `Visibility.felt`).
     """
     targets: dict[str, int] = {}
     for one in seen.causes:
@@ -177,7 +187,7 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
         here = after if one.effect.placed else seen
         limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
         first = one.effect.parameters[one.silent.index(False)]
-        limit = max(limit, least(one.effect).get(first.name, 0.0))
+        limit = max(limit, least(one.effect).get(first.name, 0.0), here.felt(i))
         sizes = [one.effect.size_told(size) for size in (limit, max(limit, here.told(i)), first.typical)]
         rows.append(Unobservable(*one.names, sizes[0], unit_at(one.effect, first.unit), *sizes[1:]))
     return tuple(rows)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
 from biodance.body.human.skeleton import kind_of
+from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT
 from biodance.diagnosis.spectrum import SHORTEST_RUN, Spectrum, spectrum, thinned
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
@@ -81,6 +82,17 @@ class Problem:
         markers = np.concatenate([self.marker_rows(one) for one in some], axis=1)
         found = np.concatenate([wrench.reshape(self.wrench_rows, -1), markers])
         return np.split(found, np.cumsum([len(one.parameters) for one in some])[:-1], axis=1)
+
+    def felt(self, rows: Array) -> Array:
+        """Return (k,): of what matters, how many times columns ``rows`` (r, k) change the wrench of all trials (the
+        largest of the channels' root mean squares in `LEAST_FORCE` or `LEAST_MOMENT`); infinite for one that the
+        markers show by themselves.
+        """
+        frames = max(1, sum(pick.size for picks in self.spectrum.picks for pick in picks))
+        wrench, markers = np.split(rows, [self.wrench_rows])
+        size = np.sqrt(np.sum(wrench.reshape(-1, 6, rows.shape[1]) ** 2, axis=0) / frames)
+        share = (size / np.repeat([LEAST_FORCE, LEAST_MOMENT], 3)[:, None]).max(axis=0)
+        return np.where(np.any(markers != 0, axis=0), np.inf, share)
 
     def unit(self, effect: Effect) -> Array:
         """Return the columns (r, p) of one effect, computed once."""

@@ -84,9 +84,7 @@ _DRAWS = 1000
 """Of the bootstrap."""
 
 
-def residual_ratio(
-    trials: tuple[TrialValidation, ...],
-) -> ResidualRatio:
+def residual_ratio(trials: tuple[TrialValidation, ...]) -> ResidualRatio:
     """Return the ratio of RMS residuals table / identified over all ``trials`` with a block-bootstrap interval.
 
     Raises
