@@ -19,7 +19,7 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import STRANGE, UNASKED
 from biodance.pipeline.attention import headline, session_attention, told
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.looked_at import TOO_SHORT
+from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Judged

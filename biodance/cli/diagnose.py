@@ -94,10 +94,11 @@ def diagnose_command(
     from rich.console import Console
 
     from biodance.pipeline import front
+    from biodance.pipeline.accepted import write_mended
     from biodance.pipeline.attention import is_well
-    from biodance.pipeline.carry import read_lab, write_mended
-    from biodance.pipeline.front_movement import describe_movement
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import with_weighed_load
+    from biodance.pipeline.movement import describe_movement
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.pipeline.kept import BODY
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.robot_trials import MatchedTrial
+from biodance.pipeline.saved_results import BODY
 from biodance.report.documents.diagnosis import attention_document, judged_document
 from biodance.report.documents.identification import agreement, identification_document
 from biodance.report.documents.session import plain_values, to_text

@@ -6,17 +6,18 @@ from typing import Any
 from biodance.body.body_file import body_text
 from biodance.errors import BiodanceError
 from biodance.lab.corrections import PlateCorrection
+from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected
 from biodance.pipeline.attention import session_attention
-from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.kept import BODY, SCALED, keep_motions
-from biodance.pipeline.looked_at import identified_trials
+from biodance.pipeline.judged_trials import identified_trials
+from biodance.pipeline.lab_file import LAB, lab_text
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import BODY, SCALED, keep_motions
 from biodance.pipeline.session_frames import frames_of
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document

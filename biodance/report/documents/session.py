@@ -10,11 +10,12 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS, Cycle
 from biodance.cycles.movement import TrialMovement
+from biodance.motion.quiet_standing import QuietStanding
 from biodance.motion.regressor import Agreement
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import QuietStanding, ShownJoints, TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import ShownJoints, TrialResult, WrenchComparison
 from biodance.records import CHANNELS, Plate
 from biodance.report.documents.identification import added_mass_document, agreement, identification_document
 
