@@ -24,7 +24,8 @@ from biodance.pipeline.provenance import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Judged
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document
-from biodance.report.documents.session import results_document, to_text
+from biodance.report.documents.plain import to_text
+from biodance.report.documents.session import results_document
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
 from biodance.report.terminal import print_diagnosis, print_session

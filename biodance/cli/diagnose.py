@@ -44,7 +44,8 @@ def foresee_command(
 
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
-    from biodance.report.pages.foresight import foresight_page, refuse_page
+    from biodance.report.files import refuse_page
+    from biodance.report.pages.foresight import foresight_page
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:

@@ -226,9 +226,8 @@ def standing_notes(result: SessionResult) -> tuple[str, ...]:
     ahead, left = 1000 * found.com_ahead, 1000 * found.com_left
     sides = "in front of" if ahead > 0 else "behind", "left" if left > 0 else "right"
     return (
-        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre "
-        f"of pressure and "
-        f"{abs(left):.0f} mm to its {sides[1]}.",
+        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre of "
+        f"pressure and {abs(left):.0f} mm to its {sides[1]}.",
     )
 
 

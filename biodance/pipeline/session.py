@@ -149,8 +149,7 @@ def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding:
         shortest = min((one.trial.settings.standing.shortest for one in results), default=StandingRules.shortest)
         raise TrialRefused(
             f"Nobody stands still for {shortest:g} s with both feet on the plates in any trial, so the declared mass "
-            f"cannot be checked. "
-            "Record a few seconds of quiet standing on the plates."
+            "cannot be checked. Record a few seconds of quiet standing on the plates."
         )
     order = {"static": 0, "check": 1}
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]

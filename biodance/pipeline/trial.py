@@ -157,9 +157,8 @@ def track_trial(trial: Trial, body: Body | None) -> Motion:
     if not trial.marker_set:
         raise TrialRefused(
             f"Trial {trial.name}: its {len(trial.markers.names)} labels are of no known marker set, so no body can "
-            f"follow them. "
-            "Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that form "
-            "and give it with --markers FILE, or say [markers] file or map in session.toml."
+            "follow them. Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that "
+            "form and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
     if body is None:
         raise TrialRefused(f"Trial {trial.name}: there is no body to follow the markers (see the session).")
