@@ -21,7 +21,7 @@ from bench_dance import BODIES
 
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import expect
-from biodance.pipeline.danced import simulate_dance
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.virtual_lab.movement.dancing import PERFORMERS
 
 HEADING = (

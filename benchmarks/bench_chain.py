@@ -29,8 +29,8 @@ from biodance.identification.posterior import Posterior
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import dancer
-from biodance.pipeline.danced import simulate_dance
 from biodance.pipeline.session import examine, identification_of
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.records import Array, Subject
 from biodance.virtual_lab.movement.dancing import PERFORMERS
 from biodance.virtual_lab.movement.protocol import Protocol, read_protocol

@@ -35,8 +35,8 @@ from biodance.dance.problem.stance import under
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance import dancer
-from biodance.pipeline.danced import simulate_dance
 from biodance.pipeline.session import examine, identification_of
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.records import Array, Motion, Subject
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.simulate import simulate_session

@@ -23,7 +23,7 @@ from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.engine import Examined, diagnose_trials
 from biodance.diagnosis.problem import Look
 from biodance.effects import Case, Effect
-from biodance.pipeline.looked_at import cases_of, looked_at
+from biodance.pipeline.judged_trials import cases_of, chosen_looks
 from biodance.records import Array
 
 TIMES = (1.0, 3.0, 10.0)
@@ -104,7 +104,7 @@ def asked(number: int, trials: int) -> tuple[Body, tuple[Look, ...]]:
     """Return body and trials of a session without fault."""
     result = examined(nulls()[number])
     assert result.body is not None
-    return result.body, looked_at(result.trials)[:trials]
+    return result.body, chosen_looks(result.trials)[:trials]
 
 
 def table(found: list[Told]) -> list[str]:

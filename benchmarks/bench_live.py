@@ -17,7 +17,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
-from biodance.pipeline.replay import body_and_stream, replay
+from biodance.pipeline.stream import body_and_stream, replay
 from biodance.records import Array, Markers, Trial, Wrench
 
 HEADING = (

@@ -104,7 +104,7 @@ def labels(data: Path) -> None:
     from biodance.effects import Recorded
     from biodance.effects.labels_swapped import exchanges
     from biodance.lab.session.read import read_session
-    from biodance.pipeline.carry import with_right_labels
+    from biodance.pipeline.accepted import with_right_labels
     from biodance.pipeline.session import examine
 
     folders = [*sorted((data / "biomechzoo").glob("HC*")), data / "pycgm", data / "adl_gait"]

@@ -17,7 +17,7 @@ from biodance.motion.contact.contact import foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.pipeline.export import body_of_result
-from biodance.pipeline.movement import contact_of
+from biodance.pipeline.trial import contact_of
 from biodance.records import SIDES
 
 MOMENTS = {

@@ -33,8 +33,8 @@ from biodance.dance.design import design
 from biodance.dance.problem.plan import read_plan
 from biodance.lab.session.read import read_session
 from biodance.pipeline.dance import dancer
-from biodance.pipeline.danced import simulate_dance
 from biodance.pipeline.session import examine, identification_of
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.virtual_lab.movement.dancing import PERFORMERS
 from biodance.virtual_lab.simulate import simulate_session
 

@@ -24,7 +24,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.followable.price import freer_dance
 from biodance.dance.problem.plan import read_plan
 from biodance.pipeline.dance import dancer
-from biodance.pipeline.danced import simulate_dance
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.records import Subject
 from biodance.virtual_lab.movement.dancing import PERFORMERS
 

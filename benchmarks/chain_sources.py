@@ -19,7 +19,7 @@ from bench_chain import FIRST_SEED, errors, identified, rms
 from virtual_visits import subjects
 
 from biodance.dance.dance import Dance
-from biodance.pipeline.danced import simulate_dance
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.records import Subject
 from biodance.virtual_lab.movement.dancing import PERFORMERS, Performer
 from biodance.virtual_lab.recording.laboratory import LabVisit

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
 from biodance.motion.kinematics import poses
-from biodance.pipeline.danced import stretches
+from biodance.pipeline.simulate_dance import stretches
 from biodance.records import SIDES, Array
 from biodance.virtual_lab.movement.dancing import SMOOTH, WANDER, Shown
 

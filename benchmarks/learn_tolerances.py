@@ -22,7 +22,7 @@ from biodance.diagnosis.learning import Null, learn_tolerances, null_of
 from biodance.diagnosis.problem import problem
 from biodance.library import folder
 from biodance.pipeline.identification import FITTED_ROLES
-from biodance.pipeline.looked_at import looks
+from biodance.pipeline.judged_trials import looks
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
 
 TABLES = folder("anthropometry") / "uncertainty"

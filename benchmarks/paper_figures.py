@@ -17,9 +17,9 @@ from biodance.dance.dance import Dance
 from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks, static_grams, total, uprights
 from biodance.identification.knowledge import SIGMAS
 from biodance.lab.session.read import read_session
-from biodance.pipeline.danced import simulate_dance
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.session import examine, identification_of
+from biodance.pipeline.simulate_dance import simulate_dance
 from biodance.records import CHANNELS, Array, Subject
 from biodance.virtual_lab.faults.causes import parse_cause
 from biodance.virtual_lab.movement.dancing import PERFORMERS

@@ -50,16 +50,16 @@ if TYPE_CHECKING:
     from biodance.pipeline.front_dance import design_dance as design_dance
     from biodance.pipeline.front_dance import simulate as simulate
     from biodance.pipeline.front_dance import verify_dance as verify_dance
-    from biodance.pipeline.front_movement import describe_movement as describe_movement
     from biodance.pipeline.identification import SessionIdentification as SessionIdentification
     from biodance.pipeline.learn import learn_laboratory as learn_laboratory
     from biodance.pipeline.movement import SessionMovement as SessionMovement
+    from biodance.pipeline.movement import describe_movement as describe_movement
     from biodance.pipeline.plates import judge_plates as judge_plates
     from biodance.pipeline.registration import register as register
-    from biodance.pipeline.replay import stream_recording as stream_recording
     from biodance.pipeline.results import SessionResult as SessionResult
     from biodance.pipeline.robot import identify_robot as identify_robot
     from biodance.pipeline.session import examine as examine
+    from biodance.pipeline.stream import stream_recording as stream_recording
     from biodance.records import FootSizes as FootSizes
     from biodance.records import Markers as Markers
     from biodance.records import Motion as Motion
@@ -90,13 +90,12 @@ HOMES = {
     "pipeline.export": ("export",),
     "pipeline.front": ("SessionComparison", "compare_sessions", "diagnose", "identify"),
     "pipeline.front_dance": ("design_dance", "simulate", "verify_dance"),
-    "pipeline.front_movement": ("describe_movement",),
     "pipeline.identification": ("SessionIdentification",),
     "pipeline.learn": ("learn_laboratory",),
-    "pipeline.movement": ("SessionMovement",),
+    "pipeline.movement": ("SessionMovement", "describe_movement"),
     "pipeline.plates": ("judge_plates",),
     "pipeline.registration": ("register",),
-    "pipeline.replay": ("stream_recording",),
+    "pipeline.stream": ("stream_recording",),
     "pipeline.results": ("SessionResult",),
     "pipeline.robot": ("identify_robot",),
     "pipeline.session": ("examine",),

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from biodance.lab.markers.gaps import MarkerGaps
+from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.results import SessionResult, Still
-from biodance.pipeline.trial_result import Check, MarkerFit, QuietStanding, Step, TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import Check, MarkerFit, Step, TrialResult, WrenchComparison
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 
 SQUARE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])

@@ -167,7 +167,7 @@ def test_ctrl_c_while_identifying_keeps_all_trials(session, tmp_path, capsys, mo
 
 
 def test_a_full_disk_is_told_with_the_path(tmp_path, monkeypatch):
-    from biodance.report.write import write_files
+    from biodance.report.files import write_files
 
     def full(*_, **__):
         raise OSError(28, "No space left on device")

@@ -26,7 +26,7 @@ from biodance.lab.c3d.subject import FileEvent, FileOutputs
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
-from biodance.pipeline.movement import movement_of
+from biodance.pipeline.trial import movement_of
 from biodance.records import Motion, Subject, Wrench
 
 BODY = human(Subject(62.0, 1.70, "F", 30.0, "S01"))

@@ -14,7 +14,7 @@ from biodance.diagnosis.model import NamedCause
 from biodance.effects import effect
 from biodance.identification.identification import identify_body
 from biodance.pipeline import gains
-from biodance.pipeline.looked_at import cases_of
+from biodance.pipeline.judged_trials import cases_of
 
 
 def faulty(local, session):

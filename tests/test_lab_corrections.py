@@ -17,7 +17,8 @@ from biodance.lab.corrections import (
     read_corrections,
 )
 from biodance.lab.read import read_trial
-from biodance.pipeline.carry import read_lab, write_corrected
+from biodance.pipeline.accepted import write_corrected
+from biodance.pipeline.lab_file import read_lab
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 
 TIME = np.arange(0.0, 2.0, 0.001)

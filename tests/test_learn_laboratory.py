@@ -13,7 +13,7 @@ from biodance.diagnosis.archive.norms import Seen, norms, usual_noise
 from biodance.diagnosis.learning import Null, learn_tolerances, shown_by
 from biodance.errors import SessionRefused
 from biodance.lab.session.read import read_session
-from biodance.pipeline.carry import read_lab
+from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.learn import LearnedLaboratory, LearnedSession, learned_session, learned_together
 from biodance.pipeline.session import examine
 from biodance.report.laboratory import lab_file_text, write_lab_file

@@ -17,7 +17,7 @@ from biodance.identification.identification import identify_body
 from biodance.identification.streaming import belief_before
 from biodance.pipeline.live import LiveSession, LiveState
 from biodance.pipeline.live_watch import StreamWatch
-from biodance.pipeline.replay import body_and_stream, replay
+from biodance.pipeline.stream import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench
 from biodance.report.live import LivePage
 from biodance.virtual_lab.simulate import simulate_session

@@ -19,12 +19,13 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import STRANGE, UNASKED
 from biodance.pipeline.attention import headline, session_attention, told
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.looked_at import TOO_SHORT
+from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Judged
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document
-from biodance.report.documents.session import results_document, to_text
+from biodance.report.documents.plain import to_text
+from biodance.report.documents.session import results_document
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
 from biodance.report.terminal import print_diagnosis, print_session

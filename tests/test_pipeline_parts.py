@@ -12,11 +12,11 @@ from biodance.body.human.human import human
 from biodance.errors import TrialRefused
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.kinematics import centre_of_mass, poses
+from biodance.motion.quiet_standing import QuietStanding, facing, quiet_run, quiet_standing
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
-from biodance.pipeline.standing import facing, quiet_run, quiet_standing
 from biodance.pipeline.still import bone_lines
 from biodance.pipeline.trial import attempt, marker_fit
-from biodance.pipeline.trial_result import MarkerFit, QuietStanding, Step, TrialResult
+from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench
 from biodance.settings import CheckLimits
 

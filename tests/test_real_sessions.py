@@ -12,7 +12,7 @@ from biodance.diagnosis.diagnosis import ABOUT
 from biodance.lab.session.read import read_session
 from biodance.pipeline.attention import is_well
 from biodance.pipeline.diagnosis import diagnose_session
-from biodance.pipeline.front_movement import describe_movement
+from biodance.pipeline.movement import describe_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 

@@ -23,7 +23,7 @@ from biodance.dance.problem.stance import seat, under
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
-from biodance.pipeline.danced import simulate_dance, stretches
+from biodance.pipeline.simulate_dance import simulate_dance, stretches
 from biodance.records import SIDES, Subject
 from biodance.virtual_lab.movement.dancing import _JOINTS, PERFORMERS, Performer, copy_dance
 from biodance.virtual_lab.movement.performance import true_wrench

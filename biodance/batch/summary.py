@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from importlib.resources import files
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -148,19 +147,18 @@ def _page(
     alike: Sequence[str] = (),
 ) -> str:
     """Return the page of an archive as HTML text."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     from biodance.pipeline.provenance import now
     from biodance.report.figures.style import svg_address
+    from biodance.report.pages.template import render, template_text
     from biodance.version import __version__
 
-    folder = files("biodance.report") / "templates"
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     drawn = _figure(table)
     first = table.drop_duplicates("session").set_index("session")
-    return environment.from_string((folder / "archive.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+    return render(
+        "archive.html.j2",
+        style=Markup(template_text("page.css")),
         name=name,
         version=__version__,
         created=now(),

@@ -38,7 +38,7 @@ def say(sentence: str) -> None:
 
 def print_json(document: object) -> None:
     """Write one JSON document to stdout."""
-    from biodance.report.documents.session import to_text
+    from biodance.report.documents.plain import to_text
 
     sys.stdout.write(to_text(document))
 

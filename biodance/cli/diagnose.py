@@ -44,7 +44,8 @@ def foresee_command(
 
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
-    from biodance.report.pages.foresight import foresight_page, refuse_page
+    from biodance.report.files import refuse_page
+    from biodance.report.pages.foresight import foresight_page
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:
@@ -94,10 +95,11 @@ def diagnose_command(
     from rich.console import Console
 
     from biodance.pipeline import front
+    from biodance.pipeline.accepted import write_mended
     from biodance.pipeline.attention import is_well
-    from biodance.pipeline.carry import read_lab, write_mended
-    from biodance.pipeline.front_movement import describe_movement
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import with_weighed_load
+    from biodance.pipeline.movement import describe_movement
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
 

@@ -90,7 +90,7 @@ def identify_command(
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
     from biodance.pipeline import front
-    from biodance.pipeline.front_movement import describe_movement
+    from biodance.pipeline.movement import describe_movement
     from biodance.report.write import write_identification
 
     with progress() as tell:

@@ -42,7 +42,7 @@ def live_command(
     """
     from rich.console import Console
 
-    from biodance.pipeline.replay import body_and_stream, replay
+    from biodance.pipeline.stream import body_and_stream, replay
     from biodance.report.live import LivePage, live_document, print_live, state_line, warning_line
     from biodance.settings import assignments
 

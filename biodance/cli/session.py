@@ -41,10 +41,10 @@ def report_session(
     """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
     person who was measured; return the result and the content of results.json.
     """
-    from biodance.pipeline.carry import read_lab
     from biodance.pipeline.diagnosis import diagnosed
-    from biodance.pipeline.front_movement import describe_movement
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import with_weighed_load
+    from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
 
@@ -105,8 +105,9 @@ def examine_with_reference(
     What cannot be read or written is said before the long work starts.
     """
     from biodance.lab.session.results_folder import results_folder
-    from biodance.pipeline.carry import known_body, read_lab
     from biodance.pipeline.front import identify
+    from biodance.pipeline.lab_file import read_lab
+    from biodance.pipeline.saved_results import known_body
     from biodance.pipeline.session import examine
 
     lab, known = read_lab(reading.lab), known_body(reading.body)

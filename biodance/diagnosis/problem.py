@@ -22,7 +22,7 @@ from biodance.effects import Case, Effect, effects
 from biodance.identification.posterior import prior_factor
 from biodance.identification.statistics import Fit, usable
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Motion, Sip, Trial
+from biodance.records import Array, Motion, Sip, Trial, runs
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.sources import Errors, forward, of_clusters
 from biodance.uncertainty.tolerances import in_state
@@ -42,6 +42,29 @@ class Look:
     use: NDArray[np.bool_]
     start: float
     end: float
+
+    @property
+    def fit(self) -> Fit:
+        """The trial as identification takes it."""
+        return Fit(self.trial.name, self.motion, self.trial.wrench, self.use)
+
+    @property
+    def runs(self) -> tuple[float, ...]:
+        """Seconds of every run of frames that can be compared and is long enough."""
+        rate = self.motion.rate
+        if not np.isfinite(rate):
+            return ()
+        return tuple((stop - start) / rate for start, stop in runs(self.use) if stop - start >= SHORTEST_RUN * rate)
+
+    @property
+    def seconds(self) -> float:
+        """For how many seconds it can be compared, in runs that are long enough."""
+        return sum(self.runs)
+
+    def case(self, body: Body, phi: Array) -> Case:
+        """Return the trial as effects see it, at the rate of the markers, with the parameters ``phi`` (10N,)."""
+        time = np.linspace(self.start, self.end, self.motion.time.size)
+        return Case(body, self.trial, self.motion, phi, time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,14 +181,10 @@ def problem(
         No trial has ``shortest`` s of believable, fully measured frames.
     """
     before = prior or widened(body.sip)
-    fits = tuple(Fit(look.trial.name, look.motion, look.trial.wrench, look.use) for look in looks)
-    used, about, notes = usable(body, fits)
+    used, about, notes = usable(body, tuple(look.fit for look in looks))
     kept = {fit.name: fit.use for fit in used}
-    pairs = []
-    for look in looks:
-        if look.trial.name in kept:
-            time = np.linspace(look.start, look.end, look.motion.time.size)
-            pairs.append(thinned(Case(body, look.trial, look.motion, before.phi, time), kept[look.trial.name]))
+    named = ((look, kept[look.trial.name]) for look in looks if look.trial.name in kept)
+    pairs = [thinned(look.case(body, before.phi), use) for look, use in named]
     cases = tuple(case for case, _ in pairs)
     where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)

@@ -101,8 +101,7 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
     if values.shape[0] < need:
         raise BiodanceError(
             f"{values.shape[0]} samples at {rate:g} Hz are too short for a low-pass at {settings.cutoff:g} Hz: at "
-            f"least {need} are needed. "
-            "Record longer or leave the signal as it is."
+            f"least {need} are needed. Record longer or leave the signal as it is."
         )
     columns = values.reshape(values.shape[0], -1)
     out = columns.copy()

@@ -73,8 +73,7 @@ def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
     if not inside.any():
         raise TrialRefused(
             f"Trial {trial.name}: the markers ({markers.time[0]:g} to {markers.time[-1]:g} s) and the plates "
-            f"({first:g} to {last:g} s) "
-            "share no time. Synchronise the files."
+            f"({first:g} to {last:g} s) share no time. Synchronise the files."
         )
     kept = Markers(markers.names, markers.time[inside], markers.xyz[inside])
     return kept, [

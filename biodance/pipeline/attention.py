@@ -12,7 +12,7 @@ from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or_else
-from biodance.pipeline.looked_at import TOO_SHORT
+from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import WARNING, Attention, Judged, Level, strongest_first, without_path

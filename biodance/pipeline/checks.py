@@ -8,7 +8,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from biodance.identification.validation import TrialValidation
-from biodance.pipeline.trial_result import Check, QuietStanding, TrialResult
+from biodance.motion.quiet_standing import QuietStanding
+from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import Subject
 from biodance.settings import CheckLimits
 

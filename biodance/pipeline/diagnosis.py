@@ -13,6 +13,7 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.heard import hear
 from biodance.diagnosis.joined import with_witnesses
+from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
 from biodance.diagnosis.testimony import weigh
@@ -24,8 +25,8 @@ from biodance.identification.rival_bodies import expect_unloaded
 from biodance.pipeline.attention import told
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
+from biodance.pipeline.judged_trials import all_looks, cases_of, chosen_looks, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
-from biodance.pipeline.looked_at import all_looks, cases_of, judged_trials, left_out, looked_at, own_tolerances
 from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
 from biodance.threads import one_thread
@@ -139,7 +140,7 @@ def diagnose_session(
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
-    used = looked_at(result.trials) if found.examined else ()
+    used = chosen_looks(result.trials) if found.examined else ()
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
     return replace(found, diagnosis=told(whole, result, judged_trials(result, used)))
@@ -170,7 +171,7 @@ def _diagnosed(
     tell: Callable[[str], None],
 ) -> SessionDiagnosis:
     """Return what was found; `told` says it."""
-    fitted = looked_at(result.trials)
+    fitted = chosen_looks(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
     checks = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=asked)
@@ -225,9 +226,8 @@ def standing_notes(result: SessionResult) -> tuple[str, ...]:
     ahead, left = 1000 * found.com_ahead, 1000 * found.com_left
     sides = "in front of" if ahead > 0 else "behind", "left" if left > 0 else "right"
     return (
-        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre "
-        f"of pressure and "
-        f"{abs(left):.0f} mm to its {sides[1]}.",
+        f"Standing still ({found.trial}), the table's centre of mass lies {abs(ahead):.0f} mm {sides[0]} the centre of "
+        f"pressure and {abs(left):.0f} mm to its {sides[1]}.",
     )
 
 

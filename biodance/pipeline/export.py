@@ -14,9 +14,9 @@ from biodance.errors import BiodanceError, SessionRefused, TrialRefused, Unknown
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
-from biodance.pipeline.kept import kept_body, kept_trials, read_kept
 from biodance.pipeline.program_folders import opensim_coordinates, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import kept_body, kept_trials, read_kept
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_files import results_into_c3d, write_rerun

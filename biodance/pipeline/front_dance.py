@@ -230,7 +230,7 @@ def _danced(
 ) -> Path:
     """Write the visit of a person who performs a dance."""
     from biodance.dance.dance import Dance
-    from biodance.pipeline.danced import simulate_dance
+    from biodance.pipeline.simulate_dance import simulate_dance
     from biodance.virtual_lab.movement.dancing import PERFORMERS
 
     if performer not in PERFORMERS:

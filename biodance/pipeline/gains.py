@@ -12,7 +12,7 @@ from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import standing_point
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
-from biodance.pipeline.looked_at import cases_of, looks
+from biodance.pipeline.judged_trials import cases_of, looks
 from biodance.pipeline.results import SessionResult
 
 

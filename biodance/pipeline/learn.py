@@ -17,12 +17,13 @@ from biodance.diagnosis.archive.norms import (
 )
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_by
+from biodance.diagnosis.own_tolerances import soft_tissue
 from biodance.diagnosis.problem import problem
 from biodance.effects import gates
 from biodance.errors import SessionRefused
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
-from biodance.pipeline.looked_at import cases_of, looked_at, soft_tissue
+from biodance.pipeline.judged_trials import cases_of, chosen_looks
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.provenance import now
@@ -151,7 +152,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     TrialRefused
         It has no second of believable, fully measured frames.
     """
-    looks, session = looked_at(result.trials), result.session
+    looks, session = chosen_looks(result.trials), result.session
     if result.body is None or not looks:
         raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
     if failed := [gate for gate in gates(session, cases_of(result.body, looks)) if not gate.ok]:

@@ -1,21 +1,21 @@
 """What moved in a visit: every trial's events, cycles and curves, with the parameters that the visit identified."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance import display
-from biodance.body.body import Body
 from biodance.cycles.curves import NormalCurve
 from biodance.cycles.cut import STRIDE_UNITS
-from biodance.cycles.movement import TrialMovement, trial_movement
-from biodance.errors import BiodanceError, TrialRefused
-from biodance.lab.c3d.subject import FileOutputs, read_outputs
-from biodance.motion.contact.contact import Contact, ground_contact
-from biodance.motion.contact.soles import soles_from_body
+from biodance.cycles.movement import TrialMovement
+from biodance.errors import BiodanceError
+from biodance.lab.session.read import read_session
+from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import TrialResult
-from biodance.records import Sip, Trial, by_name
+from biodance.pipeline.session import examine
+from biodance.pipeline.trial import movement_of
+from biodance.records import Session, by_name
 from biodance.threads import one_thread
 
 if TYPE_CHECKING:
@@ -115,6 +115,55 @@ class SessionMovement:
         return pd.DataFrame(rows, columns=["trial", "quantity", "unit", "side", "mean", "sd", "count"])
 
 
+def describe_movement(
+    session: Session | SessionResult | str | Path,
+    *,
+    lab: str | Path | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionMovement:
+    """Return what moved in every trial of a visit: events, cycles, angles, moments, powers, spatio-temporal values.
+
+    Parameters
+    ----------
+    session : Session, SessionResult, str or pathlib.Path
+        The visit: as `read_session` or `examine` return it, or its folder.
+    lab : str or pathlib.Path, optional
+        The laboratory's lab.toml, for the normal bands that it learned.
+    tell : callable, optional
+        Called with what is being done, in words.
+
+    Returns
+    -------
+    SessionMovement
+        ``moved["walk_1"].curve("knee_flexion", "left")`` holds all repetitions over 0 to 100 % with mean and sd, in
+        degrees; moments in N·m/kg and powers in W/kg with what the inertial parameters leave uncertain in them.
+
+    Raises
+    ------
+    SessionRefused
+        The folder holds no session.
+
+    See Also
+    --------
+    examine : All stages of a visit.
+
+    References
+    ----------
+    Joint axes: Wu et al. 2002, doi:10.1016/S0021-9290(01)00222-6. Events: Zeni et al. 2008,
+    doi:10.1016/j.gaitpost.2007.07.007. Pelvis: Baker 2001, doi:10.1016/S0966-6362(00)00083-7.
+
+    Examples
+    --------
+    >>> moved = biodance.describe_movement(result)
+    >>> bool(moved["squat_1"].curve("knee_flexion", "left").mean.max() > 60)
+    True
+    """
+    if not isinstance(session, SessionResult):
+        read = session if isinstance(session, Session) else read_session(session, tell=tell)
+        session = examine(read, tell=tell)
+    return replace(session_movement(session, tell=tell), normal=read_lab(lab).normal)
+
+
 @one_thread()
 def session_movement(session: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionMovement:
     """Return what moved in an examined session; see `describe_movement`."""
@@ -131,37 +180,3 @@ def session_movement(session: SessionResult, *, tell: Callable[[str], None] = la
     mass = sip if sip is not None else session.body.sip if session.body else None
     kg = float(mass.mass.sum()) if mass is not None else float("nan")
     return SessionMovement(session.session.folder.name, tuple(trials), "identified" if sip else "table", kg, left_out)
-
-
-def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMovement:
-    """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters.
-
-    Raises
-    ------
-    TrialRefused
-        The trial gives no motion, or one too short.
-    """
-    if body is None or one.motion is None:
-        raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())
-    contact = contact_of(one.trial, one, body)
-    return trial_movement(one.trial, body, one.motion, sip=sip, contact=contact, outputs=_outputs(one.trial))
-
-
-def contact_of(trial: Trial, one: TrialResult, body: Body) -> Contact | None:
-    """Return the ground contact of an examined trial; None without plates, or where it is refused."""
-    if one.contact is not None or not trial.plates or one.motion is None:
-        return one.contact
-    try:
-        return ground_contact(trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
-    except BiodanceError:
-        return None
-
-
-def _outputs(trial: Trial) -> FileOutputs | None:
-    """Return what another program wrote into the trial's file; None where it is no C3D file or cannot be read again."""
-    if trial.source.format != "C3D":
-        return None
-    try:
-        return read_outputs(trial.source.path)
-    except BiodanceError:
-        return None

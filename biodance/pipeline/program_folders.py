@@ -31,7 +31,7 @@ from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
-from biodance.pipeline.movement import contact_of, movement_of
+from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run
 from biodance.version import __version__

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from biodance.body.body import Body
+from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.problem import Look
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.read import read_trial
@@ -15,7 +16,6 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
 from biodance.pipeline.body import body_of
-from biodance.pipeline.looked_at import own_tolerances
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_result import Step
 from biodance.records import Motion, Session, Trial

@@ -13,8 +13,9 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.trial_result import Check, QuietStanding, ShownJoints, Step, TrialResult
+from biodance.pipeline.trial_result import Check, ShownJoints, Step, TrialResult
 from biodance.records import Array, Session, Sip, Subject, by_name
 from biodance.records.attention import WARNING
 from biodance.settings import Settings

@@ -7,13 +7,14 @@ from functools import partial
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused, TrialRefused
+from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, shown_joints, starting_from, with_forces
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult, Still
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
-from biodance.pipeline.trial_result import QuietStanding, ShownJoints, Step, TrialResult
+from biodance.pipeline.trial_result import ShownJoints, Step, TrialResult
 from biodance.records import Session
 from biodance.settings import StandingRules
 from biodance.threads import one_thread
@@ -148,8 +149,7 @@ def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding:
         shortest = min((one.trial.settings.standing.shortest for one in results), default=StandingRules.shortest)
         raise TrialRefused(
             f"Nobody stands still for {shortest:g} s with both feet on the plates in any trial, so the declared mass "
-            f"cannot be checked. "
-            "Record a few seconds of quiet standing on the plates."
+            "cannot be checked. Record a few seconds of quiet standing on the plates."
         )
     order = {"static": 0, "check": 1}
     return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]

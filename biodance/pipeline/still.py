@@ -13,9 +13,9 @@ from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.load_words import size_and_segments
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
+from biodance.motion.quiet_standing import facing
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.results import Still
-from biodance.pipeline.standing import facing
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Motion, side_in_name
 

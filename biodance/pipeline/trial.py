@@ -9,17 +9,19 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.optional_joints import marker_groups
+from biodance.cycles.movement import TrialMovement, trial_movement
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.lab.c3d.subject import FileOutputs, read_outputs
 from biodance.lab.markers.gaps import MarkerGaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
 from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
+from biodance.motion.quiet_standing import quiet_standing
 from biodance.motion.regressor import compare, predict_wrench
 from biodance.motion.track import track
-from biodance.pipeline.standing import quiet_standing
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison
-from biodance.records import Motion, Trial
+from biodance.records import Motion, Sip, Trial
 
 T = TypeVar("T")
 
@@ -155,9 +157,8 @@ def track_trial(trial: Trial, body: Body | None) -> Motion:
     if not trial.marker_set:
         raise TrialRefused(
             f"Trial {trial.name}: its {len(trial.markers.names)} labels are of no known marker set, so no body can "
-            f"follow them. "
-            "Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that form "
-            "and give it with --markers FILE, or say [markers] file or map in session.toml."
+            "follow them. Label them as in anthropometry/marker_sets, or describe your own set in a TOML file of that "
+            "form and give it with --markers FILE, or say [markers] file or map in session.toml."
         )
     if body is None:
         raise TrialRefused(f"Trial {trial.name}: there is no body to follow the markers (see the session).")
@@ -195,3 +196,37 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     if contact is not None and body is not None and motion is not None:
         comparison = attempt(steps, "compare", lambda: compare_wrenches(trial, body, motion, contact))
     return TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing, contact=contact)
+
+
+def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMovement:
+    """Return what moved in one examined trial; ``sip`` None: moments with the body's own parameters.
+
+    Raises
+    ------
+    TrialRefused
+        The trial gives no motion, or one too short.
+    """
+    if body is None or one.motion is None:
+        raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())
+    contact = contact_of(one.trial, one, body)
+    return trial_movement(one.trial, body, one.motion, sip=sip, contact=contact, outputs=_outputs(one.trial))
+
+
+def contact_of(trial: Trial, one: TrialResult, body: Body) -> Contact | None:
+    """Return the ground contact of an examined trial; None without plates, or where it is refused."""
+    if one.contact is not None or not trial.plates or one.motion is None:
+        return one.contact
+    try:
+        return ground_contact(trial, soles_from_body(body, one.motion), mass=float(body.sip.mass.sum()))
+    except BiodanceError:
+        return None
+
+
+def _outputs(trial: Trial) -> FileOutputs | None:
+    """Return what another program wrote into the trial's file; None where it is no C3D file or cannot be read again."""
+    if trial.source.format != "C3D":
+        return None
+    try:
+        return read_outputs(trial.source.path)
+    except BiodanceError:
+        return None

@@ -19,7 +19,7 @@ from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.movement import contact_of, movement_of
+from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import SIDES, Array, Wrench
 from biodance.settings import COP_FORCE

@@ -16,6 +16,7 @@ from biodance.identification.statistics import Fit
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.contact.contact import Contact
 from biodance.motion.optional_joints import JointGain
+from biodance.motion.quiet_standing import QuietStanding
 from biodance.records import CHANNEL_TITLES, Array, Motion, Trial, Wrench
 
 if TYPE_CHECKING:
@@ -101,32 +102,6 @@ class WrenchComparison:
         'Fz (N)'
         """
         return display.side_by_side(self.time, self.measured, self.simulated, self.used, CHANNEL_TITLES)
-
-
-@dataclass(frozen=True, eq=False)
-class QuietStanding:
-    """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g),
-    ``mass_sd`` kg.
-
-    ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass
-    (``com`` empty without a tracked motion); ``forward`` (2,) unit vector the subject faces; ``com_ahead``,
-    ``com_left`` m: mean of CoM minus CoP along it and to its left; ``feet`` (F, 2) m foot landmarks and their
-    ``foot_names`` (``left_heel`` ...); ``plates`` (P, 4, 2) m corners.
-    """
-
-    trial: str
-    start: float
-    end: float
-    mass: float
-    mass_sd: float
-    cop: Array
-    com: Array
-    forward: Array
-    com_ahead: float
-    com_left: float
-    feet: Array
-    foot_names: tuple[str, ...]
-    plates: Array
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.still import posture_still
 from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.dance import dance_document
-from biodance.report.documents.session import plain_values, to_text
+from biodance.report.documents.plain import plain_values, to_text
 from biodance.report.figures.dance import criterion_figure, expectation_figure, postures_figure, zmp_figure
 from biodance.report.figures.solid import sheet_png
 from biodance.report.pages.dance import cards_page

@@ -19,6 +19,7 @@ from rich.table import Table
 from biodance.cycles.curves import normal_toml
 from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
+from biodance.report.documents.plain import keyed
 from biodance.report.wording import format_number, millimetres
 from biodance.uncertainty.tolerances import shipped, to_toml
 
@@ -118,14 +119,13 @@ def learned_document(found: LearnedLaboratory) -> dict[str, Any]:
         "left_out": dict(found.left_out),
         "learned_utc": found.created,
         "norms": [
-            {"name": n.name, "value": n.value, "sd": n.sd, "between_sessions_sd": n.between, "unit": n.unit,
-             "sessions": n.sessions, "observations": n.observations} for n in found.norms
+            keyed(norm, "name value sd between_sessions_sd=between unit sessions observations") for norm in found.norms
         ],
         "changed_most": [
             {"key": key, "size": found.tolerances.size(key), "shipped": before.size(key), "values": found.shown[key]}
             for key in most
         ],
-    }  # fmt: skip
+    }
 
 
 def print_plates(document: dict[str, Any], console: Console) -> None:

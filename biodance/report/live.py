@@ -19,6 +19,7 @@ from biodance.diagnosis.watch import LiveWarning
 from biodance.errors import BiodanceError
 from biodance.pipeline.live import LiveResult, LiveState
 from biodance.report.documents.identification import ASKED
+from biodance.report.documents.plain import keyed
 from biodance.report.wording import format_number
 
 
@@ -33,19 +34,11 @@ def live_document(found: LiveResult) -> dict[str, Any]:
         "frames_used": int(found.fit.use.sum()) if found.fit else 0,
         "frame_ms": _spread(found.frame_s) | {"wall": _spread(found.wall_s)},
         "known": [
-            {
-                "segment": known.segment,
-                "quantity": known.quantity,
-                "unit": known.unit,
-                "value": known.value,
-                "sd": known.sd,
-                "low": known.interval[0],
-                "high": known.interval[1],
-                "verdict": known.verdict,
-            }
+            keyed(known, "segment quantity unit value sd")
+            | {"low": known.interval[0], "high": known.interval[1], "verdict": known.verdict}
             for known in rows
         ],
-        "warnings": [_warning(said) for said in found.warnings],
+        "warnings": [keyed(said, "time_s effect target text") for said in found.warnings],
         "next": found.state.advice,
         "cause": found.cause,
     }
@@ -58,10 +51,6 @@ def _spread(seconds: np.ndarray) -> dict[str, float]:
         "p99": float(np.percentile(milliseconds, 99)),
         "longest": float(milliseconds.max()),
     }
-
-
-def _warning(said: LiveWarning) -> dict[str, Any]:
-    return {"time_s": said.time_s, "effect": said.effect, "target": said.target, "text": said.text}
 
 
 def state_line(state: LiveState) -> str:
@@ -139,7 +128,7 @@ class LivePage:
     def warn(self, said: LiveWarning) -> None:
         """Add a warning."""
         with self._lock:
-            self._said["warnings"] = [*self._said["warnings"], {"time_s": said.time_s, "text": said.text}]
+            self._said["warnings"] = [*self._said["warnings"], keyed(said, "time_s text")]
 
     def end(self, state: LiveState, cause: str) -> None:
         """Show the last state, and that the stream has ended, with the ``cause`` where nothing was identified."""

@@ -4,16 +4,17 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.pipeline.kept import BODY
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.robot_trials import MatchedTrial
+from biodance.pipeline.saved_results import BODY
 from biodance.report.documents.diagnosis import attention_document, judged_document
 from biodance.report.documents.identification import agreement, identification_document
-from biodance.report.documents.session import plain_values, to_text
+from biodance.report.documents.plain import keyed, plain_values, to_text
+from biodance.report.files import write_files
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.template import render, template_text
-from biodance.report.write import PAGE, write_files
+from biodance.report.write import PAGE
 from biodance.version import __version__
 
 
@@ -44,36 +45,29 @@ def robot_document(result: RobotResult) -> dict[str, Any]:
 
 def _diagnosis(result: RobotResult) -> dict[str, Any]:
     """Return what is not as drawn: the verdict, and the findings."""
+    keys = (
+        "cause=cause.kind where=cause.where value sd unit=cause.unit evidence_nats=gain evidence_on_kept_nats=kept_gain"
+    )
     findings = [
-        {
-            "cause": one.cause.kind,
-            "where": one.cause.where,
-            "value": one.value,
-            "sd": one.sd,
-            "unit": one.cause.unit,
-            "evidence_nats": one.gain,
-            "evidence_on_kept_nats": one.kept_gain,
-            "not_told_from": [f"{rival.kind} {rival.where}" for rival in one.rivals],
-        }
+        keyed(one, keys) | {"not_told_from": [f"{rival.kind} {rival.where}" for rival in one.rivals]}
         for one in result.causes
     ]
     return {"verdict": result.verdict, "findings": findings}
 
 
+_MATCHED = (
+    "delay_s=plate.delay place_m=plate.place yaw_rad=plate.yaw correlation=plate.correlation scale=plate.scale surprise"
+)
+
+
 def _matched(one: MatchedTrial) -> dict[str, Any]:
+    encoders, plate = one.recorded.files
     return {
-        "trial": one.recorded.name,
-        "role": one.recorded.role,
-        "encoders": one.recorded.files[0].name,
-        "plate": one.recorded.files[1].name,
-        "encoders_hz": one.recorded.encoders.rate,
-        "plate_hz": one.recorded.wrench.rate,
-        "delay_s": one.plate.delay,
-        "place_m": one.plate.place,
-        "yaw_rad": one.plate.yaw,
-        "correlation": one.plate.correlation,
-        "scale": one.plate.scale,
-        "surprise": one.surprise,
+        **keyed(one, "trial=recorded.name role=recorded.role"),
+        "encoders": encoders.name,
+        "plate": plate.name,
+        **keyed(one.recorded, "encoders_hz=encoders.rate plate_hz=wrench.rate"),
+        **keyed(one, _MATCHED),
         "standing": [{"foot": f, "start_s": a, "end_s": b} for f, a, b in one.motion.grounded.supports],
         "history": one.recorded.history,
     }

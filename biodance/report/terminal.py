@@ -106,16 +106,11 @@ def print_session(result: SessionResult, attention: Sequence[dict[str, Any]], co
     for trial in result.trials:
         rms = f"{millimetres(trial.fit.total_rms)} mm" if trial.fit else "–"
         c = trial.comparison
-        wrench = (
-            (
-                str(int(c.used.sum())),
-                f"{format_number(float(c.rms[2]))} N",
-                # who stands still presses evenly: there is nothing to correlate but noise
-                "–" if trial.trial.role == "static" else format_number(float(c.correlation[2]), 3),
-            )
-            if c
-            else ("–", "–", "–")
-        )
+        wrench = ["–", "–", "–"]
+        if c:
+            # who stands still presses evenly: there is nothing to correlate but noise
+            alike = "–" if trial.trial.role == "static" else format_number(float(c.correlation[2]), 3)
+            wrench = [str(int(c.used.sum())), f"{format_number(float(c.rms[2]))} N", alike]
         table.add_row(escape(trial.trial.name), trial.trial.role, trial.status, rms, *wrench)
     console.print(table)
 
@@ -134,9 +129,7 @@ def _print_failures(failures: dict[str, str], console: Console) -> None:
 def print_identification(found: dict[str, Any], console: Console) -> None:
     """Print one line a segment, the validation, the added mass and the notes of `biodance identify`."""
     print_attention(found["attention"], console)
-    table = Table(box=None, pad_edge=False)
-    for heading in ("segment", "mass (kg)", "table (kg)", "from the data"):
-        table.add_column(heading)
+    table = Table("segment", "mass (kg)", "table (kg)", "from the data", box=None, pad_edge=False)
     for row in found["segments"]:
         mass = f"{format_number(row['mass_kg'], 2)} ± {format_number(row['mass_sd_kg'], 2)}"
         table.add_row(
@@ -181,9 +174,7 @@ def _print_performance(found: dict[str, Any], console: Console) -> None:
 
 def print_foresight(found: dict[str, Any], console: Console) -> None:
     """Print what a movement will see, what it will confuse, and what it cannot see, of `biodance foresee`."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("cause", "will be seen from", "and told from the others from", "typical"):
-        table.add_column(heading)
+    table = Table("cause", "will be seen from", "and told from the others from", "typical", box=None, pad_edge=False)
     for row in found["limits"]:
         cells = (size_seen(row, key) for key in ("limit", "told_from", "typical"))
         table.add_row(escape(f"{row['effect']} {row['target']}".strip()), *cells)
@@ -248,9 +239,7 @@ def _print_witnesses(found: dict[str, Any], console: Console) -> None:
     seen = [row for row in found["witness_table"] if row["witnesses"]]
     if not found["witnesses"]:
         return
-    table = Table(box=None, pad_edge=False)
-    for heading in ("cause", "seen to", "by the witnesses", "not told from"):
-        table.add_column(heading)
+    table = Table("cause", "seen to", "by the witnesses", "not told from", box=None, pad_edge=False)
     for row in seen:
         by = ", ".join(name.replace("_", " ") for name in row["witnesses"])
         cause = f"{row['effect'].replace('_', ' ')} {row['target']}"

@@ -4,24 +4,26 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.errors import BiodanceError
 from biodance.lab.corrections import PlateCorrection
+from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected
 from biodance.pipeline.attention import session_attention
-from biodance.pipeline.carry import CORRECTED, LAB, accepted_corrections, lab_text, write_corrected
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.kept import BODY, SCALED, keep_motions
-from biodance.pipeline.looked_at import identified_trials
+from biodance.pipeline.judged_trials import identified_trials
+from biodance.pipeline.lab_file import LAB, lab_text
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.saved_results import BODY, SCALED, keep_motions
 from biodance.pipeline.session_frames import frames_of
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
-from biodance.report.documents.session import movement_document, plain_values, results_document, to_text
+from biodance.report.documents.plain import plain_values, to_text
+from biodance.report.documents.session import movement_document, results_document
+from biodance.report.files import write_files
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
@@ -44,19 +46,19 @@ def write_report(
     made = provenance(result, created=now())
     first = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
     judged = diagnosis.diagnosis.judged if diagnosis else ()
-    found = {
+    numbers = {
         **results_document(result, made),
         "diagnosis": diagnosis_document(diagnosis) if diagnosis else None,
         "attention": attention_document(first),
         "judged": judged_document(judged),
         "movement": movement_document(movement) if movement else None,
     }
-    plain = dict(plain_values(found))
-    files = {_NUMBERS: to_text(found), METHODS: methods_text(plain)}
+    found: dict[str, Any] = plain_values(numbers)
+    files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
     if drawn:
         files |= {PAGE: _page(result, made, diagnosis, movement)} | _kept(result, folder)
     write_files(folder, files)
-    return plain
+    return found
 
 
 def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
@@ -91,11 +93,11 @@ def write_identification(
         "movement": movement_document(movement) if movement else None,
         "provenance": made.as_dict(),
     }
-    plain = dict(plain_values(numbers))
+    told: dict[str, Any] = plain_values(numbers)
     page = _page(result, made, movement=movement)
-    files = {_NUMBERS: to_text(numbers), METHODS: methods_text(plain), PAGE: page}
+    files = {_NUMBERS: to_text(told), METHODS: methods_text(told), PAGE: page}
     write_files(folder, files | _kept(result, folder))
-    return plain
+    return told
 
 
 def write_diagnosis(
@@ -165,18 +167,3 @@ def _page(
     attention = diagnosis.diagnosis.attention if diagnosis else None
     frames = frames_of(result)
     return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames)
-
-
-def write_files(folder: Path, files: dict[str, str]) -> None:
-    """Write every file under another name first and then rename it, so that a stopped run leaves no half file."""
-    for name, text in files.items():
-        part = folder / f".{name}.part"
-        try:
-            part.write_text(text, encoding="utf-8", newline="\n")
-            part.replace(folder / name)
-        except OSError as error:
-            part.unlink(missing_ok=True)
-            raise BiodanceError(
-                f"{folder / name}: cannot be written ({error.strerror or error}). Make room or choose another --out, "
-                f"and run again."
-            ) from error

@@ -26,17 +26,14 @@ def _layout(text: str) -> Any:
 
 MAIN = _layout(
     "version i4, size i4, plates i4, instruments i4, name S100, date S12, birth S12, weight f8, height f8, sex S4, "
-    "trials i4, seconds f8, "
-    "zero_method i4, weight_method i4, delay i4, trigger_method i4, trigger_channel i4, before i4, after i4, "
-    "trigger_value f8, gap S4, "
-    "rate i4, protocol S150, test S200, comments S150, description S150, examiner S100, gap2 S2, metric i4"
+    "trials i4, seconds f8, zero_method i4, weight_method i4, delay i4, trigger_method i4, trigger_channel i4, before "
+    "i4, after i4, trigger_value f8, gap S4, rate i4, protocol S150, test S200, comments S150, description S150, "
+    "examiner S100, gap2 S2, metric i4"
 )
 INSTRUMENT = _layout(
     "size i4, serial i4, layout i4, model S20, channels i4, indices i4 4, length f4, width f4, offset f4 3, "
-    "sensitivity f4 32, "
-    "numbers i4 32, turn f4 16, distance f4 3, gain f4 32, excitation f4 32, counts_per_volt f4 32, timing f4 5, zero "
-    "i4 32, rate i4, "
-    "trigger f4, end f4"
+    "sensitivity f4 32, numbers i4 32, turn f4 16, distance f4 3, gain f4 32, excitation f4 32, counts_per_volt f4 32, "
+    "timing f4 5, zero i4 32, rate i4, trigger f4, end f4"
 )
 SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
 IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)
@@ -145,8 +142,7 @@ def _instruments(content: bytes, main: Any, path: Path) -> tuple[list[Any], int]
         ):
             raise FileRefused(
                 f"{path}: the header of instrument {number + 1} says {int(header['size'])} bytes and "
-                f"{int(header['channels'])} "
-                f"channels. Export it again."
+                f"{int(header['channels'])} channels. Export it again."
             )
         headers.append(header)
         at += int(header["size"])
@@ -159,9 +155,7 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
     if found != need or not samples:
         raise FileRefused(
             f"{path}: {found} bytes follow the {headers + 1} headers, {samples} samples of {channels} channels need "
-            f"{need}. The "
-            f"file is cut off or "
-            "damaged: copy or export it again."
+            f"{need}. The file is cut off or damaged: copy or export it again."
         )
     data = np.frombuffer(content, kind, samples * channels, offset=start).reshape(samples, channels)
     if not np.isfinite(data).all():

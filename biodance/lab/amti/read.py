@@ -149,9 +149,7 @@ def _refuse_nonsense(plate: BsfPlate, number: int, path: Path) -> None:
     if not SHORTEST_SIDE <= min(plate.size) <= max(plate.size) <= LONGEST_SIDE:
         raise FileRefused(
             f"{path}: plate {number} is {plate.size[0]:.3g} x {plate.size[1]:.3g} m, legal are sides of "
-            f"{SHORTEST_SIDE:g} to "
-            f"{LONGEST_SIDE:g} m. "
-            "Enter the plate's size in NetForce and save again."
+            f"{SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Enter the plate's size in NetForce and save again."
         )
     if not np.abs(plate.offset).max() <= DEEPEST:
         raise FileRefused(

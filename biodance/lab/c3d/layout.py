@@ -205,8 +205,7 @@ def _counts(
     if len(full) != 1:
         raise FileRefused(
             f"{where}: header and parameters contradict each other (points {points}, channels and samples per frame "
-            f"{analog}, "
-            f"frames {frames}, data from byte {starts}) and the file's length does not decide. {RESAVE}"
+            f"{analog}, frames {frames}, data from byte {starts}) and the file's length does not decide. {RESAVE}"
         )
     start, p, c, n, f = full[0]
     notes.append(

@@ -82,9 +82,8 @@ def read_header(content: bytes, where: str) -> Header:
         raise FileRefused(f"{where}: the file is empty (0 bytes). {RESAVE}")
     if len(content) < 2 * C3D_BLOCK or content[1] != 0x50:
         raise FileRefused(
-            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least "
-            f"1024 bytes, expected). "
-            "Check that the file is a C3D export and not another format with that name."
+            f"{where}: this is not a C3D file: of its {len(content)} bytes the second is not 80 (80, and at least 1024 "
+            "bytes, expected). Check that the file is a C3D export and not another format with that name."
         )
     start = (content[0] - 1) * C3D_BLOCK
     if start < C3D_BLOCK or start + 4 > len(content):
@@ -102,14 +101,12 @@ def read_header(content: bytes, where: str) -> Header:
     if not start < data_start <= len(content):
         raise FileRefused(
             f"{where}: the header puts the data into block {words[8]}, but the file has only "
-            f"{len(content) // C3D_BLOCK} blocks: "
-            f"it is damaged or was cut off. {RESAVE}"
+            f"{len(content) // C3D_BLOCK} blocks: it is damaged or was cut off. {RESAVE}"
         )
     if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
         raise FileRefused(
             f"{where}: read as {PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of "
-            f"{rate:g} Hz, "
-            f"which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
+            f"{rate:g} Hz, which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
         )
     return Header(processor, words[1], words[2], words[3], words[4], scale, words[9], rate, start, data_start)
 

@@ -68,8 +68,7 @@ def metres_per_unit(
     if math.isnan(size):
         raise FileRefused(
             f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
-            f"m). "
-            "Write the unit into the file and read it again."
+            "m). Write the unit into the file and read it again."
         )
     guess = min(GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
     said = f"POINT:UNITS is {written!r}; {what} of {size:.4g} can only be in {guess}, so lengths are in {guess}."

@@ -182,9 +182,8 @@ def _without_repeats(
             history.append(f"Label {name} occurs {len(same)} times; repetitions that are empty or equal are left out.")
         if len(different) > 1:
             warnings.append(
-                f"Label {name} is given to {len(different)} different points, so neither is taken for {name}: they "
-                f"are called {name}#1, "
-                f"{name}#2 ... Correct the labels in the recording software."
+                f"Label {name} is given to {len(different)} different points, so neither is taken for {name}: they are "
+                f"called {name}#1, {name}#2 ... Correct the labels in the recording software."
             )
         kept |= {
             column: name if len(different) == 1 else f"{name}#{n}"

@@ -225,8 +225,7 @@ def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:
     if len(absent) == len(marker_set.required):
         raise TrialRefused(
             f"The markers are not of the set {marker_set.title}: {', '.join(absent)} "
-            f"{'is' if len(absent) == 1 else 'are'} not among them. "
-            "Label them, or choose the set that was worn."
+            f"{'is' if len(absent) == 1 else 'are'} not among them. Label them, or choose the set that was worn."
         )
     chosen = markers.select(match.values())
     return Markers(tuple(match), chosen.time, chosen.xyz)

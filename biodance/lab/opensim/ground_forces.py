@@ -124,8 +124,7 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     if not groups:
         raise FileRefused(
             f"{where}: holds no force plate: the columns are {', '.join(table.columns[:6])} ... Columns such as "
-            f"ground_force_vx, "
-            "ground_force_px and ground_torque_x are needed."
+            "ground_force_vx, ground_force_px and ground_torque_x are needed."
         )
     raw = {name: _wrench(table, columns, f"{where}, plate {name}") for name, columns in groups.items()}
     time = np.linspace(table.time[0], table.time[-1], table.time.size) if table.time.size else table.time

@@ -106,8 +106,7 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
         row, column = np.argwhere(~np.isfinite(table.values))[0]
         raise TrialRefused(
             f"{path}: column {table.columns[column]} is {table.values[row, column]} at {table.time[row]:g} s, and the "
-            f"format allows finite "
-            "numbers only. Fill the gap or leave the column out."
+            "format allows finite numbers only. Fill the gap or leave the column out."
         )
     header = [
         table.name or path.stem,

@@ -228,9 +228,8 @@ def _equal_steps(
             break
     else:
         raise FileRefused(
-            f"{path}: the time column has no equal steps and does not fit the DataRate of {declared:g} Hz. Correct "
-            f"the rate in the header "
-            "or export the file again."
+            f"{path}: the time column has no equal steps and does not fit the DataRate of {declared:g} Hz. Correct the "
+            "rate in the header or export the file again."
         )
     warnings = []
     rate = declared

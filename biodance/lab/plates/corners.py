@@ -42,9 +42,7 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     if gap > NOT_CLOSED or skew > NOT_CLOSED:
         raise TrialRefused(
             f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by "
-            f"{1000 * skew:.0f} mm at "
-            f"a side's end "
-            f"(legal: {1000 * NOT_CLOSED:.0f} mm). Measure the corners again."
+            f"{1000 * skew:.0f} mm at a side's end (legal: {1000 * NOT_CLOSED:.0f} mm). Measure the corners again."
         )
     if gap > CROOKED or skew > CROOKED:
         decisions.append(
@@ -54,8 +52,7 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     if abs(axes[2, 2]) < _STEEPEST:
         raise TrialRefused(
             f"CORNERS make a surface {np.degrees(np.arccos(abs(axes[2, 2]))):.0f} degrees steep (legal: up to 45). "
-            f"Check "
-            f"corners and lab axes."
+            "Check corners and lab axes."
         )
     return lab, tuple(decisions)
 
@@ -110,8 +107,7 @@ def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
         return metres, []
     said = (
         f"CORNERS would be {sides.max() * metres:.4g} m long in the file's unit; they were taken as {fits[0]}, the "
-        f"only unit "
-        f"that fits a plate."
+        "only unit that fits a plate."
     )
     return _UNITS[fits[0]], [said]
 
@@ -126,14 +122,11 @@ def _refuse_disorder(lab: Array) -> None:
         if np.linalg.norm(fixed[0] - fixed[1] + fixed[2] - fixed[3]) < NOT_CLOSED:
             raise TrialRefused(
                 f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "
-                f"is +x+y, "
-                f"-x+y, -x-y, +x-y "
-                "of the plate axes. Correct FORCE_PLATFORM:CORNERS."
+                "is +x+y, -x+y, -x-y, +x-y of the plate axes. Correct FORCE_PLATFORM:CORNERS."
             )
     raise TrialRefused(
         f"CORNERS {', '.join(_point(p) for p in lab)} m are no rectangle: the outline crosses itself. Enter the "
-        f"corners in the order "
-        "+x+y, -x+y, -x-y, +x-y of the plate axes."
+        "corners in the order +x+y, -x+y, -x-y, +x-y of the plate axes."
     )
 
 
@@ -142,8 +135,8 @@ def _refuse_size(lab: Array, corners: Array) -> None:
     if sides.min() < SHORTEST_SIDE or sides.max() > LONGEST_SIDE:
         raise TrialRefused(
             f"CORNERS make a plate of {sides[:2].min():.3g} x {sides[:2].max():.3g} m (first corner as written: "
-            f"{_point(corners[0])}); legal are "
-            f"sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and POINT:UNITS."
+            f"{_point(corners[0])}); legal are sides of {SHORTEST_SIDE:g} to {LONGEST_SIDE:g} m. Check CORNERS and "
+            "POINT:UNITS."
         )
 
 

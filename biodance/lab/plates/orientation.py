@@ -128,8 +128,7 @@ def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Marker
     """
     why = (
         "CORNERS make the plate's z point up, but the sway of the standing person shows that its z points down: the "
-        "corners "
-        "run the wrong way round"
+        "corners run the wrong way round"
     )
     choices = {"y": axes * [1, -1, -1], "x": axes * [-1, 1, -1]}
     if markers is not None:
@@ -174,9 +173,7 @@ def _under_feet(
     if len(good) == 1 and all(d is None or d > NOT_UNDER for angle, d in found.items() if angle != good[0]):
         said = (
             f"The load lies {distance:.2f} m from the feet that the markers show, and under them when the corners are "
-            f"counted "
-            f"from another one: the plate "
-            f"axes were turned by {good[0]} degrees."
+            f"counted from another one: the plate axes were turned by {good[0]} degrees."
         )
         return turns[good[0]], (said,), (f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS.",)
     said = f"The load lies {distance:.2f} m (median) from the feet that the markers show"
@@ -222,7 +219,7 @@ def _sign_said(sign: int, otherwise: int) -> str:
         taken = "reaction" if otherwise > 0 else "load"
         return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}."
     return (
-        f"Sign: the file holds the "
-        f"{'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the "
-        f"weight must point up)."
+        "Sign: the file holds the "
+        f"{'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the weight must point "
+        "up)."
     )

@@ -127,8 +127,7 @@ def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
     if bad:
         raise TrialRefused(
             f"CHANNEL names analog channel {', '.join(bad)}, but the file holds {available} channels (legal: 1 to "
-            f"{available}). "
-            f"Export it again."
+            f"{available}). Export it again."
         )
     if len(set(used)) < need:
         raise TrialRefused(

@@ -128,9 +128,7 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
     )
     raise TrialRefused(
         f"ORIGIN is ({written}) in units of {metres:g} m, which no plate of {2 * half[0]:.2f} x {2 * half[1]:.2f} m "
-        f"has (legal: "
-        f"{legal}, depth up to "
-        f"{DEEPEST:g} m). Enter the values of the maker's sheet."
+        f"has (legal: {legal}, depth up to {DEEPEST:g} m). Enter the values of the maker's sheet."
     )
 
 

@@ -133,9 +133,8 @@ def _choose(quantity: str, unit: str, declared: list[Declared], notes: list[str]
     other = next((d for d in declared[1:] if abs(d.value - first.value) > SAME_MASS * first.value), None)
     if other:
         notes.append(
-            f"The {quantity} is {first.value:g} {unit} in {first.source} but {other.value:g} {unit} in "
-            f"{other.source}; the first was used. "
-            "Are all files of the same person and day?"
+            f"The {quantity} is {first.value:g} {unit} in {first.source} but {other.value:g} {unit} in {other.source}; "
+            "the first was used. Are all files of the same person and day?"
         )
     return first.value
 
@@ -157,8 +156,8 @@ def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> flo
     if other:
         notes.append(
             f"The plates carry {other.value:.2f} kg in quiet standing in {other.source}, but the body mass is "
-            f"{mass:.2f} kg. Check the "
-            "entry, the plates, whether both feet stand on them, and whether it is the same person."
+            f"{mass:.2f} kg. Check the entry, the plates, whether both feet stand on them, and whether it is the same "
+            "person."
         )
     return mass
 

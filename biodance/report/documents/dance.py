@@ -9,24 +9,15 @@ from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import Rehearsal
 from biodance.pipeline.dance_result import DanceResult
+from biodance.report.documents.plain import keyed
+
+_CURVE = "segments duration_s=duration mass_kg=mass com_m=com inertia_kgm2=inertia"
 
 
 def dance_document(result: DanceResult) -> dict[str, Any]:
     """Return what `biodance dance` promises as results.json (see docs/guide/dance.md); SI units by suffix."""
     dance, account, expectation = result.dance, result.account, result.expectation
-    limits = [
-        {"limit": m.limit, "worst": m.worst, "where_s": m.where_s, "unit": m.unit, "what": m.what}
-        for m in result.margins
-    ]
-    criterion = None
-    if account is not None:
-        criterion = {
-            "static": account.static,
-            "static_bound": account.static_bound,
-            "dynamic": account.dynamic,
-            "dynamic_bound": account.dynamic_bound,
-            "hardly_excited": account.hardly,
-        }
+    criterion = account and keyed(account, "static static_bound dynamic dynamic_bound hardly_excited=hardly")
     rows = []
     if expectation is not None:
         for i, name in enumerate(expectation.segments):
@@ -40,11 +31,11 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "transitions": len(dance.move) if dance else 0,
         "duration_s": dance.duration if dance else 0.0,
         "criterion": criterion,
-        "margins": limits,
+        "margins": [keyed(margin, "limit worst where_s unit what") for margin in result.margins],
         "feasible": result.feasible,
         "reason": result.reason,
         "expected_sd": rows,
-        "expected_curve": _curve(result),
+        "expected_curve": expectation and keyed(expectation, _CURVE),
         "for": result.plan.whom,
         "instructions": _counted(dance),
         "performers": result.performers,
@@ -90,17 +81,4 @@ def playback_document(found: Rehearsal, film: Path) -> dict[str, Any]:
         "pelvis_worst_m": float(p.root_error.max()),
         "cop_rms_m": float(np.sqrt(np.nanmean(p.zmp_error**2))),
         "cop_inside_least_m": float(np.nanmin(found.inside)),
-    }
-
-
-def _curve(result: DanceResult) -> dict[str, Any] | None:
-    if result.expectation is None:
-        return None
-    e = result.expectation
-    return {
-        "segments": e.segments,
-        "duration_s": e.duration,
-        "mass_kg": e.mass,
-        "com_m": e.com,
-        "inertia_kgm2": e.inertia,
     }

@@ -7,54 +7,43 @@ from typing import Any
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Alias, Estimate, Finding, Gain, Unobservable
+from biodance.diagnosis.diagnosis import Estimate, Finding, Gain
 from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.heard import Testimony, sights
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.records.attention import Attention, Judged
+from biodance.report.documents.plain import keyed
 
-
-def _alias(one: Alias) -> dict[str, Any]:
-    return {"effect": one.effect, "target": one.target, "log_bayes_factor": one.log_bayes_factor}
+_ALIAS = "effect target log_bayes_factor"
+_GAIN = "rms_before rms_after ci95 trials log_density_per_s=score log_density_se=score_se"
+_LIMIT = "effect target limit unit told_from typical"
+_ADEQUACY = "channel band_hz z size unit matters trial around_s=second"
+_OBSERVED = "what value sd unit expected expected_sd z trial counts"
 
 
 def _gain(found: Gain | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "rms_before": found.rms_before,
-        "rms_after": found.rms_after,
-        "ci95": found.ci95,
-        "trials": found.trials,
-        "log_density_per_s": found.score,
-        "log_density_se": found.score_se,
-    }
+    return keyed(found, _GAIN) if found else None
 
 
 def attention_document(found: Sequence[Attention]) -> list[dict[str, Any]]:
     """Return what a person must see, strongest first."""
-    return [{"level": one.level, "text": one.text, "trial": one.trial, "about": one.about} for one in found]
+    return [keyed(one, "level text trial about") for one in found]
 
 
 def judged_document(found: Sequence[Judged]) -> list[dict[str, Any]]:
     """Return what a verdict rests on, and of what it does not why; ``missed``: it should have."""
-    return [
-        {"trial": one.trial, "seconds": one.seconds, "why_not": one.why_not or None, "missed": one.missed}
-        for one in found
-    ]
+    return [keyed(one, "trial seconds") | {"why_not": one.why_not or None, "missed": one.missed} for one in found]
 
 
 def _finding(one: Finding) -> dict[str, Any]:
     return {
-        "effect": one.effect,
-        "target": one.target,
+        **keyed(one, "effect target"),
         "parameters": _parameters(one.parameters),
-        "set": [_alias(a) for a in one.set],
+        "set": [keyed(alias, _ALIAS) for alias in one.set],
         "visible_fraction": one.visible_fraction,
         "gain": _gain(one.gain),
-        "changes": one.changes,
-        "advice": one.advice,
+        **keyed(one, "changes advice"),
     }
 
 
@@ -62,7 +51,7 @@ def _parameters(found: Sequence[Estimate]) -> dict[str, Any]:
     """Return every parameter by its name, and what has three axes (``shift_x`` ...) as a vector under the name without
     axis, too.
     """
-    rows = {p.name: {"value": p.value, "sd": p.sd, "unit": p.unit, "ci95": p.interval} for p in found}
+    rows = {one.name: keyed(one, "value sd unit ci95=interval") for one in found}
     stems = [name.removesuffix("_x") for name in rows if name.endswith("_x")]
     for stem in stems:
         axes = [rows.get(f"{stem}_{axis}") for axis in "xyz"]
@@ -70,17 +59,6 @@ def _parameters(found: Sequence[Estimate]) -> dict[str, Any]:
             rows[stem] = {key: [one[key] for one in axes if one] for key in ("value", "sd", "ci95")}
             rows[stem]["unit"] = rows[f"{stem}_x"]["unit"]
     return rows
-
-
-def _limit(row: Unobservable) -> dict[str, Any]:
-    return {
-        "effect": row.effect,
-        "target": row.target,
-        "limit": row.limit,
-        "unit": row.unit,
-        "told_from": row.told_from,
-        "typical": row.typical,
-    }
 
 
 _SEATED = (
@@ -98,8 +76,8 @@ def foresight_document(found: Foresight, *, seated: bool = False) -> dict[str, A
         for p in found.confusions
     ]
     return {
-        "limits": [_limit(row) for row in found.limits],
-        "unobservable": [_limit(row) for row in found.hidden],
+        "limits": [keyed(row, _LIMIT) for row in found.limits],
+        "unobservable": [keyed(row, _LIMIT) for row in found.hidden],
         "confusions": pairs,
         "separation": found.separation,
         "summary": foresight_summary(found),
@@ -142,26 +120,11 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "findings": [_finding(finding) for finding in one.findings],
         "resembles": [_finding(finding) for finding in one.resembles],
         "within_tolerance": [_finding(finding) for finding in one.tolerated],
-        "gates": [
-            {"check": g.check, "ok": g.ok, "text": g.text, "effect": g.effect, "target": g.target, "size": g.size}
-            for g in one.gates
-        ],
-        "adequacy": [
-            {
-                "channel": a.channel,
-                "band_hz": a.band_hz,
-                "z": a.z,
-                "size": a.size,
-                "unit": a.unit,
-                "matters": a.matters,
-                "trial": a.trial,
-                "around_s": a.second,
-            }
-            for a in one.adequacy
-        ],
-        "unobservable": [_limit(row) for row in one.unobservable],
-        "limits": [_limit(row) for row in one.limits],
-        "candidates": [_alias(a) for a in one.candidates],
+        "gates": [keyed(gate, "check ok text effect target size") for gate in one.gates],
+        "adequacy": [keyed(row, _ADEQUACY) for row in one.adequacy],
+        "unobservable": [keyed(row, _LIMIT) for row in one.unobservable],
+        "limits": [keyed(row, _LIMIT) for row in one.limits],
+        "candidates": [keyed(alias, _ALIAS) for alias in one.candidates],
         "gain": _gain(found.gain),
         "masses": {"before": _masses(found.before), "accepted": _masses(found.accepted)},
         "failures": found.failures,
@@ -174,19 +137,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
 def _witnesses(heard: Testimony | None) -> list[dict[str, Any]]:
     """Return every observation; ``cause`` is the one that it sees best, "" where it is blind to all."""
     return [
-        {
-            "witness": o.witness,
-            "cause": " ".join(filter(None, heard.strongest(i))),
-            "what": o.what,
-            "value": o.value,
-            "sd": o.sd,
-            "unit": o.unit,
-            "expected": o.expected,
-            "expected_sd": o.expected_sd,
-            "z": o.z,
-            "trial": o.trial,
-            "counts": o.counts,
-        }
+        {"witness": o.witness, "cause": " ".join(filter(None, heard.strongest(i))), **keyed(o, _OBSERVED)}
         for i, o in enumerate(heard.observations if heard else ())
         if heard
     ]
@@ -195,14 +146,7 @@ def _witnesses(heard: Testimony | None) -> list[dict[str, Any]]:
 def _sights(heard: Testimony | None) -> list[dict[str, Any]]:
     """Return how well each cause was seen; an ``sd`` of null: every witness was blind to it."""
     return [
-        {
-            "effect": s.effect,
-            "target": s.target,
-            "sd": s.sd,
-            "unit": s.unit,
-            "witnesses": s.witnesses,
-            "alike": [f"{effect} {target}".strip() for effect, target in s.alike],
-            "would_be_seen_by": s.would,
-        }
-        for s in (sights(heard) if heard else ())
+        keyed(one, "effect target sd unit witnesses")
+        | {"alike": [f"{effect} {target}".strip() for effect, target in one.alike], "would_be_seen_by": one.would}
+        for one in (sights(heard) if heard else ())
     ]

@@ -9,11 +9,11 @@ from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.identification.load_words import say_load
-from biodance.identification.sessions import Difference
 from biodance.identification.torques import TorqueBands
 from biodance.identification.validation import ResidualRatio, TrialValidation
 from biodance.motion.regressor import Agreement
 from biodance.pipeline.identification import SessionIdentification
+from biodance.report.documents.plain import keyed
 
 if TYPE_CHECKING:
     from biodance.dance.scoring import PerformanceScore
@@ -25,7 +25,7 @@ ASKED = ("mass", "com x", "com y", "com z")
 
 def agreement(found: Agreement) -> dict[str, Any]:
     """Return RMS and correlation of six channels; null where a correlation is not defined."""
-    return {"rms": found.rms, "cc": found.correlation, "frames": found.frames}
+    return keyed(found, "rms cc=correlation frames")
 
 
 def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:
@@ -51,10 +51,7 @@ def _segment(found: Identification, name: str) -> dict[str, Any]:
     mass, com, inertia = rows[0], rows[1:4], rows[4:]
     return {
         "name": name,
-        "mass_kg": mass.value,
-        "mass_sd_kg": mass.sd,
-        "mass_prior_kg": mass.table,
-        "mass_prior_sd_kg": mass.table_sd,
+        **keyed(mass, "mass_kg=value mass_sd_kg=sd mass_prior_kg=table mass_prior_sd_kg=table_sd"),
         "mass_prior_source": prior_source(found, name),
         "com_m": [row.value for row in com],
         "com_sd_m": [row.sd for row in com],
@@ -78,14 +75,8 @@ def _validation(trial: TrialValidation) -> dict[str, Any]:
 
 
 def _gain(found: ResidualRatio | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "force": found.force,
-        "force_ci95": found.force_interval,
-        "moment": found.moment,
-        "moment_ci95": found.moment_interval,
-    }
+    keys = "force force_ci95=force_interval moment moment_ci95=moment_interval"
+    return keyed(found, keys) if found else None
 
 
 def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
@@ -96,12 +87,7 @@ def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
     return {
         "status": search.status,
         "text": say_load(search),
-        "segment": best.segment,
-        "kg": best.mass,
-        "sd_kg": best.sd,
-        "ci95_kg": best.interval,
-        "place_m": best.place,
-        "place_sd_m": best.place_sd,
+        **keyed(best, "segment kg=mass sd_kg=sd ci95_kg=interval place_m=place place_sd_m=place_sd"),
         "p_none": search.p_no_load,
         "smallest_detectable_kg": best.smallest,
         "reference": search.reference,
@@ -112,53 +98,28 @@ def added_mass_document(search: LoadSearch) -> dict[str, Any] | None:
     }
 
 
+_SUSPECT = "segment kg=mass sd_kg=sd ci95_kg=interval probability log_bayes_factor smallest_detectable_kg=smallest"
+
+
 def _search(search: LoadSearch) -> dict[str, Any]:
-    rows = [
-        {
-            "segment": suspect.segment,
-            "kg": suspect.mass,
-            "sd_kg": suspect.sd,
-            "ci95_kg": suspect.interval,
-            "probability": suspect.probability,
-            "log_bayes_factor": suspect.log_bayes_factor,
-            "smallest_detectable_kg": suspect.smallest,
-        }
-        for suspect in search.suspects
-    ]
     return {
         "status": search.status,
         "text": say_load(search),
-        "doubts": search.doubts,
-        "reference": search.reference,
-        "p_none": search.p_no_load,
-        "announced": search.found,
-        "segments": rows,
+        **keyed(search, "doubts reference p_none=p_no_load announced=found"),
+        "segments": [keyed(suspect, _SUSPECT) for suspect in search.suspects],
     }
 
 
 def _together(one: Identification) -> list[dict[str, Any]]:
     return [
-        {
-            "segments": several.segments,
-            "mass_kg": several.mass,
-            "mass_sd_kg": several.sd,
-            "mass_ci95_kg": (several.mass - SIGMAS * several.sd, several.mass + SIGMAS * several.sd),
-        }
+        keyed(several, "segments mass_kg=mass mass_sd_kg=sd")
+        | {"mass_ci95_kg": (several.mass - SIGMAS * several.sd, several.mass + SIGMAS * several.sd)}
         for several in (known_together(one.sip) if one.status == "solved" else ())
     ]
 
 
-def _difference(row: Difference) -> dict[str, Any]:
-    return {
-        "segment": row.segment,
-        "quantity": row.quantity,
-        "unit": row.unit,
-        "later_minus_earlier": row.value,
-        "sd": row.sd,
-        "ci95": row.interval,
-        "p": row.p,
-        "known": row.known,
-    }
+_DIFFERENCE = "segment quantity unit later_minus_earlier=value sd ci95=interval p known"
+_REPETITION = "transition start_s=start end_s=end gain most"
 
 
 def torques_document(bands: TorqueBands | None) -> dict[str, Any] | None:
@@ -192,14 +153,10 @@ def performance_document(found: "PerformanceScore | None") -> dict[str, Any] | N
     if found is None:
         return None
     return {
-        "dance": found.dance,
-        "seconds": found.seconds,
+        **keyed(found, "dance seconds"),
         "excitation": [vars(one) for one in found.excitation],
         "repeat": found.repeat,
-        "repetitions": [
-            {"transition": r.transition, "start_s": r.start, "end_s": r.end, "gain": r.gain, "most": r.most}
-            for r in found.repetitions
-        ],
+        "repetitions": [keyed(one, _REPETITION) for one in found.repetitions],
     }
 
 
@@ -219,11 +176,9 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
     """
     one = found.identification
     return {
-        "status": one.status,
-        "cause": one.cause,
+        **keyed(one, "status cause"),
         "failures": found.failures,
-        "trials": one.trials,
-        "frames": one.frames,
+        **keyed(one, "trials frames"),
         "segments": [_segment(one, name) for name in one.sip.segments] if one.status == "solved" else [],
         "inertia_order": _TENSOR,
         "base_parameters": {
@@ -231,7 +186,7 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
             "well_known": len(one.base.well_known),
             "rank": one.base.rank,
         },
-        "disturbances": {"kinematics": one.sizes.kinematics, "noise_variance": one.sizes.noise},
+        "disturbances": keyed(one.sizes, "kinematics noise_variance=noise"),
         "validation": [_validation(trial) for trial in found.validations],
         "fitted": [_validation(trial) for trial in found.fitted],
         "gain": _gain(found.gain),
@@ -239,18 +194,8 @@ def identification_document(found: SessionIdentification) -> dict[str, Any]:
         "added_mass_search": _search(found.search),
         "known_together": _together(one),
         "joint_torques": torques_document(found.torques),
-        "impacts": [
-            {
-                "segment": row.segment,
-                "quantity": row.quantity,
-                "pull": row.pull,
-                "left": row.left,
-                "knee_Nm": row.knee,
-                "hip_Nm": row.hip,
-            }
-            for row in found.impacts
-        ],
-        "differences": [_difference(row) for row in found.changes],
+        "impacts": [keyed(row, "segment quantity pull left knee_Nm=knee hip_Nm=hip") for row in found.impacts],
+        "differences": [keyed(row, _DIFFERENCE) for row in found.changes],
         "performance": performance_document(found.performance),
         "notes": found.notes,
     }

@@ -7,6 +7,7 @@ from biodance.diagnosis.archive.conditions import ConditionEffect
 from biodance.diagnosis.archive.judge import PlateCard, PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.pipeline.plates import PlatesJudged
+from biodance.report.documents.plain import keyed
 
 
 def plates_document(found: PlatesJudged) -> dict[str, Any]:
@@ -16,7 +17,7 @@ def plates_document(found: PlatesJudged) -> dict[str, Any]:
     judged = found.judgement
     return {
         "archive": found.archive.resolve().name,
-        "visits": [{"visit": one.name, "person": one.person, "date": one.date or None} for one in judged.visits],
+        "visits": [keyed(one, "visit=name person") | {"date": one.date or None} for one in judged.visits],
         "plates": [_card(card) for card in judged.plates],
         "persons": _persons(found),
         "common": [_common(one) for one in judged.conditions],
@@ -33,41 +34,28 @@ def plates_document(found: PlatesJudged) -> dict[str, Any]:
 def _card(card: PlateCard) -> dict[str, Any]:
     levels = {one.quantity: one for one in card.levels}
 
-    def value(*names: str) -> list[float | None]:
-        return [levels[name].value if name in levels else None for name in names]
+    def of(names: tuple[str, ...], attribute: str) -> list[float | None]:
+        return [getattr(levels.get(name), attribute, None) for name in names]
 
-    def error(*names: str) -> list[float | None]:
-        return [levels[name].sd if name in levels else None for name in names]
-
-    gain, delay, offset = levels.get("gain"), levels.get("delay"), ("offset_x", "offset_y", "offset_z")
+    place, offset = ("place_x", "place_y"), ("offset_x", "offset_y", "offset_z")
     seen = [levels[name].taken_off for name in offset if name in levels]
     return {
-        "plate": card.plate,
-        "visits": card.visits,
-        "place_m": value("place_x", "place_y"),
-        "place_sd_m": error("place_x", "place_y"),
-        "gain": gain.value if gain else None,
-        "gain_sd": gain.sd if gain else None,
-        "offset_n": value(*offset),
-        "offset_sd_n": error(*offset),
+        **keyed(card, "plate visits"),
+        "place_m": of(place, "value"),
+        "place_sd_m": of(place, "sd"),
+        **keyed(levels.get("gain"), "gain=value gain_sd=sd"),
+        "offset_n": of(offset, "value"),
+        "offset_sd_n": of(offset, "sd"),
         "offset_taken_off": min(seen) if seen else None,
-        "delay_s": delay.value if delay else None,
-        "delay_sd_s": delay.sd if delay else None,
-        "levels": [_level(one) for one in card.levels],
+        **keyed(levels.get("delay"), "delay_s=value delay_sd_s=sd"),
+        "levels": [_with_unit(one, "quantity value sd between_visits_sd=between visits") for one in card.levels],
         "changes": [_change(one) for one in card.changes],
-        "findings": [_finding(one) for one in card.findings],
+        "findings": [_with_unit(one, "effect target text quantity value ci95=interval") for one in card.findings],
     }
 
 
-def _level(one: PlateLevel) -> dict[str, Any]:
-    return {
-        "quantity": one.quantity,
-        "value": one.value,
-        "sd": one.sd,
-        "between_visits_sd": one.between,
-        "visits": one.visits,
-        "unit": PLATE_QUANTITIES[one.quantity].unit,
-    }
+def _with_unit(one: PlateLevel | PlateFinding | Change, keys: str) -> dict[str, Any]:
+    return keyed(one, keys) | {"unit": PLATE_QUANTITIES[one.quantity].unit}
 
 
 def _change(one: Change) -> dict[str, Any]:
@@ -77,25 +65,8 @@ def _change(one: Change) -> dict[str, Any]:
         "visit": one.visit.name,
         "earliest": one.earliest.date or one.earliest.name,
         "latest": one.latest.date or one.latest.name,
-        "plate": one.plate,
-        "quantity": one.quantity,
-        "before": one.before,
-        "after": one.after,
-        "ci95": list(one.interval),
-        "unit": PLATE_QUANTITIES[one.quantity].unit,
+        **_with_unit(one, "plate quantity before after ci95=interval"),
         "matters": one.matters,
-    }
-
-
-def _finding(one: PlateFinding) -> dict[str, Any]:
-    return {
-        "effect": one.effect,
-        "target": one.target,
-        "text": one.text,
-        "quantity": one.quantity,
-        "value": one.value,
-        "ci95": list(one.interval),
-        "unit": PLATE_QUANTITIES[one.quantity].unit,
     }
 
 
@@ -139,13 +110,7 @@ def _row(effect: str, target: str, text: str, quantity: str, value: float, sd: f
 
 def _common(one: ConditionEffect) -> dict[str, Any]:
     return {
-        "plate": one.plate,
-        "quantity": one.quantity,
-        "factor": one.factor,
-        "level": one.level,
-        "base": one.base,
-        "value": one.shared.mean,
-        "ci95": list(one.shared.interval),
+        **keyed(one, "plate quantity factor level base value=shared.mean ci95=shared.interval"),
         "between_persons_sd": one.shared.spread,
         "unit": PLATE_QUANTITIES[one.quantity].unit,
         "persons": len(one.visits),

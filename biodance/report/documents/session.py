@@ -1,22 +1,20 @@
 """results.json: what the pipeline found, under keys whose unit is their suffix. NaN becomes null."""
 
-import json
-import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from biodance.cycles.curves import CurveGroup
-from biodance.cycles.cut import PERCENT, STRIDE_UNITS, Cycle
+from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
 from biodance.motion.regressor import Agreement
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import QuietStanding, ShownJoints, TrialResult, WrenchComparison
-from biodance.records import CHANNELS, Plate
+from biodance.pipeline.trial_result import ShownJoints, TrialResult, WrenchComparison
+from biodance.records import CHANNELS
 from biodance.report.documents.identification import added_mass_document, agreement, identification_document
+from biodance.report.documents.plain import keyed
 
 
 def movement_document(moved: SessionMovement) -> dict[str, Any]:
@@ -26,37 +24,23 @@ def movement_document(moved: SessionMovement) -> dict[str, Any]:
     quantity and side: extremes of the mean over ``count`` repetitions and where in the cycle; ``sd_mean`` between
     repetitions, ``parameters_sd_mean`` what the inertial parameters leave uncertain, both averaged over the cycle.
     """
-    return {
-        "parameters": moved.parameters,
-        "mass_kg": moved.mass,
-        "trials": [_moved(one) for one in moved.trials],
-        "left_out": moved.left_out,
-    }
+    trials = [_moved(one) for one in moved.trials]
+    return keyed(moved, "parameters mass_kg=mass") | {"trials": trials, "left_out": moved.left_out}
 
 
 def _moved(one: TrialMovement) -> dict[str, Any]:
     strikes, leavings = one.late
     return {
         "trial": one.trial,
-        "events": [{"time_s": e.time, "side": e.side, "down": e.down, "source": e.source} for e in one.events],
+        "events": [keyed(event, "time_s=time side down source") for event in one.events],
         "markers_after_forces_s": {"strikes": strikes, "leavings": leavings},
-        "cycles": [_cycle(cycle) for cycle in one.cycles],
+        "cycles": [keyed(cycle, "kind side start_s=start end_s=end off_s=off") for cycle in one.cycles],
         "spatiotemporal": _spatiotemporal(one),
         "curves": [_curve(group) for group in one.groups],
-        "file_angles": [
-            {"joint": a.joint, "label": a.label, "offset_deg": a.offset, "sd_deg": a.sd, "cc": a.correlation}
-            for a in one.file_angles
-        ],
-        "file_events": [
-            {"down": e.down, "late_s": e.late, "sd_s": e.sd, "count": e.count, "missed": e.missed}
-            for e in one.file_events
-        ],
+        "file_angles": [keyed(a, "joint label offset_deg=offset sd_deg=sd cc=correlation") for a in one.file_angles],
+        "file_events": [keyed(e, "down late_s=late sd_s=sd count missed") for e in one.file_events],
         "notes": one.notes,
     }
-
-
-def _cycle(one: Cycle) -> dict[str, Any]:
-    return {"kind": one.kind, "side": one.side, "start_s": one.start, "end_s": one.end, "off_s": one.off}
 
 
 def _spatiotemporal(one: TrialMovement) -> list[dict[str, Any]]:
@@ -68,11 +52,8 @@ def _spatiotemporal(one: TrialMovement) -> list[dict[str, Any]]:
 
 
 def _curve(group: CurveGroup) -> dict[str, Any]:
-    known = np.isfinite(group.mean)
-    about: dict[str, Any] = {"kind": group.kind, "quantity": group.quantity}
-    about |= {"side": group.side, "unit": group.unit}
-    about["count"] = len(group.values)
-    if not known.any():
+    about = keyed(group, "kind quantity side unit") | {"count": len(group.values)}
+    if not np.isfinite(group.mean).any():
         return about
     low, high = int(np.nanargmin(group.mean)), int(np.nanargmax(group.mean))
     return about | {
@@ -89,144 +70,88 @@ def _average(values: Any) -> float | None:
     return float(np.nanmean(values)) if np.isfinite(values).any() else None
 
 
-def plain_values(value: object) -> Any:
-    """Return ``value`` made of dict, list, str, int, float, bool and None only; a number that is not finite becomes
-    None.
-    """
-    if isinstance(value, float) and not isinstance(value, np.generic):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): plain_values(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain_values(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain_values(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain_values(value.item())
-    return value if value is None or isinstance(value, str | int | bool) else str(value)
-
-
-def to_text(document: object) -> str:
-    """Return one JSON document as text (indented, keys in their order, newline at the end)."""
-    return json.dumps(plain_values(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _plate(plate: Plate) -> dict[str, Any]:
-    return {"name": plate.name, "type": plate.type, "corners_m": plate.corners, "decisions": plate.decisions}
-
-
 def _wrench(comparison: WrenchComparison, identified: Agreement | None) -> dict[str, Any]:
     return {
         "channels": CHANNELS,
         "frames_used": int(comparison.used.sum()),
         "frames": comparison.used.size,
-        "table": {"rms": comparison.rms, "cc": comparison.correlation},
-        "identified": None if identified is None else agreement(identified),
+        "table": keyed(comparison, "rms cc=correlation"),
+        "identified": identified and agreement(identified),
         "notes": comparison.notes,
     }
 
 
-def _standing(standing: QuietStanding) -> dict[str, Any]:
-    return {
-        "trial": standing.trial,
-        "start_s": standing.start,
-        "end_s": standing.end,
-        "mass_kg": standing.mass,
-        "mass_sd_kg": standing.mass_sd,
-        "com_ahead_of_cop_m": standing.com_ahead,
-        "com_left_of_cop_m": standing.com_left,
-    }
+_STEP = "step=name status reason=text"
+_STANDING = (
+    "trial start_s=start end_s=end mass_kg=mass mass_sd_kg=mass_sd com_ahead_of_cop_m=com_ahead "
+    "com_left_of_cop_m=com_left"
+)
 
 
 def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
-    trial, fit = result.trial, result.fit
+    trial, fit, markers = result.trial, result.fit, result.trial.markers
+    seen = zip(fit.names, fit.rms, fit.max, strict=True) if fit else ()
     return {
-        "name": trial.name,
-        "role": trial.role,
-        "status": result.status,
-        "reason": result.reason,
-        "file": trial.source.path.name,
-        "marker_set": trial.worn,
-        "frames": 0 if trial.markers is None else trial.markers.time.size,
-        "rate_hz": None if trial.markers is None else trial.markers.rate,
+        **keyed(result, "name role=trial.role status reason file=trial.source.path.name marker_set=trial.worn"),
+        "frames": markers.time.size if markers else 0,
+        "rate_hz": markers.rate if markers else None,
         "gaps_percent": result.gaps_percent,
-        "gaps": [
-            {"marker": g.label, "percent": g.percent, "longest_s": g.longest} for g in result.gaps if g.percent > 0
-        ],
-        "marker_rms_m": None if fit is None else fit.total_rms,
-        "marker_rms_by_group_m": None if fit is None else dict(fit.by_group),
-        "marker_max_m": None if fit is None else fit.total_max,
-        "markers": []
-        if fit is None
-        else [{"name": n, "rms_m": r, "max_m": m} for n, r, m in zip(fit.names, fit.rms, fit.max, strict=True)],
-        "wrench": None if result.comparison is None else _wrench(result.comparison, identified),
-        "standing": None if result.standing is None else _standing(result.standing),
-        "plates": [_plate(plate) for plate in trial.plates],
-        "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
+        "gaps": [keyed(gap, "marker=label percent longest_s=longest") for gap in result.gaps if gap.percent > 0],
+        "marker_rms_m": fit and fit.total_rms,
+        "marker_rms_by_group_m": fit and fit.by_group,
+        "marker_max_m": fit and fit.total_max,
+        "markers": [{"name": name, "rms_m": rms, "max_m": largest} for name, rms, largest in seen],
+        "wrench": result.comparison and _wrench(result.comparison, identified),
+        "standing": result.standing and keyed(result.standing, _STANDING),
+        "plates": [keyed(plate, "name type corners_m=corners decisions") for plate in trial.plates],
+        "steps": [keyed(step, _STEP) for step in result.steps],
         "history": trial.history,
         "warnings": trial.warnings,
     }
 
 
 def _mass_check(result: SessionResult) -> dict[str, Any]:
-    standing = result.standing
-    return {
-        "trial": standing.trial if standing else None,
-        "mass_on_plates_kg": standing.mass if standing else None,
-        "mass_on_plates_sd_kg": standing.mass_sd if standing else None,
-        "declared_mass_kg": result.declared_mass,
-        "difference_percent": result.mass_difference,
-    }
+    weighed = keyed(result.standing, "trial mass_on_plates_kg=mass mass_on_plates_sd_kg=mass_sd")
+    return weighed | keyed(result, "declared_mass_kg=declared_mass difference_percent=mass_difference")
 
 
 def _optional_joints(shown: ShownJoints) -> dict[str, Any]:
     """Return what each joint beyond the 23 axes brings: to its markers (mm), and all to the vertical force (N)."""
-    return {
-        "optional_joints": [
-            {
-                "joint": gain.name,
-                "taken": gain.taken,
-                "markers": gain.markers,
-                "fitted_mm": 1000 * gain.fitted,
-                "held_out_without_mm": 1000 * gain.without,
-                "held_out_with_mm": 1000 * gain.with_it,
-            }
-            for gain in shown.gains
-        ],
-        "optional_joints_force": [
-            {"trial": one.trial, "rms_without_N": one.without, "rms_with_N": one.with_them} for one in shown.forces
-        ],
-    }
+    joints = [
+        keyed(gain, "joint=name taken markers")
+        | {
+            "fitted_mm": 1000 * gain.fitted,
+            "held_out_without_mm": 1000 * gain.without,
+            "held_out_with_mm": 1000 * gain.with_it,
+        }
+        for gain in shown.gains
+    ]
+    forces = [keyed(one, "trial rms_without_N=without rms_with_N=with_them") for one in shown.forces]
+    return {"optional_joints": joints, "optional_joints_force": forces}
 
 
 def results_document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
     """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this
     version.
     """
-    subject, found = result.subject, result.identification
+    found = result.identification
+    agreements = found.agreements if found else {}
     return {
         "session": result.session.folder.name,
-        "subject": {
-            "name": subject.name,
-            "mass_kg": subject.mass,
-            "height_m": subject.stature,
-            "sex": subject.sex,
-            "age": subject.age,
-            "guessed": subject.guessed,
-        },
-        "trials": [_trial(trial, found.agreements.get(trial.trial.name) if found else None) for trial in result.trials],
-        "refused": dict(result.session.refused),
+        "subject": keyed(result.subject, "name mass_kg=mass height_m=stature sex age guessed"),
+        "trials": [_trial(trial, agreements.get(trial.name)) for trial in result.trials],
+        "refused": result.session.refused,
         "notes": result.session.notes,
         "body": {
             "source": result.body_source,
             "notes": result.body.notes if result.body else (),
             **_optional_joints(result.shown_joints),
         },
-        "steps": [{"step": s.name, "status": s.status, "reason": s.text} for s in result.steps],
+        "steps": [keyed(step, _STEP) for step in result.steps],
         "checks": [vars(check) for check in result.all_checks],
         "mass_check": _mass_check(result),
-        "identification": None if found is None else identification_document(found),
-        "added_mass": None if found is None else added_mass_document(found.search),
+        "identification": found and identification_document(found),
+        "added_mass": found and added_mass_document(found.search),
         "diagnosis": None,
         "provenance": provenance.as_dict(),
     }

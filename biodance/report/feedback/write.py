@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
@@ -18,7 +19,8 @@ from biodance.dance.telling import telling_of
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, side_in_name
-from biodance.report.pages.template import three_js
+from biodance.report.files import refuse_page, write_files
+from biodance.report.pages.template import render, template_text, three_js
 from biodance.version import __version__
 
 _POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
@@ -79,8 +81,8 @@ def _called(segment: str) -> str:
     return segment.replace("_head", " and head").replace("_hand", " and hand").replace("_", " ")
 
 
-def _packed(values: "np.ndarray[Any, Any]") -> str:
-    return b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
+def _packed(values: ArrayLike, kind: str = "<f4") -> str:
+    return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
 
 
 def _points(body: Body) -> list[dict[str, Any]]:
@@ -144,28 +146,24 @@ def scene_of(dance: Dance) -> dict[str, Any]:
             f"The dance goes {np.abs(place).max() / _FACTOR:.1f} m from the lab origin; the page shows 3.2 m about it."
         )
     turn = Rotation.from_matrix(pose.rotation[:, chosen].reshape(-1, 3, 3)).as_quat().reshape(*place.shape[:2], 4)
-    packed = np.round(np.concatenate([place, 32767 * turn], axis=2)).astype("<i2")
+    placed = np.round(np.concatenate([place, 32767 * turn], axis=2))
     return {
         "name": dance.protocol,
         "duration_s": dance.duration,
         "rate_hz": _RATE,
-        "frames": len(packed),
+        "frames": len(placed),
         "segments": [
             {
                 "name": name,
                 "side": side_in_name(name, ""),
-                "vertices": _text(np.asarray(solids[name].vertices).astype("<f4")),
-                "faces": _text(np.asarray(solids[name].faces).astype("<u2")),
+                "vertices": _packed(solids[name].vertices),
+                "faces": _packed(solids[name].faces, "<u2"),
             }
             for name in (dance.body.segments[k] for k in chosen)
         ],
-        "poses": _text(packed),
+        "poses": _packed(placed, "<i2"),
         "cues": _cues(dance),
     }
-
-
-def _text(values: "np.ndarray[Any, Any]") -> str:
-    return b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
 def _cues(dance: Dance) -> list[dict[str, Any]]:
@@ -215,16 +213,11 @@ def write_feedback(dance: Dance, path: Path, *, force: bool = False) -> bool:
         There is a file of that name and ``force`` was not given, the folder is missing, the dance is that of a robot
         without solids, or the drawing library is missing.
     """
-    if path.exists() and not force:
-        raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
-    if not path.parent.is_dir():
-        raise BiodanceError(f"{path.parent}: there is no such folder. Make it, or choose another --out.")
+    refuse_page(path, force=force)
     scene, carried = scene_of(dance), bundle()
     scene["follow"] = follow_scene(dance) if carried else None
     page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None)
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(page, encoding="utf-8", newline="\n")
-    part.replace(path)
+    write_files(path.parent, {path.name: page})
     return scene["follow"] is not None
 
 
@@ -239,23 +232,16 @@ def bundle() -> dict[str, str] | None:
 
 def feedback_page(name: str, scene: dict[str, Any], carried: dict[str, str] | None) -> str:
     """Return the page of a dance as HTML text: what it shows (`scene_of`), and what follows the person, or None."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    folder = files("biodance.report") / "templates"
-
-    def text(name: str) -> Markup:
-        return Markup((folder / name).read_text(encoding="utf-8"))
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    text_of_scene = json.dumps(scene, separators=(",", ":")).replace("</", "<\\/")
-    return environment.from_string(text("feedback.html.j2")).render(
+    return render(
+        "feedback.html.j2",
         name=name.replace("_", " "),
         version=__version__,
-        style=text("feedback.css"),
-        program=text("feedback.js"),
+        style=Markup(template_text("feedback.css")),
+        program=Markup(template_text("feedback.js")),
         three=Markup(three_js()),
-        scene=Markup(text_of_scene),
+        scene=Markup(json.dumps(scene, separators=(",", ":")).replace("</", "<\\/")),
         bundle={key: Markup(value) for key, value in carried.items()} if carried else None,
-        following=text("follow_body.js") + text("follow.js"),
+        following=Markup(template_text("follow_body.js") + template_text("follow.js")),
     )

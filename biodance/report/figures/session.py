@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from biodance.display import BLACK, GREEN, GREY
 from biodance.identification.validation import TrialValidation
-from biodance.pipeline.trial_result import MarkerFit, QuietStanding, WrenchComparison
+from biodance.motion.quiet_standing import QuietStanding
+from biodance.pipeline.trial_result import MarkerFit, WrenchComparison
 from biodance.records import CHANNEL_TITLES, Array
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import (

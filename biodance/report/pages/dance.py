@@ -1,7 +1,5 @@
 """The cards of a dance: a page to print, a picture and the instructions of every posture on a card of its own."""
 
-from pathlib import Path
-
 import numpy as np
 from scipy.spatial import ConvexHull
 
@@ -13,6 +11,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult
 from biodance.records import Array
 from biodance.report.figures.style import SIDE_COLOURS
+from biodance.report.pages.template import render
 
 _VIEWS = (("from the front", (1.0, 0.0)), ("from the right", (0.0, -1.0)))
 """Where the eye is in the horizontal plane, for a person who faces lab x."""
@@ -58,7 +57,6 @@ def _colour(segment: str) -> str:
 
 def cards_page(result: DanceResult) -> str:
     """Return the page (HTML) of a dance that keeps its limits."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     dance = result.dance
@@ -73,9 +71,8 @@ def cards_page(result: DanceResult) -> str:
         cues.append(
             {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said, "picture": picture}
         )
-    folder = Path(__file__).parents[1] / "templates"
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string((folder / "cues.html.j2").read_text(encoding="utf-8")).render(
+    return render(
+        "cues.html.j2",
         name=dance.protocol,
         count=len(cues),
         minutes=f"{dance.duration / 60:.1f} minutes",

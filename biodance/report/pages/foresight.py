@@ -1,9 +1,7 @@
 """The page of what a planned movement will see: a summary, what to change, and every cause."""
 
-from pathlib import Path
 from typing import Any
 
-from biodance.errors import BiodanceError
 from biodance.pipeline.provenance import now
 from biodance.report.pages.template import render
 from biodance.report.wording import size_seen
@@ -11,14 +9,6 @@ from biodance.version import __version__
 
 _NAMED = 6
 """Targets of a cause that are listed by name."""
-
-
-def refuse_page(path: Path, *, force: bool) -> None:
-    """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
-    if path.exists() and not force:
-        raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
-    if not path.parent.is_dir():
-        raise BiodanceError(f"{path.parent}: there is no such folder. Make it, or choose another --out.")
 
 
 def foresight_page(document: dict[str, Any], name: str) -> str:

@@ -1,6 +1,5 @@
 """The page of a laboratory's plates: what changed when, what is wrong, who stands out."""
 
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +12,11 @@ from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
+from biodance.report.documents.plain import plain_values, to_text
 from biodance.report.documents.plates import plates_document
-from biodance.report.documents.session import plain_values, to_text
 from biodance.report.figures.style import figure, look, svg_address
+from biodance.report.files import write_files
+from biodance.report.pages.template import render, template_text
 from biodance.version import __version__
 
 if TYPE_CHECKING:
@@ -95,15 +96,13 @@ def condition_figure(one: ConditionEffect) -> "Figure":
 
 def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
     """Return the page as HTML text."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     judged = found.judgement
     count = len(judged.findings)
-    folder = files("biodance.report") / "templates"
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string((folder / "plates.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "page.css").read_text(encoding="utf-8")),
+    return render(
+        "plates.html.j2",
+        style=Markup(template_text("page.css")),
         name=document["archive"],
         version=__version__,
         created=now(),
@@ -136,8 +135,5 @@ def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
         "report.html": plates_page(found, document),
         "plates.csv": found.table().to_csv(index=False, lineterminator="\n"),
     }
-    for name, text in texts.items():
-        part = folder / f".{name}.part"
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(folder / name)
+    write_files(folder, texts)
     return dict(plain_values(document))

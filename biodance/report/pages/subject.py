@@ -3,7 +3,6 @@
 from base64 import b64encode
 from collections.abc import Mapping
 from html import escape
-from importlib.resources import files
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from biodance.motion.kinematics import poses
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.records import Array
+from biodance.report.pages.template import render, template_text
 
 _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}
 """rad: arms and legs a little away from the body, so that no part hides another."""
@@ -125,22 +125,19 @@ def kilograms(part: PartMass) -> str:
 
 def subject_page(account: SubjectAccount) -> str:
     """Return the page as HTML text; the same account gives the same characters."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    folder = files("biodance.report") / "templates"
-    parts = [(_name(part), kilograms(part), part) for part in account.parts]
     visit = account.visit
-    return environment.from_string((folder / "subject.html.j2").read_text(encoding="utf-8")).render(
-        style=Markup((folder / "subject.css").read_text(encoding="utf-8")),
+    return render(
+        "subject.html.j2",
+        style=Markup(template_text("subject.css")),
         account=account,
         facts=[
             (what, str(value)[:10] if what == "Date" else value)
             for what, value in (("Lab", visit.lab), ("Done by", visit.operator), ("Date", visit.date))
             if value
         ],
-        parts=parts,
+        parts=[(_name(part), kilograms(part), part) for part in account.parts],
         picture=_picture(account),
         weight=_between(*account.weight) if np.isfinite(account.weight[0]) else "",
         together=(_name(account.together), kilograms(account.together)) if account.together else None,

@@ -55,17 +55,19 @@ def template_text(name: str) -> str:
     return (files("biodance.report") / "templates" / name).read_text(encoding="utf-8")
 
 
-def render(name: str, *, filters: dict[str, Any] | None = None, scripts: Sequence[str] = (), **values: Any) -> str:
+def render(
+    template: str, /, *, filters: dict[str, Any] | None = None, scripts: Sequence[str] = (), **values: Any
+) -> str:
     """Return a template filled with ``values`` as HTML text; the same arguments give the same characters.
 
-    Every template knows ``style`` and ``policy`` (what its page may do: nothing of the network, and only ``scripts``),
-    ``scripts``, and the filters ``number`` and ``mm``.
+    Every template knows ``style`` (of the analyst's page, unless another one is among the values), ``policy`` (what its
+    page may do: nothing of the network, and only ``scripts``), ``scripts``, and the filters ``number`` and ``mm``.
     """
     from markupsafe import Markup
 
     style = template_text("page.css") + template_text("curves.css")
     given = {"style": Markup(style), "policy": _policy(scripts), "scripts": [Markup(text) for text in scripts]}
-    return _compiled(name, tuple((filters or {}).items())).render(**{**given, **values})
+    return _compiled(template, tuple((filters or {}).items())).render(**{**given, **values})
 
 
 @functools.cache

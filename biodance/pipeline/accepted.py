@@ -1,97 +1,35 @@
-"""What one session gives to the next: an accepted body, accepted corrections of the force plates, corrected trials,
-and a copy in which exchanged labels are put right.
-"""
+"""What accepting the findings of a session writes: corrected trials, and copies with exchanged labels put right."""
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from biodance.body.body import Body
-from biodance.body.body_file import read_body
-from biodance.cycles.curves import NormalCurve, normal_of
 from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import Gate, Recorded, gates
 from biodance.effects.labels_swapped import exchanges, renamed
-from biodance.errors import BiodanceError, FileRefused
+from biodance.errors import BiodanceError
 from biodance.lab.c3d.ezc3d_object import write_trial
 from biodance.lab.c3d.results import write_relabelled
 from biodance.lab.corrections import (
     APPLIED,
-    LASTING,
     PARAMETER_OF,
     PlateCorrection,
-    corrected_session,
     corrected_trial,
     corrections_text,
     joined_corrections,
-    read_corrections,
 )
-from biodance.library import read_toml
-from biodance.pipeline.looked_at import all_looks, cases_of
+from biodance.pipeline.judged_trials import all_looks, cases_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Session
-from biodance.uncertainty.tolerances import Tolerances, tolerances_of
 
-LAB, CORRECTED = "lab.toml", "corrected"
-"""File with the accepted corrections of a laboratory, and folder with the trials that were corrected."""
-
-
-@dataclass(frozen=True, eq=False)
-class LabFile:
-    """What a lab.toml says: ``corrections`` of the plates, ``tolerances`` of the laboratory's own or None, and the
-    ``normal`` bands of its people.
-    """
-
-    corrections: tuple[PlateCorrection, ...] = ()
-    tolerances: Tolerances | None = None
-    normal: tuple[NormalCurve, ...] = ()
-
-    def corrected(self, session: Session) -> Session:
-        """Return a session as read, corrected."""
-        return corrected_session(session, self.corrections) if self.corrections else session
-
-
-NO_LAB = LabFile()
-
-
-def read_lab(path: str | Path | None) -> LabFile:
-    """Return what the file of a laboratory says; nothing without a file.
-
-    Raises
-    ------
-    FileRefused
-        It cannot be read, or says what cannot be corrected.
-    """
-    if path is None:
-        return NO_LAB
-    corrections = read_corrections(path)
-    whole = read_toml(Path(path))
-    raw, where = whole.get("tolerances"), "norms"
-    try:
-        norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}
-        where = "tolerances"
-        known, where = replace(tolerances_of(raw), norms=norms) if raw else None, "normal"
-        return LabFile(corrections, known, normal_of(whole.get("normal", {})))
-    except (KeyError, TypeError, ValueError, BiodanceError) as error:
-        raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error
-
-
-def known_body(body: Body | str | Path | None) -> Body | None:
-    """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one.
-
-    Raises
-    ------
-    FileRefused
-        The file is no body.
-    """
-    if body is None or isinstance(body, Body):
-        return body
-    path = Path(body)
-    return read_body(path / "body.json" if path.is_dir() else path)[0]
+CORRECTED = "corrected"
+"""Folder with the trials that were corrected."""
+_ROUNDS = 3
+"""How often exchanged labels are looked for again: a static trial that was wrong hides others."""
 
 
 def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[PlateCorrection, ...]:
@@ -102,14 +40,6 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
         if size is not None and np.isfinite(size.value):
             out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
     return tuple(out)
-
-
-def lab_text(earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrection, ...]) -> str:
-    """Return the lab.toml that holds what was corrected ``earlier`` and what lasts of what was ``accepted``; "" for
-    nothing.
-    """
-    lasting = tuple(one for one in accepted if one.effect in LASTING)
-    return corrections_text(joined_corrections(earlier, lasting))
 
 
 def write_corrected(
@@ -147,10 +77,6 @@ def _session_toml(session: Session) -> str:
     for trial in session.trials:
         lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"']
     return "\n".join(lines) + "\n"
-
-
-_ROUNDS = 3
-"""How often exchanged labels are looked for again: a static trial that was wrong hides others."""
 
 
 def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> tuple[SessionResult, tuple[Gate, ...]]:

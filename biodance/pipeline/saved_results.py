@@ -80,6 +80,20 @@ def kept_body(folder: Path) -> Path:
     )
 
 
+def known_body(body: Body | str | Path | None) -> Body | None:
+    """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one.
+
+    Raises
+    ------
+    FileRefused
+        The file is no body.
+    """
+    if body is None or isinstance(body, Body):
+        return body
+    path = Path(body)
+    return read_body(path / "body.json" if path.is_dir() else path)[0]
+
+
 def read_kept(folder: Path) -> KeptResults:
     """Return what a results folder keeps.
 

@@ -5,6 +5,8 @@ weight: two checks that need no model of motion. Quiet is the longest run in whi
 percent of its median.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,13 +14,38 @@ from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.weight import movement
 from biodance.motion.kinematics import centre_of_mass, in_blocks, poses
-from biodance.pipeline.trial_result import QuietStanding
 from biodance.records import Array, Markers, Motion, Trial, longest_run
 from biodance.settings import StandingRules
 
 FOOT_LANDMARKS = tuple(
     f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral")
 )
+
+
+@dataclass(frozen=True, eq=False)
+class QuietStanding:
+    """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g),
+    ``mass_sd`` kg.
+
+    ``cop`` and ``com`` (T, 2) m, horizontal lab coordinates of the centre of pressure and of the table's centre of mass
+    (``com`` empty without a tracked motion); ``forward`` (2,) unit vector the subject faces; ``com_ahead``,
+    ``com_left`` m: mean of CoM minus CoP along it and to its left; ``feet`` (F, 2) m foot landmarks and their
+    ``foot_names`` (``left_heel`` ...); ``plates`` (P, 4, 2) m corners.
+    """
+
+    trial: str
+    start: float
+    end: float
+    mass: float
+    mass_sd: float
+    cop: Array
+    com: Array
+    forward: Array
+    com_ahead: float
+    com_left: float
+    feet: Array
+    foot_names: tuple[str, ...]
+    plates: Array
 
 
 def quiet_run(

@@ -9,9 +9,10 @@ from diagnosed_sessions import RATE, body, known, looks, motion
 from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.own_tolerances import UNREST, own_tolerances, soft_tissue, unrest
 from biodance.diagnosis.problem import Look
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.looked_at import UNREST, left_out, looked_at, own_tolerances, soft_tissue, unrest
+from biodance.pipeline.judged_trials import chosen_looks, left_out
 from biodance.pipeline.trial_result import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench
 from biodance.uncertainty.bands import BANDS
@@ -56,14 +57,14 @@ def test_standing_is_looked_at_where_movement_is_short() -> None:
     moving, quiet = looks(1, trials=1)[0], standing(np.zeros((150, 6)))
     short = np.zeros(moving.use.size, dtype=bool)
     short[100:140] = True
-    assert [look.trial.name for look in looked_at((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
+    assert [look.trial.name for look in chosen_looks((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
     some = (result(quiet, "static"), result(moving, "fit", short))
-    assert [look.trial.name for look in looked_at(some)] == ["static", "t0"]
+    assert [look.trial.name for look in chosen_looks(some)] == ["static", "t0"]
     assert left_out(some) == (
         "t0 was left out: no 1 s in which the plates measure all ground contact without a break.",
     )
-    assert looked_at(some)[0].start == 0.0
-    assert looked_at(some)[1].end == 1.0
+    assert chosen_looks(some)[0].start == 0.0
+    assert chosen_looks(some)[1].end == 1.0
 
 
 def test_the_unrest_of_standing_is_measured_and_bounded() -> None:

@@ -1,0 +1,120 @@
+"""The tolerances that hold for some recordings: the learned ones, with what these recordings show of their own skin,
+cameras, plates and quiet standing.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.diagnosis.problem import Look
+from biodance.diagnosis.spectrum import spectrum, thinned
+from biodance.identification.statistics import standing_point
+from biodance.records import Array, Trial
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.session_noise import added_noise, of_zeros, with_own_noise, with_zeros
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
+
+_POSTURES = 4
+"""Postures in which the way from marker noise to wrench is computed."""
+MORE = 1.6
+"""So many times as large it must be before soft tissue is believed to be larger than theirs (five real walks: 2.4 to
+4.8 times).
+"""
+_TOO_FAR = 4.0
+"""So many times as far from the body, markers are no longer those of the segments that they are named after: nothing is
+named. (Soft tissue made 2 to 3 times as large in an independent laboratory: 1.6 to 2.6.)
+"""
+_SOFT = (
+    *("flesh ", "sag ", "slide ", "tilt ", "marker ", "joint_centre ", "segment_length ", "marker_misplaced "),
+    *("wobbling_mass ", "shown "),
+)
+"""Keys of the tolerances that grow with it."""
+SWAYING = 0.3
+"""Hz: above, what a person who stands still does to the plates is heart, breath and muscles, which no marker shows."""
+UNREST = 1.5
+"""N, N·m RMS per band and channel: no more than this is taken for it (three real persons: up to 0.8 N and 0.7 N·m)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Own:
+    """``tolerances`` that hold for some recordings, ``notes`` on what changed, and whether a name found under them
+    is ``believed``.
+    """
+
+    tolerances: Tolerances
+    notes: tuple[str, ...] = ()
+    believed: bool = True
+
+
+def own_tolerances(
+    body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, ...] = (), *, known: Tolerances | None = None
+) -> Own:
+    """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
+    recordings: with markers that move more on the body than where they were learned, with the noise of their own
+    cameras and plates as ``recorded`` shows it, with the unrest of a person who stands still where standing is looked
+    at, and with trial means no surer than a plate's zero.
+    """
+    found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
+    tracked = [look for look in chosen if look.motion.q.size]
+    if recorded and tracked:
+        middle = np.array([look.motion.q[len(look.motion.q) // 2] for look in tracked[:_POSTURES]])
+        about = standing_point(tuple(look.fit for look in chosen))
+        found = with_own_noise(found, added_noise(body, recorded, middle, about, known=found.instruments), mass)
+    factor = soft_tissue(chosen) / found.instruments.distance
+    if factor > MORE:
+        found = widened_by(found, factor)
+        notes.append(
+            f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first "
+            f"quartile): soft tissue and joints, and what they leave in the forces, were taken for so many times as "
+            f"large, and a fault must be larger to be seen. Tolerances learned on sessions of your own laboratory "
+            f"without fault (biodance learn) hold for it."
+        )
+    standing = tuple(look for look in chosen if look.trial.role == "static" and look.seconds > 0)
+    if standing:
+        shaken = unrest(body, standing, standing_point(tuple(look.fit for look in chosen)))
+        found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / mass) ** 2)
+        size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
+        notes.append(
+            f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
+            f"{size[3:].max():.1f} N·m above {SWAYING:g} Hz (heart, breath, muscles; root mean square), which no "
+            f"marker shows: a fault must be larger to be seen."
+        )
+    zeros = of_zeros([run for look in chosen for run in look.runs])
+    return Own(with_zeros(found, zeros, mass), tuple(notes), believed=factor <= _TOO_FAR)
+
+
+def widened_by(known: Tolerances, factor: float) -> Tolerances:
+    """Return tolerances for soft tissue and joints ``factor`` times as large: their sizes, and what they leave in the
+    wrench beyond them; the mean force is weight, whatever the skin does.
+    """
+    sizes = {key: size * (factor if key.startswith(_SOFT) else 1.0) for key, size in known.sizes.items()}
+    more = np.full((len(known.noise), 6), factor)
+    more[0, :3] = 1.0
+    return replace(known, sizes=sizes, noise=known.noise * more[:, :, None] * more[:, None, :])
+
+
+def soft_tissue(chosen: tuple[Look, ...]) -> float:
+    """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are
+    wrong do not count.
+    """
+    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and look.seconds > 0]
+    with np.errstate(invalid="ignore"):
+        each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
+    return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
+
+
+def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
+    """Return (B, 6, 6) covariance of a coefficient of what standing still leaves above `SWAYING`, per band, moments
+    about ``about`` (3,) m; zero below.
+    """
+    cases, uses = zip(*(thinned(look.case(body, body.sip.phi), look.use) for look in standing), strict=True)
+    where = spectrum(cases, uses, about)
+    left = where.rows(tuple(case.residual[:, :, None] for case in cases))[:, :, 0]
+    out = np.zeros((len(BANDS), 6, 6))
+    for b in np.flatnonzero(np.array(BANDS.edges[:-1]) >= SWAYING):
+        here = left[where.band == b]
+        size = np.sqrt(np.sum(here**2, axis=0) / (BANDS.rate * where.seconds))
+        believed = here * np.minimum(1.0, UNREST / np.maximum(size, 1e-9))
+        out[b] = believed.T @ believed / max(1, len(here))
+    return out
