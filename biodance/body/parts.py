@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from biodance.body.inertia import shift_matter
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, known_index
 from biodance.records import Array, freeze
 from biodance.settings import STANDARD_GRAVITY
 
@@ -227,10 +227,7 @@ class JointTree:
         >>> result.body.joint_index("right_hip_flexion")
         0
         """
-        names = tuple(joint.name for joint in self.joints)
-        if name not in names:
-            raise UnknownName.of("joint", name, names)
-        return names.index(name)
+        return known_index("joint", name, [joint.name for joint in self.joints])
 
     def segment_index(self, name: str) -> int:
         """Return the index of a segment by name.
@@ -255,6 +252,4 @@ class JointTree:
         >>> result.body.segment_index("pelvis")
         0
         """
-        if name not in self.segments:
-            raise UnknownName.of("segment", name, self.segments)
-        return self.segments.index(name)
+        return known_index("segment", name, self.segments)
