@@ -49,8 +49,8 @@ class Part:
 
     ``segment`` index of the segment that it is a piece of, whose inertial parameters go on meaning the whole, in the
     neutral posture; ``share`` (10,) the ten parameters of the piece, in its own frame (axes of the segment, origin at
-    its joint), for one kilogram of the whole: of what the whole weighs the piece has its share, whatever else the whole
-    has otherwise than the table is in the rest.
+    its joint), for one kilogram of the whole: the piece has its share of the mass, and whatever else of the whole
+    differs from the table is in the rest.
     """
 
     name: str
@@ -163,6 +163,14 @@ class JointTree:
         """Index in `joints` of the joint that carries each of the `links`, (N + P); -1 for the root's segment."""
         carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
         return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
+
+    @cached_property
+    def paths(self) -> tuple[tuple[int, ...], ...]:
+        """Of every joint the indices of the joints from the root to it, itself last."""
+        paths: list[tuple[int, ...]] = []
+        for index, joint in enumerate(self.joints):
+            paths.append((*(paths[joint.parent] if joint.parent >= 0 else ()), index))
+        return tuple(paths)
 
     def place_on_segment(self, joint: int) -> tuple[int, Array]:
         """Return which segment a joint hangs on, and where.
