@@ -103,6 +103,13 @@ class UnknownName(BiodanceError):
         return cls(f"{name!r} is not {article} {kind}.{hint} Legal: {', '.join(sorted(legal)) or 'none'}.")
 
 
+def known_index(kind: str, name: str, legal: list[str] | tuple[str, ...]) -> int:
+    """Return where a ``name`` of some ``kind`` stands among the ``legal`` ones; UnknownName where it is none."""
+    if name not in legal:
+        raise UnknownName.of(kind, name, legal)
+    return legal.index(name)
+
+
 class MissingLibrary(BiodanceError):
     """A third-party library that this step needs does not load on this machine; says how to mend it.
 

@@ -46,10 +46,10 @@ def parse_body(text: str, where: str) -> tuple[Body, str]:
         The text is of another version or is not such a body.
     """
     try:
-        found: dict[str, Any] = json.loads(text)
-        if found.get("biodance_body") != _VERSION:
+        raw: dict[str, Any] = json.loads(text)
+        if raw.get("biodance_body") != _VERSION:
             raise FileRefused(f"{where}: is no body of version {_VERSION}. Run biodance identify again.")
-        return _body(found), str(found["source"])
+        return _body(raw), str(raw["source"])
     except FileRefused:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, BiodanceError) as error:
@@ -58,31 +58,24 @@ def parse_body(text: str, where: str) -> tuple[Body, str]:
         ) from error
 
 
-def _body(found: dict[str, Any]) -> Body:
+def _body(raw: dict[str, Any]) -> Body:
+    worn = raw["markers"]
+    place = np.reshape(worn["position"], (-1, 3))  # a robot may have none
     return Body(
-        name=found["name"],
-        segments=tuple(found["segments"]),
-        joints=tuple(Joint(**joint) for joint in found["joints"]),
-        sip=_sip(found["sip"]),
-        limits=JointLimits(**found["limits"]),
-        markers=_markers(found["markers"]),
-        boxes=found["boxes"],
-        com_boxes=found["com_boxes"],
-        feet={side: Foot(**foot) for side, foot in found["feet"].items()},
-        root=found["root"],
-        notes=tuple(found["notes"]),
-        joint_errors=tuple(JointError(*error) for error in found["joint_errors"]),
-        **({"gravity": found["gravity"]} if "gravity" in found else {}),
-        at_joint=_sip(found["at_joint"]) if found.get("at_joint") else None,
-        girths={segment: tuple(said) for segment, said in found.get("girths", {}).items()},
-        parts=tuple(Part(**part) for part in found.get("parts", ())),
+        name=raw["name"],
+        segments=tuple(raw["segments"]),
+        joints=tuple(Joint(**joint) for joint in raw["joints"]),
+        sip=Sip(**raw["sip"]),
+        limits=JointLimits(**raw["limits"]),
+        markers=SegmentMarkers(tuple(worn["names"]), tuple(worn["segment"]), place, np.array(worn["weight"])),
+        boxes=raw["boxes"],
+        com_boxes=raw["com_boxes"],
+        feet={side: Foot(**foot) for side, foot in raw["feet"].items()},
+        root=raw["root"],
+        notes=tuple(raw["notes"]),
+        joint_errors=tuple(JointError(*error) for error in raw["joint_errors"]),
+        **({"gravity": raw["gravity"]} if "gravity" in raw else {}),
+        at_joint=Sip(**raw["at_joint"]) if raw.get("at_joint") else None,
+        girths={segment: tuple(names) for segment, names in raw.get("girths", {}).items()},
+        parts=tuple(Part(**part) for part in raw.get("parts", ())),
     )
-
-
-def _sip(found: dict[str, Any]) -> Sip:
-    return Sip(**{**found, "segments": tuple(found["segments"])})
-
-
-def _markers(found: dict[str, Any]) -> SegmentMarkers:
-    place = np.reshape(found["position"], (-1, 3))  # a robot may have none
-    return SegmentMarkers(tuple(found["names"]), tuple(found["segment"]), place, np.array(found["weight"]))

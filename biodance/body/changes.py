@@ -133,10 +133,9 @@ def with_axis(body: Body, after: str, name: str, axis: Array) -> Body:
     k = body.joint_index(after)
     old = body.joints[k]
     jointed = _jointed(body, Cut("", "", {name: axis}, np.zeros(3), np.zeros(10), ()), old.segment, old.segment)
-    joints = list(jointed.joints)
+    joints = [j if j.parent != k or i == k + 1 else replace(j, parent=k + 1) for i, j in enumerate(jointed.joints)]
     joints[k] = replace(joints[k], segment=-1)
-    hung = [j if j.parent != k or i == k + 1 else replace(j, parent=k + 1) for i, j in enumerate(joints)]
-    return replace(jointed, joints=tuple(hung))
+    return replace(jointed, joints=tuple(joints))
 
 
 def parts_as_segments(body: Body) -> Body:

@@ -40,7 +40,9 @@ def written_in(body: Body, segment: int, turn: Array, shift: Array) -> Body:
     place = np.where(on, (body.markers.position - shift) @ turn, body.markers.position)
     boxes, com_boxes = np.array(body.boxes), np.array(body.com_boxes)
     for some in (boxes, com_boxes):
-        some[segment] = _turned_box(some[segment] - shift, turn.T)
+        low, high = some[segment] - shift
+        corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+        some[segment] = (corners @ turn).min(axis=0), (corners @ turn).max(axis=0)
     return replace(
         body,
         joints=joints,
@@ -50,9 +52,3 @@ def written_in(body: Body, segment: int, turn: Array, shift: Array) -> Body:
         com_boxes=com_boxes,
         feet=feet,
     )
-
-
-def _turned_box(box: Array, turn: Array) -> Array:
-    """Return the smallest box (2, 3) along the axes around a ``box`` (2, 3) turned by ``turn`` (3, 3) = new_R_old."""
-    corners = np.array([[box[i, 0], box[j, 1], box[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) @ turn.T
-    return np.stack([corners.min(axis=0), corners.max(axis=0)])

@@ -51,12 +51,15 @@ def inertial_parameters(lump: RigidInertia) -> Array:
 
 
 def rigid_inertia(phi: Array) -> RigidInertia:
-    """Return the lump of ten parameters; the inverse of ``parameters`` for a positive mass."""
+    """Return the lump of ten parameters; the inverse of `inertial_parameters` for a positive mass."""
     com = phi[1:4] / phi[0]
-    about_origin = np.zeros((3, 3))
-    for value, (i, j) in zip(phi[4:], TENSOR, strict=True):
-        about_origin[i, j] = about_origin[j, i] = value
-    return RigidInertia(float(phi[0]), com, about_origin - phi[0] * _steiner(com))
+    return RigidInertia(float(phi[0]), com, _tensor(phi[4:]) - phi[0] * _steiner(com))
+
+
+def _tensor(moments: Array) -> Array:
+    """Return the tensor (3, 3) of Ixx, Ixy, Iyy, Ixz, Iyz, Izz (6,)."""
+    xx, xy, yy, xz, yz, zz = moments
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _pseudo_inertia_map() -> Array:
@@ -128,7 +131,4 @@ def parameter_jacobian(lump: RigidInertia) -> Array:
 
 def lump_from(row: Array) -> RigidInertia:
     """Return the segment of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz]; the inverse of `primitives_of`."""
-    inertia = np.zeros((3, 3))
-    for value, (i, j) in zip(row[4:], TENSOR, strict=True):
-        inertia[i, j] = inertia[j, i] = row[0] * value
-    return RigidInertia(float(row[0]), row[1:4], inertia)
+    return RigidInertia(float(row[0]), row[1:4], row[0] * _tensor(row[4:]))

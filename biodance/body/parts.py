@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from biodance.body.inertia import shift_matter
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, known_index
 from biodance.records import Array, freeze
 from biodance.settings import STANDARD_GRAVITY
 
@@ -49,8 +49,8 @@ class Part:
 
     ``segment`` index of the segment that it is a piece of, whose inertial parameters go on meaning the whole, in the
     neutral posture; ``share`` (10,) the ten parameters of the piece, in its own frame (axes of the segment, origin at
-    its joint), for one kilogram of the whole: of what the whole weighs the piece has its share, whatever else the whole
-    has otherwise than the table is in the rest.
+    its joint), for one kilogram of the whole: the piece has its share of the mass, and whatever else of the whole
+    differs from the table is in the rest.
     """
 
     name: str
@@ -164,6 +164,14 @@ class JointTree:
         carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
         return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
 
+    @cached_property
+    def paths(self) -> tuple[tuple[int, ...], ...]:
+        """Of every joint the indices of the joints from the root to it, itself last."""
+        paths: list[tuple[int, ...]] = []
+        for index, joint in enumerate(self.joints):
+            paths.append((*(paths[joint.parent] if joint.parent >= 0 else ()), index))
+        return tuple(paths)
+
     def place_on_segment(self, joint: int) -> tuple[int, Array]:
         """Return which segment a joint hangs on, and where.
 
@@ -227,10 +235,7 @@ class JointTree:
         >>> result.body.joint_index("right_hip_flexion")
         0
         """
-        names = tuple(joint.name for joint in self.joints)
-        if name not in names:
-            raise UnknownName.of("joint", name, names)
-        return names.index(name)
+        return known_index("joint", name, [joint.name for joint in self.joints])
 
     def segment_index(self, name: str) -> int:
         """Return the index of a segment by name.
@@ -255,6 +260,4 @@ class JointTree:
         >>> result.body.segment_index("pelvis")
         0
         """
-        if name not in self.segments:
-            raise UnknownName.of("segment", name, self.segments)
-        return self.segments.index(name)
+        return known_index("segment", name, self.segments)

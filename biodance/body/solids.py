@@ -1,4 +1,4 @@
-"""Closed meshes of segments: made of their boxes, of their markers, or read from a file; and what a mesh weighs.
+"""Closed meshes of segments: made of their boxes, of their markers, or read from a file; and the mass of a mesh.
 
 All meshes are `trimesh.Trimesh` in m, in the axes of their segment (x anterior, y up, z right; origin at the proximal
 joint).
@@ -48,24 +48,20 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
     The head takes `HEAD` of what is above the shoulders, in the proportions of a person (Winter 2009); segments without
     a box have none.
     """
-    parts = []
+    parts, alone = [], "head" not in body.segments
     for index, box in enumerate(body.boxes):
         if not np.all(box[1] > box[0]):
             continue
         arms = [joint.translation[1] for joint in body.joints if joint.parent == body.segment_joint[index]]
         if body.segments[index] == "head":
             parts.append((index, _head_in(box, box[1, 1] - box[0, 1])))
-        elif _has_head(body, index) and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
+        elif body.segments[index] == "trunk_head" and alone and arms and box[0, 1] < np.mean(arms) < box[1, 1]:
             low = np.array(box)
             low[1, 1] = np.mean(arms) + _SHOULDER * (box[1, 1] - np.mean(arms))
             parts += [(index, low), (index, _head_in(box, _HEAD * (box[1, 1] - np.mean(arms))))]
         else:
             parts.append((index, box))
     return parts
-
-
-def _has_head(body: Body, index: int) -> bool:
-    return body.segments[index] == "trunk_head" and "head" not in body.segments
 
 
 def _head_in(box: Array, height: float) -> Array:

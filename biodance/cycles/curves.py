@@ -6,16 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.cut import PERCENT, Cycle, place_at
 from biodance.cycles.events import heel_and_toe
 from biodance.motion.contact.soles import Soles
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
-from biodance.records import SIDES, Array, Motion, frozen_array
-from biodance.records.arrays import assign
+from biodance.records import SIDES, Array, Motion, freeze
 
 _TRAVELS = 0.3
 """m that the pelvis goes in a cycle from which its way, not the way it faces, is the direction of walking."""
-_PELVIS = ("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation")
+_WHOLE = (PERCENT.size,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +32,7 @@ class CycleCurve:
     sd: Array
 
     def __post_init__(self) -> None:
-        assign(
-            self,
-            value=frozen_array(self.value, (PERCENT.size,), f"CycleCurve {self.quantity}"),
-            sd=frozen_array(self.sd, (PERCENT.size,), f"CycleCurve {self.quantity}, sd"),
-        )
+        freeze(self, f"CycleCurve {self.quantity}", value=_WHOLE, sd=_WHOLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +67,15 @@ def over_cycle(
 
 def group_curves(curves: Sequence[CycleCurve]) -> tuple[CurveGroup, ...]:
     """Return the curves of the same kind, quantity and side together, in the order in which they come."""
-    keys = dict.fromkeys((one.cycle.kind, one.quantity, one.side) for one in curves)
-    found = []
-    for kind, quantity, side in keys:
-        same = [one for one in curves if (one.cycle.kind, one.quantity, one.side) == (kind, quantity, side)]
-        values = np.stack([one.value for one in same])
-        mean, spread = mean_and_sd(values)
-        known, _ = mean_and_sd(np.stack([one.sd for one in same]))
-        found.append(CurveGroup(kind, quantity, side, same[0].unit, values, mean, spread, known))
-    return tuple(found)
+    same: dict[tuple[str, str, str], list[CycleCurve]] = {}
+    for one in curves:
+        same.setdefault((one.cycle.kind, one.quantity, one.side), []).append(one)
+    groups = []
+    for (kind, quantity, side), some in same.items():
+        values = np.stack([one.value for one in some])
+        parameters_sd, _ = mean_and_sd(np.stack([one.sd for one in some]))
+        groups.append(CurveGroup(kind, quantity, side, some[0].unit, values, *mean_and_sd(values), parameters_sd))
+    return tuple(groups)
 
 
 def mean_and_sd(values: Array) -> tuple[Array, Array]:
@@ -109,18 +104,13 @@ def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurv
 
 def seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
     """Return side, name without it and sign with which a joint belongs to a cycle; None where it does not."""
-    side, name = side_and_name(joint)
+    first, _, rest = joint.partition("_")
+    side, name = (first, rest) if first in SIDES else ("middle", joint)
     if cycle.side == "both":
         return side, name, 1.0
     if side == "middle":
         return cycle.side, name, -1.0 if cycle.side == "left" and not name.endswith("flexion") else 1.0
     return (side, name, 1.0) if side == cycle.side else None
-
-
-def side_and_name(joint: str) -> tuple[str, str]:
-    """Return side ("right", "left", "middle") and name without it of a joint or segment: ``left_knee_flexion``."""
-    side, _, name = joint.partition("_")
-    return (side, name) if side in SIDES else ("middle", joint)
 
 
 def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterator[CycleCurve]:
@@ -132,13 +122,14 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     mass: m ahead of where the cycle began, to the side of the foot, over the ground.
     """
     pose, time = poses(body, motion.q), motion.time
-    forward = _direction(cycle, pose, time)
-    mirror = -1.0 if cycle.side == "left" else 1.0
+    x, y = _direction(cycle, pose, time)
+    frame = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
+    middle, mirror = "middle" if cycle.side == "both" else cycle.side, -1.0 if cycle.side == "left" else 1.0
     known = np.where(motion.determined, 1.0, np.nan)
-    right = np.array([forward[1], -forward[0], 0.0])
-    frame = np.stack([np.array([*forward, 0.0]), np.array([0.0, 0.0, 1.0]), right])
-    for name, angle in zip(_PELVIS, _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True):
-        yield over_cycle(cycle, name, "middle" if cycle.side == "both" else cycle.side, "deg", time, known * angle)
+    for name, angle in zip(
+        ("tilt", "obliquity", "rotation"), _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True
+    ):
+        yield over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
     heel, toe = heel_and_toe(body, soles.outline)
     for foot, side in enumerate(SIDES):
         if cycle.side in (side, "both"):
@@ -147,13 +138,11 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
             stands = np.where((time > cycle.off) & (cycle.side == side), np.nan, known)
             yield over_cycle(cycle, "foot_progression", side, "deg", time, stands * inwards)
     centre = centre_of_mass(body, motion)
-    began = np.array([np.interp(cycle.start, time, column) for column in centre.T]) * np.array([1.0, 1.0, 0.0])
+    began = place_at(centre, time, cycle.start) * np.array([1.0, 1.0, 0.0])
     ground = float(np.percentile(soles.outline[..., 2].min(axis=(1, 2)), 5))
     for name, axis, sign, zero in (("ahead", 0, 1.0, 0.0), ("aside", 2, mirror, 0.0), ("height", 1, 1.0, ground)):
         path = sign * ((centre - began) @ frame[axis]) - zero
-        yield over_cycle(
-            cycle, f"centre_of_mass_{name}", "middle" if cycle.side == "both" else cycle.side, "m", time, known * path
-        )
+        yield over_cycle(cycle, f"centre_of_mass_{name}", middle, "m", time, known * path)
 
 
 def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
@@ -196,11 +185,7 @@ class NormalCurve:
     sd: Array
 
     def __post_init__(self) -> None:
-        assign(
-            self,
-            mean=frozen_array(self.mean, (PERCENT.size,), f"NormalCurve {self.quantity}"),
-            sd=frozen_array(self.sd, (PERCENT.size,), f"NormalCurve {self.quantity}, sd"),
-        )
+        freeze(self, f"NormalCurve {self.quantity}", mean=_WHOLE, sd=_WHOLE)
 
 
 def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCurve, ...]:
@@ -208,14 +193,13 @@ def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCur
 
     ``people`` by name, with the curves of all their trials; a person's own mean is over trials and sides.
     """
-    found: dict[tuple[str, str, str], list[Array]] = {}
-    for groups in people.values():
-        for key in dict.fromkeys((one.kind, one.quantity, one.unit) for one in groups):
-            same = [one.mean for one in groups if (one.kind, one.quantity, one.unit) == key]
-            found.setdefault(key, []).append(mean_and_sd(np.stack(same))[0])
+    means: dict[tuple[str, str, str], dict[str, list[Array]]] = {}
+    for name, groups in people.items():
+        for one in groups:
+            means.setdefault((one.kind, one.quantity, one.unit), {}).setdefault(name, []).append(one.mean)
     bands = []
-    for (kind, quantity, unit), means in found.items():
-        whole = [one for one in means if np.isfinite(one).mean() > 0.9]
+    for (kind, quantity, unit), own in means.items():
+        whole = [mean for some in own.values() if np.isfinite(mean := mean_and_sd(np.stack(some))[0]).mean() > 0.9]
         if len(whole) >= FEWEST_PEOPLE:
             bands.append(NormalCurve(kind, quantity, unit, len(whole), *mean_and_sd(np.stack(whole))))
     return tuple(bands)
@@ -242,9 +226,9 @@ def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...
     KeyError, TypeError, ValueError
         It is not what `normal_toml` writes.
     """
-    found = []
+    bands = []
     for name, row in raw.items():
         kind, quantity = name.split(" ")
         mean, sd = (np.interp(PERCENT, PERCENT[::_EVERY], np.asarray(row[key], dtype=float)) for key in ("mean", "sd"))
-        found.append(NormalCurve(kind, quantity, str(row["unit"]), int(str(row["people"])), mean, sd))
-    return tuple(found)
+        bands.append(NormalCurve(kind, quantity, str(row["unit"]), int(str(row["people"])), mean, sd))
+    return tuple(bands)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.cycles.events import FootEvent, heel_and_toe
+from biodance.cycles.events import FootEvent, heel_and_toe, thigh_and_shank
 from biodance.motion.contact.soles import Soles
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.records import SIDES, Array, Motion, runs
@@ -57,6 +57,10 @@ class Cycle:
         """``off`` in % of the cycle: of a gait cycle the stance."""
         return 100 * (self.off - self.start) / self.duration
 
+    def overlaps(self, other: "Cycle") -> bool:
+        """Return whether two repetitions share time: then nobody stood between them. Each overlaps itself."""
+        return self.start < other.end and other.start < self.end
+
     def times(self) -> Array:
         """Return the times (101,) s of `PERCENT`."""
         return self.start + PERCENT / 100 * self.duration
@@ -64,7 +68,7 @@ class Cycle:
 
 def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:
     """Return the cycles from each strike to the next of the same foot, with the other foot's strike between them."""
-    found = []
+    cycles = []
     for side in SIDES:
         strikes = [e.time for e in events if e.down and e.side == side]
         others = [e.time for e in events if e.down and e.side != side]
@@ -72,8 +76,8 @@ def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:
             if not _SHORTEST_STRIDE < end - start < _LONGEST_STRIDE or not any(start < one < end for one in others):
                 continue
             off = [e.time for e in events if not e.down and e.side == side and start < e.time < end]
-            found.append(Cycle(trial, "gait", side, start, end, off[0] if len(off) == 1 else float("nan")))
-    return tuple(sorted(found, key=lambda cycle: cycle.start))
+            cycles.append(Cycle(trial, "gait", side, start, end, off[0] if len(off) == 1 else float("nan")))
+    return tuple(sorted(cycles, key=lambda cycle: cycle.start))
 
 
 def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[Cycle, ...]:
@@ -82,60 +86,34 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
     A squat begins and ends standing and goes down by `_DEEP` of the leg's length at least. Whoever has the centre of
     mass `_SEATED` behind the heels sits on something: a rise begins with the centre of mass moving and ends standing.
     """
-    height = poses(body, motion.q).position[:, 0, 2]
-    leg, top = _leg_length(body), float(np.percentile(height, 98))
-    centre = centre_of_mass(body, motion)
-    seated = _seated(body, motion, soles, centre)
-    found = []
-    for first, stop in runs(height < top - _DEEP * leg):
-        depth = top - float(height[first:stop].min())
-        begin, end = _reach(height, top - _UP * depth, first, -1), _reach(height, top - _UP * depth, stop - 1, 1)
-        if end is None or not motion.determined[first : end + 1].all() or _slide(soles, first, end) > _SLIDES:
+    height, time = poses(body, motion.q).position[:, 0, 2], motion.time
+    top, centre = float(np.percentile(height, 98)), centre_of_mass(body, motion)
+    seated, cycles = _seated(body, soles, centre), list[Cycle]()
+    for first, stop in runs(height < top - _DEEP * thigh_and_shank(body)):
+        lowest = first + int(np.argmin(height[first:stop]))
+        up = np.flatnonzero(height >= top - _UP * (top - height[lowest]))
+        before, after = up[up < first], up[up >= stop]
+        if not after.size or not motion.determined[first : after[0] + 1].all():
             continue
-        time = motion.time
+        path = soles.centre[first : after[0] + 1, :, :2]
+        if np.linalg.norm(path - path[0], axis=-1).max() > _SLIDES:
+            continue
         if seated[first:stop].any():
             leaves = first + int(np.flatnonzero(seated[first:stop])[-1])
-            begin = _still_before(centre, motion, leaves)
-            found.append(
-                Cycle(trial, "sit_to_stand", "both", float(time[begin]), float(time[end]), float(time[leaves]))
-            )
-        elif begin is not None:
-            lowest = first + int(np.argmin(height[first:stop]))
-            found.append(Cycle(trial, "squat", "both", float(time[begin]), float(time[end]), float(time[lowest])))
-    return tuple(one for one in found if not any(_overlap(one, other) for other in found if other is not one))
+            instants = time[[_still_before(centre, motion, leaves), after[0], leaves]]
+            cycles.append(Cycle(trial, "sit_to_stand", "both", *instants.tolist()))
+        elif before.size:
+            cycles.append(Cycle(trial, "squat", "both", *time[[before[-1], after[0], lowest]].tolist()))
+    return tuple(one for one in cycles if sum(map(one.overlaps, cycles)) == 1)
 
 
-def _overlap(one: Cycle, other: Cycle) -> bool:
-    """Return whether two repetitions share time: then the person went down several times without standing between."""
-    return one.start < other.end and other.start < one.end
-
-
-def _leg_length(body: Body) -> float:
-    ends = ("knee_flexion", "ankle_dorsiflexion")
-    return float(sum(np.linalg.norm(one.translation) for one in body.joints if one.name.endswith(ends))) / 2
-
-
-def _seated(body: Body, motion: Motion, soles: Soles, centre: Array) -> NDArray[np.bool_]:
+def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
     """Return (T,) True where the centre of mass (T, 3) m lies behind both heels, as the feet point."""
-    from biodance.cycles.events import heel_and_toe
-
     heel, toe = (place[..., :2] for place in heel_and_toe(body, soles.outline))
     ahead = (toe - heel).mean(axis=1)
     ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
     behind = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1)
     return np.asarray(behind > _SEATED)
-
-
-def _reach(height: Array, level: float, start: int, step: int) -> int | None:
-    """Return the first frame from ``start`` on, in steps of ``step``, at which the pelvis is above a level; None where
-    the trial ends before.
-    """
-    at = start
-    while 0 <= at < height.size:
-        if height[at] >= level:
-            return at
-        at += step
-    return None
 
 
 def _still_before(centre: Array, motion: Motion, leaves: int) -> int:
@@ -145,12 +123,6 @@ def _still_before(centre: Array, motion: Motion, leaves: int) -> int:
     speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
     rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
     return int(rest[-1]) if rest.size else 0
-
-
-def _slide(soles: Soles, first: int, last: int) -> float:
-    """Return the farthest that a sole's centre goes between two frames, m."""
-    path = soles.centre[first : last + 1, :, :2]
-    return float(np.linalg.norm(path - path[:1], axis=-1).max())
 
 
 _BELT = 0.15
@@ -173,9 +145,7 @@ STRIDE_UNITS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Stride:
-    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that the trial does not tell is
-    missing.
-    """
+    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that is not known is missing."""
 
     cycle: Cycle
     values: Mapping[str, float]
@@ -190,39 +160,32 @@ def strides(cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, so
     """
     heel = heel_and_toe(body, soles.outline)[0][..., :2]
     gait = [one for one in cycles if one.kind == "gait"]
-    return tuple(Stride(one, _values(one, _others(one, events), heel, soles.time)) for one in gait)
+    return tuple(Stride(one, _values(one, *_other_foot(one, events), heel, soles.time)) for one in gait)
 
 
-def mean_values(found: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:
-    """Return mean, standard deviation (NaN for one stride) and number of every value that the strides tell."""
+def mean_values(strides: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:
+    """Return mean, standard deviation (NaN for one stride) and number of every value that the strides have."""
     out = {}
     for name in STRIDE_UNITS:
-        some = [s.values[name] for s in found if name in s.values and side in ("both", s.cycle.side)]
+        some = [s.values[name] for s in strides if name in s.values and side in ("both", s.cycle.side)]
         if some:
             out[name] = (float(np.mean(some)), float(np.std(some, ddof=1)) if len(some) > 1 else np.nan, len(some))
     return out
 
 
-@dataclass(frozen=True)
-class _Other:
-    """What the other foot does in a cycle: it leaves at ``off`` and strikes at ``strike`` s; NaN = not known."""
-
-    off: float
-    strike: float
-
-
-def _others(cycle: Cycle, events: Sequence[FootEvent]) -> _Other:
+def _other_foot(cycle: Cycle, events: Sequence[FootEvent]) -> tuple[float, float]:
+    """Return when, s, the other foot leaves and strikes the ground in a cycle; NaN = not known."""
     inside = [one for one in events if one.side != cycle.side and cycle.start < one.time < cycle.end]
     strikes, offs = ([one.time for one in inside if one.down is down] for down in (True, False))
     strike = strikes[0] if len(strikes) == 1 else np.nan
     before = [time for time in offs if time < strike]
-    return _Other(before[0] if len(before) == 1 else np.nan, strike)
+    return before[0] if len(before) == 1 else np.nan, strike
 
 
-def _values(cycle: Cycle, other: _Other, heel: Array, time: Array) -> dict[str, float]:
+def _values(cycle: Cycle, other_off: float, other_strike: float, heel: Array, time: Array) -> dict[str, float]:
     foot = SIDES.index(cycle.side)
     ground = _ground(cycle, heel[:, foot], time)
-    start, end = (_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
+    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
     stride = end - start - ground * cycle.duration
     length = float(np.linalg.norm(stride))
     values = {
@@ -233,23 +196,24 @@ def _values(cycle: Cycle, other: _Other, heel: Array, time: Array) -> dict[str, 
     }
     if np.isfinite(cycle.off):
         values["stance"] = cycle.off_percent
-    if np.isfinite(other.strike) and length > 0:
-        across = end - _at(heel[:, 1 - foot], time, other.strike) - ground * (cycle.end - other.strike)
+    if np.isfinite(other_strike) and length > 0:
+        across = end - place_at(heel[:, 1 - foot], time, other_strike) - ground * (cycle.end - other_strike)
         along = stride / length
-        values["step_time"] = cycle.end - other.strike
+        values["step_time"] = cycle.end - other_strike
         values["step_length"] = float(across @ along)
         to_right = float(across[0] * along[1] - across[1] * along[0])
         values["step_width"] = to_right if cycle.side == "right" else -to_right
-    double = other.off - cycle.start + max(0.0, cycle.off - other.strike)
+    double = other_off - cycle.start + max(0.0, cycle.off - other_strike)
     return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
 
 
 def _ground(cycle: Cycle, heel: Array, time: Array) -> Array:
     """Return the velocity (2,) m/s of what the foot stands on; zero for a floor."""
     first, last = (cycle.start + share / 100 * cycle.duration for share in _FLAT)
-    velocity = (_at(heel, time, last) - _at(heel, time, first)) / (last - first)
+    velocity = (place_at(heel, time, last) - place_at(heel, time, first)) / (last - first)
     return velocity if np.linalg.norm(velocity) > _BELT else np.zeros(2)
 
 
-def _at(path: Array, time: Array, when: float) -> Array:
+def place_at(path: Array, time: Array, when: float) -> Array:
+    """Return the place (k,) at an instant s of a path (T, k)."""
     return np.array([np.interp(when, time, column) for column in path.T])

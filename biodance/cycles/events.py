@@ -7,17 +7,18 @@ speed under the pelvis. Ahead is where the pelvis faces in that frame, so that t
 body follows the markers, so that a marker that is lost for a moment costs no event.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.lab.c3d.subject import FileEvent
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.kinematics import poses
-from biodance.records import SIDES, Array, Motion, Wrench, runs
+from biodance.records import SIDES, Array, Mask, Motion, Wrench, runs
 
 _THRESHOLD = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
@@ -46,7 +47,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
     between two frames in which the plates tell what the ground does to this foot and the other one is not over the same
     plate: a force that two feet share tells nothing of one.
     """
-    found = []
+    events = []
     for foot, side in enumerate(SIDES):
         wrench = feet[f"{side}_foot"]
         shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
@@ -58,13 +59,11 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
                 continue
             share = (_THRESHOLD - force[i]) / (force[i + 1] - force[i])
             time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
-            found.append(FootEvent(float(time), side, bool(loaded[i + 1])))
-    return tuple(sorted(found, key=lambda event: event.time))
+            events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
+    return tuple(sorted(events, key=lambda event: event.time))
 
 
-def _without_short(
-    loaded: "np.ndarray[tuple[int], np.dtype[np.bool_]]", shortest: float
-) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+def _without_short(loaded: Mask, shortest: float) -> Mask:
     """Return ``loaded`` (T,) without gaps and without contacts shorter than ``shortest`` frames; the ends of the
     trial stay.
     """
@@ -98,28 +97,20 @@ def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
     TrialRefused
         The body has no two feet.
     """
-    ahead = foot_places(body, motion)
-    if motion.time.size < 0.5 * motion.rate or not np.ptp(ahead["heel"][:, 0] - ahead["heel"][:, 1]) > _least(body):
-        return ()
-    found = []
-    for foot, side in enumerate(SIDES):
-        for part, down in (("heel", True), ("toe", False)):
-            times = _turning_points(ahead[part][:, foot], motion, down=down, prominence=_least(body) / 2)
-            found += [FootEvent(time, side, down, "markers") for time in times]
-    return tuple(sorted(found, key=lambda event: event.time))
-
-
-def foot_places(body: Body, motion: Motion) -> dict[str, Array]:
-    """Return how far ahead of the pelvis heel and toe of the right and the left sole are, (T, 2) m each."""
-    outline = soles_from_body(body, motion).outline
-    pose = poses(body, motion.q)
+    outline, pose = soles_from_body(body, motion).outline, poses(body, motion.q)
     forward = pose.rotation[:, 0, :2, 0]
     forward = forward / np.linalg.norm(forward, axis=1, keepdims=True)
-    heel, toe = heel_and_toe(body, outline)
-    return {
-        name: np.einsum("tfk,tk->tf", place[..., :2] - pose.position[:, :1, :2], forward)
-        for name, place in (("heel", heel), ("toe", toe))
-    }
+    places = (place[..., :2] - pose.position[:, :1, :2] for place in heel_and_toe(body, outline))
+    heel, toe = (np.einsum("tfk,tk->tf", place, forward) for place in places)  # m ahead of the pelvis, (T, 2)
+    least = _SWING * thigh_and_shank(body)
+    if motion.time.size < 0.5 * motion.rate or not np.ptp(heel[:, 0] - heel[:, 1]) > least:
+        return ()
+    events = []
+    for foot, side in enumerate(SIDES):
+        for path, down in ((heel, True), (toe, False)):
+            times = _turning_points(path[:, foot], motion, down=down, prominence=least / 2)
+            events += [FootEvent(time, side, down, "markers") for time in times]
+    return tuple(sorted(events, key=lambda event: event.time))
 
 
 def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
@@ -137,36 +128,29 @@ def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, 
     """Return by how much the strikes and the leavings (n,) s come later by markers than by forces, where both see
     one.
     """
-    late: dict[bool, list[float]] = {True: [], False: []}
-    for event in force:
-        same = [other.time - event.time for other in markers if (other.side, other.down) == (event.side, event.down)]
-        nearest = min(same, key=abs, default=np.inf)
-        if abs(nearest) < _TOGETHER:
-            late[event.down].append(nearest)
-    return np.array(late[True]), np.array(late[False])
+    late = [(event.down, delay_of_nearest(markers, event)) for event in force]
+    strikes, leavings = ([s for d, s in late if d is down and abs(s) < _TOGETHER] for down in (True, False))
+    return np.array(strikes), np.array(leavings)
+
+
+def delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent) -> float:
+    """Return by how many s the nearest of ``events`` of the same kind and foot comes later than one event; infinity
+    without any.
+    """
+    kind = event.side, event.down
+    return min((one.time - event.time for one in events if (one.side, one.down) == kind), key=abs, default=np.inf)
 
 
 def joined_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[FootEvent, ...]:
     """Return the events of both, in the order of time: the force's where a plate saw it, else the markers'."""
-    kept = [
-        event
-        for event in markers
-        if not any(
-            (other.side, other.down) == (event.side, event.down) and abs(other.time - event.time) < _TOGETHER
-            for other in force
-        )
-    ]
+    kept = [event for event in markers if not abs(delay_of_nearest(force, event)) < _TOGETHER]
     return tuple(sorted((*force, *kept), key=lambda event: event.time))
 
 
-def _least(body: Body) -> float:
-    """Return the travel of a foot, m, that makes a step."""
-    legs = [
-        np.linalg.norm(joint.translation)
-        for joint in body.joints
-        if joint.name.endswith(("knee_flexion", "ankle_dorsiflexion"))
-    ]
-    return _SWING * float(np.sum(legs)) / 2
+def thigh_and_shank(body: Body) -> float:
+    """Return the length, m, of thigh and shank together, mean of both legs."""
+    ends = ("knee_flexion", "ankle_dorsiflexion")
+    return float(sum(np.linalg.norm(one.translation) for one in body.joints if one.name.endswith(ends))) / 2
 
 
 def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: float) -> list[float]:
@@ -182,12 +166,12 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
     ground = float(np.median(speed[speed < 0]))
     tops, _ = find_peaks(path if down else -path, prominence=prominence, distance=max(1, round(_APART * rate)))
     step, level = (1, _STRIKES * ground) if down else (-1, _LEAVES * ground)
-    found = []
+    times = []
     for top in tops[motion.determined[tops]]:
         here = top
         while 0 < here < path.size - 1 and speed[here] > level:
             here += step
         before = here - step
         share = (speed[before] - level) / (speed[before] - speed[here]) if speed[here] <= level else 1.0
-        found.append(float(motion.time[before] + step * share / rate))
-    return found
+        times.append(float(motion.time[before] + step * share / rate))
+    return times

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.cycles.events import FootEvent
+from biodance.cycles.events import FootEvent, delay_of_nearest
 from biodance.lab.c3d.subject import FileOutputs
 from biodance.records import Motion
 
@@ -57,12 +57,13 @@ class EventComparison:
 
 def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[AngleComparison, ...]:
     """Return every angle that both have, over the frames in which both are known."""
-    found = []
+    comparisons = []
     for j, joint in enumerate(body.joints):
         side, _, name = joint.name.partition("_")
         label, axis = PLUG_IN_GAIT.get(name, ("", 0))
-        theirs = outputs.angles.get(f"{side[:1].upper()}{label}") if label else None
-        if theirs is None or len(theirs) != motion.time.size:
+        label = f"{side[:1].upper()}{label}"
+        theirs = outputs.angles.get(label)
+        if name not in PLUG_IN_GAIT or theirs is None or len(theirs) != motion.time.size:
             continue
         known = motion.determined & np.isfinite(theirs).all(axis=1)
         ours, other = motion.angles[known, j], theirs[known, axis]
@@ -70,26 +71,19 @@ def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[An
             continue
         moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
         correlation = float(np.corrcoef(ours, other)[0, 1]) if moves else float("nan")
-        apart = ours - other
-        label = f"{side[:1].upper()}{label} {'xyz'[axis]}"
-        found.append(
-            AngleComparison(joint.name, label, float(apart.mean()), float(apart.std()), correlation, ours.size)
-        )
-    return tuple(found)
+        apart, label = ours - other, f"{label} {'xyz'[axis]}"
+        mean, sd = float(apart.mean()), float(apart.std())
+        comparisons.append(AngleComparison(joint.name, label, mean, sd, correlation, ours.size))
+    return tuple(comparisons)
 
 
 def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple[EventComparison, ...]:
     """Return how our events lie beside those that the file holds; () where it holds none."""
-    found = []
+    comparisons = []
     for down in (True, False):
-        theirs = [one for one in outputs.events if one.down is down]
-        late = []
-        for one in theirs:
-            near = [e.time - one.time for e in events if (e.side, e.down) == (one.side, down)]
-            nearest = min(near, key=abs, default=np.inf)
-            if abs(nearest) < _NEAR_EVENT:
-                late.append(nearest)
-        if theirs:
+        delays = [delay_of_nearest(events, one) for one in outputs.events if one.down is down]
+        late = [delay for delay in delays if abs(delay) < _NEAR_EVENT]
+        if delays:
             mean, sd = (float(np.mean(late)), float(np.std(late))) if late else (np.nan, np.nan)
-            found.append(EventComparison(down, mean, sd, len(late), len(theirs) - len(late)))
-    return tuple(found)
+            comparisons.append(EventComparison(down, mean, sd, len(late), len(delays) - len(late)))
+    return tuple(comparisons)

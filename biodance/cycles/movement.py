@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -81,8 +81,7 @@ class TrialMovement:
     def told(self) -> str:
         """The repetitions in words."""
         counts = {kind: sum(one.kind == kind for one in self.cycles) for kind in _WORDS}
-        said = [f"{n} {_WORDS[kind][n > 1]}" for kind, n in counts.items() if n]
-        return ", ".join(said) or "no repetition"
+        return ", ".join(f"{n} {_WORDS[kind][n > 1]}" for kind, n in counts.items() if n) or "no repetition"
 
     @cached_property
     def groups(self) -> tuple[CurveGroup, ...]:
@@ -137,7 +136,13 @@ class TrialMovement:
         import pandas as pd
 
         columns = ["kind", "quantity", "side", "unit", "percent", "count", "mean", "sd", "parameters_sd"]
-        rows = [row for one in self.groups for row in _rows(one)]
+        rows = [
+            (one.kind, one.quantity, one.side, one.unit, float(percent), int(count), *values)
+            for one in self.groups
+            for percent, count, *values in zip(
+                PERCENT, np.isfinite(one.values).sum(axis=0), one.mean, one.sd, one.parameters_sd, strict=True
+            )
+        ]
         return pd.DataFrame(rows, columns=columns)
 
     def spatiotemporal(self, side: str = "both") -> dict[str, tuple[float, float, int]]:
@@ -159,14 +164,6 @@ class TrialMovement:
         {}
         """
         return mean_values(self.strides, side)
-
-
-def _rows(one: CurveGroup) -> list[tuple[Any, ...]]:
-    count = np.isfinite(one.values).sum(axis=0)
-    return [
-        (one.kind, one.quantity, one.side, one.unit, float(p), int(n), m, s, k)
-        for p, n, m, s, k in zip(PERCENT, count, one.mean, one.sd, one.parameters_sd, strict=True)
-    ]
 
 
 def trial_movement(
@@ -202,7 +199,6 @@ def trial_movement(
         curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
         if contact is not None and feet is not None:
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, contact.told)
-    found = compare_events(events, outputs) if outputs else ()
     return TrialMovement(
         trial.name,
         events,
@@ -211,7 +207,7 @@ def trial_movement(
         strides(cycles, events, body, soles),
         agreement_of_events(force, markers),
         compare_angles(body, motion, outputs) if outputs else (),
-        found,
+        compare_events(events, outputs) if outputs else (),
         _notes(cycles, contact),
     )
 

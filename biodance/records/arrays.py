@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Protocol, TypeGuard, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, known_index
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,13 +85,11 @@ def rate_of(time: Array) -> float:
 
 
 def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
-    """Return the one of ``trials`` that has a ``name``; UnknownName says what it is no ``kind`` of and lists all
-    names.
+    """Return the first of ``trials`` of that ``name``; UnknownName lists all names where there is none of the
+    ``kind``.
     """
-    found = {one.name: one for one in trials}
-    if name not in found:
-        raise UnknownName.of(kind, name, tuple(found))
-    return found[name]
+    some = tuple(trials)
+    return some[known_index(kind, name, [one.name for one in some])]
 
 
 def in_time(time: Array, values: Array, columns: Iterable[str]) -> "pd.DataFrame":

@@ -1,13 +1,12 @@
 """What a person must see first, and what a verdict rests on: the same records on page, terminal and in JSON."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 Level = Literal["fail", "warn", "note"]
 LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
-
-
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
 
@@ -36,9 +35,9 @@ class Judged:
     missed: bool = False
 
 
-def strongest_first(found: "tuple[Attention, ...] | list[Attention]") -> tuple[Attention, ...]:
+def strongest_first(sentences: Iterable[Attention]) -> tuple[Attention, ...]:
     """Return the sentences by level, each once, in their order otherwise."""
-    return tuple(sorted(dict.fromkeys(found), key=lambda one: LEVELS.index(one.level)))
+    return tuple(sorted(dict.fromkeys(sentences), key=lambda one: LEVELS.index(one.level)))
 
 
 def without_path(reason: str, file: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
-from biodance.errors import BiodanceError, UnknownName
+from biodance.errors import BiodanceError, known_index
 from biodance.records.arrays import Array, assign, check_time, freeze, frozen_array, in_time, rate_of, span
 
 if TYPE_CHECKING:
@@ -96,15 +96,8 @@ class Motion:
         if determined.shape != (frames,):
             raise BiodanceError(f"Motion.determined has shape {determined.shape}, expected ({frames},).")
         determined.setflags(write=False)
-        assign(
-            self,
-            time=time,
-            determined=determined,
-            notes=tuple(self.notes),
-            residual=residual,
-            marker_names=tuple(self.marker_names),
-            joint_names=tuple(self.joint_names),
-        )
+        assign(self, time=time, determined=determined, residual=residual)
+        assign(self, **{name: tuple(getattr(self, name)) for name in ("notes", "marker_names", "joint_names")})
         freeze(self, "Motion", v=(frames, None), q=(frames, None), residual=(frames, len(self.marker_names)))
         freeze(self, "Motion", a=(frames, self.v.shape[1]))
         if self.joint_names and self._root + len(self.joint_names) != self.q.shape[1]:
@@ -115,10 +108,8 @@ class Motion:
 
     def __repr__(self) -> str:
         left = int(np.sum(~self.determined))
-        return (
-            f"Motion({self.q.shape[1] - self._root} joint angles, "
-            f"{span(self.time)}{f', {left} frames left open' if left else ''})"
-        )
+        open_frames = f", {left} frames left open" if left else ""
+        return f"Motion({self.q.shape[1] - self._root} joint angles, {span(self.time)}{open_frames})"
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table().describe(), self.notes)
@@ -160,8 +151,7 @@ class Motion:
 
     @property
     def _titles(self) -> tuple[str, ...]:
-        count = self.q.shape[1] - self._root
-        return self.joint_names or tuple(f"joint_{k + 1}" for k in range(count))
+        return self.joint_names or tuple(f"joint_{k + 1}" for k in range(self.q.shape[1] - self._root))
 
     def table(self) -> "pd.DataFrame":
         """Return posture over time as a table.
@@ -207,8 +197,5 @@ class Motion:
         2
         """
         names = self._titles
-        for joint in joints:
-            if joint not in names:
-                raise UnknownName.of("joint angle of this motion", joint, names)
-        columns = [names.index(joint) for joint in joints or names]
+        columns = [known_index("joint angle of this motion", joint, names) for joint in joints or names]
         return display.curves(self.time, self.angles[:, columns], [names[k] for k in columns], "angle (deg)", axes=axes)

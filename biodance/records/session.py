@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from biodance import display
-from biodance.errors import BiodanceError, TrialRefused, UnknownName
+from biodance.errors import BiodanceError, TrialRefused, known_index
 from biodance.records.arrays import assign, by_name, rate_of
 from biodance.records.markers import Markers
 from biodance.records.subject import Subject
@@ -95,8 +95,7 @@ class Trial:
     settings: Settings = USUAL
 
     def __post_init__(self) -> None:
-        if self.role not in ROLES:
-            raise UnknownName.of("trial role", self.role, ROLES)
+        known_index("trial role", self.role, ROLES)
         assign(
             self,
             plates=tuple(self.plates),
@@ -121,13 +120,8 @@ class Trial:
 
     def _row(self) -> dict[str, Any]:
         """Return what the table of a session says about this trial."""
-        time = (
-            self.markers.time
-            if self.markers is not None
-            else self.plates[0].wrench.time
-            if self.plates
-            else np.zeros(0)
-        )
+        clock = self.markers or (self.plates[0].wrench if self.plates else None)
+        time = np.zeros(0) if clock is None else clock.time
         return {
             "trial": self.name,
             "role": self.role,
@@ -176,7 +170,7 @@ class Session:
     refused : mapping
         File name -> the sentence why it could not be read.
     notes : tuple of str
-        Guesses made (roles by name, sex unknown ...), each said.
+        Guesses made (roles by name, sex unknown ...), one sentence each.
 
     Raises
     ------
@@ -210,15 +204,14 @@ class Session:
             )
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{trial.name} ({trial.role})" for trial in self.trials[:6])
+        first = ", ".join(f"{trial.name} ({trial.role})" for trial in self.trials[:6])
         more = f", and {len(self.trials) - 6} more" if len(self.trials) > 6 else ""
         left = f"; {len(self.refused)} files refused" if self.refused else ""
-        return f"Session({self.folder.name!r}, {len(self.trials)} trials: {told}{more}{left})"
+        return f"Session({self.folder.name!r}, {len(self.trials)} trials: {first}{more}{left})"
 
     def _repr_html_(self) -> str:
-        return display.card(
-            repr(self), self.table(), (*(f"Refused: {why}" for why in self.refused.values()), *self.notes)
-        )
+        refused = (f"Refused: {why}" for why in self.refused.values())
+        return display.card(repr(self), self.table(), (*refused, *self.notes))
 
     def __getitem__(self, name: str) -> Trial:
         """Return the trial of that name; UnknownName lists all names."""
@@ -273,6 +266,5 @@ class Session:
         """
         import pandas as pd
 
-        return (
-            pd.DataFrame([trial._row() for trial in self.trials]).set_index("trial") if self.trials else pd.DataFrame()
-        )
+        rows = [trial._row() for trial in self.trials]
+        return pd.DataFrame(rows).set_index("trial") if rows else pd.DataFrame()

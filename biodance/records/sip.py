@@ -1,4 +1,4 @@
-"""What the segments weigh: standard inertial parameters."""
+"""Standard inertial parameters of the segments, with their covariance."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance import display
-from biodance.errors import UnknownName
+from biodance.errors import known_index
 from biodance.records.arrays import Array, assign, freeze
 
 if TYPE_CHECKING:
     import pandas as pd
-
 
 INERTIAL = (
     "mass (kg)",
@@ -37,7 +36,7 @@ class Sip:
     covariance : array_like
         (10N, 10N) in the same units.
     measured : tuple of str
-        Segments whose masses more than a table told: girths of the person.
+        Segments whose masses rest on more than a table: girths of the person.
 
     Raises
     ------
@@ -90,9 +89,7 @@ class Sip:
         >>> result.body.sip.of("pelvis").shape
         (10,)
         """
-        if segment not in self.segments:
-            raise UnknownName.of("segment", segment, self.segments)
-        i = self.segments.index(segment)
+        i = known_index("segment", segment, self.segments)
         return self.phi[10 * i : 10 * i + 10]
 
     @property

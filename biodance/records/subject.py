@@ -9,14 +9,12 @@ import numpy as np
 from biodance.errors import SessionRefused
 
 SIDES = ("right", "left")
+"""Of a person, in the order of every array over feet or hands."""
 
 
 def side_in_name(name: str, otherwise: str = "middle") -> str:
     """Return the side, one of `SIDES`, that the name of a segment begins with."""
     return next((side for side in SIDES if name.startswith(side)), otherwise)
-
-
-"""Of a person, in the order of every array over feet or hands."""
 
 
 @dataclass(frozen=True)

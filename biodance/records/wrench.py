@@ -1,4 +1,4 @@
-"""What the ground did to the subject, in all and by plate."""
+"""The wrench of the ground on the subject, in all and by plate."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING

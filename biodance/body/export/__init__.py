@@ -70,14 +70,13 @@ def refuse_impossible(body: Body) -> None:
         if phi[0] <= 0:
             raise BiodanceError(
                 f"Segment {name}: a mass of {phi[0]:g} kg cannot exist, so no model is written. Masses must be "
-                f"positive."
+                "positive."
             )
         value = np.linalg.eigvalsh(pseudo_inertia(phi)[0])
         if value[0] < -_ROUNDING * value[-1]:
             raise BiodanceError(
-                f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue "
-                f"{value[0]:.3g}, must be >= 0), so "
-                "no model is written. Use physically consistent parameters."
+                f"Segment {name}: no body has this mass, centre and inertia (pseudo-inertia eigenvalue {value[0]:.3g}, "
+                "must be >= 0), so no model is written. Use physically consistent parameters."
             )
 
 
@@ -104,7 +103,8 @@ def write_model(
         body = parts_as_segments(body)
         refuse_impossible(body)
     write_new(path, _content(kind, body, source, solids))
-    for name, content in _beside(kind, body, solids).items():
+    beside = kind.beside(body, solids) if solids is not None and hasattr(kind, "beside") else {}
+    for name, content in beside.items():
         file = path.parent / name
         if not (file.is_file() and file.read_bytes() == content):
             file.parent.mkdir(exist_ok=True)
@@ -119,7 +119,3 @@ def _content(member: ModelFormat, body: Body, source: str, solids: SegmentSolids
         raise BiodanceError(f"The format {member.FORMAT} shows no meshes. Leave them out, or choose glb or osim.")
     content = write(body, source) if solids is None else write(body, source, solids)
     return content if isinstance(content, bytes) else str(content).encode()
-
-
-def _beside(member: ModelFormat, body: Body, solids: SegmentSolids | None) -> dict[str, bytes]:
-    return dict(member.beside(body, solids)) if solids is not None and hasattr(member, "beside") else {}

@@ -86,6 +86,11 @@ def plain_name(name: str) -> str:
     return re.sub(r"[^\w.-]", "_", name) or "model"
 
 
+def link_names(body: Body) -> list[str]:
+    """Return the name of what turns with each joint (n): its segment, or an intermediate link named after the joint."""
+    return [body.segments[joint.segment] if joint.segment >= 0 else f"{joint.name}_link" for joint in body.joints]
+
+
 def add(parent: Element, tag: str, text: str = "", **attributes: str) -> Element:
     """Append an element with text and attributes and return it."""
     element = SubElement(parent, tag, attributes)

@@ -8,7 +8,7 @@ frame. The root moves by translations x y z and rotations x y z (body-fixed) in 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import plain_name, row
+from biodance.body.export._tree import link_names, plain_name, row
 from biodance.body.inertia import rigid_inertia
 from biodance.records import Array
 
@@ -22,41 +22,24 @@ def text(body: Body, source: str) -> str:
     if body.n_root:
         ranges = ["rangesQ", *["  -100 100"] * 3, *["  -10 10"] * 3]
         lines += _segment(body.segments[0], ["translations xyz", "rotations xyz", *ranges, *_mass(body, 0)])
+    links = link_names(body)
     for i, joint in enumerate(body.joints):
         turn = _x_along(joint.axis)
+        above = links[joint.parent] if joint.parent >= 0 else body.segments[0] if body.n_root else ""
+        placed = [*([f"parent {above}"] if above else []), *_placed(joint.rotation @ turn, joint.translation)]
         limits = f"rangesQ {row([body.limits.lower[i], body.limits.upper[i]])}"
-        lines += _segment(
-            joint.name,
-            [*_parent(body, joint.parent), *_placed(joint.rotation @ turn, joint.translation), "rotations x", limits],
-        )
-        if joint.segment >= 0:
-            back = [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))]
-            lines += _segment(body.segments[joint.segment], [*back, *_mass(body, joint.segment)])
-        else:
-            lines += _segment(f"{joint.name}_link", [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))])
+        lines += _segment(joint.name, [*placed, "rotations x", limits])
+        back = [f"parent {joint.name}", *_placed(turn.T, np.zeros(3))]
+        lines += _segment(links[i], [*back, *(_mass(body, joint.segment) if joint.segment >= 0 else ())])
     markers = body.markers
     for name, segment, position in zip(markers.names, markers.segment, markers.position, strict=True):
-        lines += [
-            f"marker {plain_name(name)}",
-            f"  parent {body.segments[segment]}",
-            f"  position {row(position)}",
-            "  technical 1",
-            "endmarker",
-            "",
-        ]
+        place = [f"  parent {body.segments[segment]}", f"  position {row(position)}", "  technical 1"]
+        lines += [f"marker {plain_name(name)}", *place, "endmarker", ""]
     return "\n".join(lines)
 
 
 def _segment(name: str, lines: list[str]) -> list[str]:
     return [f"segment {name}", *(f"  {line}" for line in lines), "endsegment", ""]
-
-
-def _parent(body: Body, parent: int) -> list[str]:
-    """Return the parent's line: the segment, or the link, in whose frame the joint is placed."""
-    if parent < 0:
-        return [f"parent {body.segments[0]}"] if body.n_root else []
-    joint = body.joints[parent]
-    return [f"parent {body.segments[joint.segment] if joint.segment >= 0 else f'{joint.name}_link'}"]
 
 
 def _placed(rotation: Array, translation: Array) -> list[str]:

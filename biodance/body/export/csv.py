@@ -20,6 +20,8 @@ HEADER = ("segment", "quantity", "value", "unit", "sd", "frame", "source")
 _TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
 STANDARD = ("mass", *(f"first_moment_{a}" for a in "xyz"), *(f"inertia_{t}" for t in _TENSOR))
 DERIVED = (*(f"com_{a}" for a in "xyz"), *(f"central_inertia_{t}" for t in _TENSOR))
+_UNITS = ("kg", *["kg·m"] * 3, *["kg·m²"] * 6, *["m"] * 3, *["kg·m²"] * 6)
+"""Of the standard, then of the derived quantities."""
 JOINT_FRAME = "segment axes (x anterior, y up, z right), about the proximal joint centre"
 COM_FRAME = "segment axes (x anterior, y up, z right), about the centre of mass"
 
@@ -33,17 +35,11 @@ def text(body: Body, source: str) -> str:
     for i, name in enumerate(body.segments):
         phi, block = body.sip.of(name), slice(10 * i, 10 * i + 10)
         spread = _derived_sd(phi, body.sip.covariance[block, block])
-        quantities = (*zip(STANDARD, phi, sd[i], strict=True), *zip(DERIVED, _derived(phi), spread, strict=True))
-        for quantity, value, deviation in quantities:
+        numbers = (*phi, *_derived(phi)), (*sd[i], *spread)
+        for quantity, unit, value, deviation in zip((*STANDARD, *DERIVED), _UNITS, *numbers, strict=True):
             frame = COM_FRAME if quantity.startswith("central") else "" if quantity == "mass" else JOINT_FRAME
-            write.writerow([name, quantity, repr(float(value)), _unit(quantity), repr(float(deviation)), frame, source])
+            write.writerow([name, quantity, repr(float(value)), unit, repr(float(deviation)), frame, source])
     return stream.getvalue()
-
-
-def _unit(quantity: str) -> str:
-    if quantity == "mass":
-        return "kg"
-    return "m" if quantity.startswith("com_") else "kg·m" if quantity.startswith("first") else "kg·m²"
 
 
 def _derived(phi: Array) -> Array:

@@ -37,14 +37,8 @@ def _body(parent: Element, body: Body, branch: Branch) -> Element:
     if branch.parent == WORLD and body.n_root:
         add(element, "freejoint", name="root")
     for hinge in branch.hinges:
-        joint = add(
-            element,
-            "joint",
-            name=body.joints[hinge.joint].name,
-            type="hinge",
-            axis=row(hinge.axis),
-            pos=row(hinge.place),
-        )
+        place = {"axis": row(hinge.axis), "pos": row(hinge.place)}
+        joint = add(element, "joint", name=body.joints[hinge.joint].name, type="hinge", **place)
         low, high = body.limits.lower[hinge.joint], body.limits.upper[hinge.joint]
         if low < high:
             joint.set("range", row([low, high]))
@@ -52,14 +46,6 @@ def _body(parent: Element, body: Body, branch: Branch) -> Element:
     add(element, "inertial", pos=row(lump.com), mass=row([lump.mass]), fullinertia=six(lump.inertia))
     low, high = body.boxes[branch.segment]
     if np.all(high > low):
-        add(
-            element,
-            "geom",
-            type="box",
-            pos=row((low + high) / 2),
-            size=row((high - low) / 2),
-            contype="0",
-            conaffinity="0",
-            rgba=".7 .7 .7 .4",
-        )
+        place = {"pos": row((low + high) / 2), "size": row((high - low) / 2)}
+        add(element, "geom", type="box", **place, contype="0", conaffinity="0", rgba=".7 .7 .7 .4")
     return element

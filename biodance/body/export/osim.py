@@ -77,21 +77,16 @@ def _body(bodies: Element, body: Body, segment: int, solids: SegmentSolids) -> N
         add(mesh, "socket_frame", "..")
         add(mesh, "mesh_file", _mesh_file(body, name))
     elif np.all(high > low):
-        _box(element, name, low, high)
+        frame = add(add(element, "components"), "PhysicalOffsetFrame", name="box")
+        brick = add(add(frame, "attached_geometry"), "Brick", name=f"{name}_box")
+        add(brick, "socket_frame", "..")
+        add(add(brick, "Appearance"), "opacity", "0.4")
+        add(brick, "half_lengths", row((high - low) / 2))
+        add(frame, "socket_parent", "..")
+        add(frame, "translation", row((low + high) / 2))
     add(element, "mass", row([lump.mass]))
     add(element, "mass_center", row(lump.com))
     add(element, "inertia", six(lump.inertia))
-
-
-def _box(element: Element, name: str, low: Array, high: Array) -> None:
-    """Attach a box to see, at its place in the segment."""
-    frame = add(add(element, "components"), "PhysicalOffsetFrame", name="box")
-    brick = add(add(frame, "attached_geometry"), "Brick", name=f"{name}_box")
-    add(brick, "socket_frame", "..")
-    add(add(brick, "Appearance"), "opacity", "0.4")
-    add(brick, "half_lengths", row((high - low) / 2))
-    add(frame, "socket_parent", "..")
-    add(frame, "translation", row((low + high) / 2))
 
 
 def _joint(joints: Element, body: Body, branch: Branch) -> None:
@@ -109,17 +104,16 @@ def _joint(joints: Element, body: Body, branch: Branch) -> None:
     if free:
         turns, names = ROOT_AXES, [f"{name}_{word}" for word in ROOT_ROTATIONS]
         shifts = [f"{name}_{word}" for word in ROOT_TRANSLATIONS]
-        for word in (*names, *shifts):
-            _coordinate(coordinates, word, (-10.0, 10.0))
+        ranges = [(-10.0, 10.0)] * 6
     else:
-        turns, shifts = _axes(body, branch), []
-        names = [body.joints[hinge.joint].name for hinge in branch.hinges]
-        for hinge, word in zip(branch.hinges, names, strict=True):
-            _coordinate(coordinates, word, (body.limits.lower[hinge.joint], body.limits.upper[hinge.joint]))
-    for i in range(3):
-        _axis(transform, f"rotation{i + 1}", names[i : i + 1], turns[i])
-    for i in range(3):
-        _axis(transform, f"translation{i + 1}", shifts[i : i + 1], np.eye(3)[i])
+        turns, shifts, hinges = _axes(body, branch), [], [hinge.joint for hinge in branch.hinges]
+        names = [body.joints[joint].name for joint in hinges]
+        ranges = [(body.limits.lower[joint], body.limits.upper[joint]) for joint in hinges]
+    for coordinate, limits in zip((*names, *shifts), ranges, strict=True):
+        _coordinate(coordinates, coordinate, limits)
+    for kind, moved, axes in (("rotation", names, turns), ("translation", shifts, np.eye(3))):
+        for i, axis in enumerate(axes):
+            _axis(transform, f"{kind}{i + 1}", moved[i : i + 1], axis)
 
 
 def _coordinate(parent: Element, name: str, limits: tuple[float, float]) -> None:

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.export._tree import add, row, xml_document
+from biodance.body.export._tree import add, link_names, row, xml_document
 from biodance.body.inertia import rigid_inertia
 from biodance.records import Array
 
@@ -35,8 +35,7 @@ def text(body: Body, source: str) -> str:
         _link(root, body, body.segments[0], 0)
     else:
         add(root, "link", name="world")
-    names = [body.segments[joint.segment] if joint.segment >= 0 else f"{joint.name}_link" for joint in body.joints]
-    limits = body.limits
+    names, limits = link_names(body), body.limits
     for i, joint in enumerate(body.joints):
         _link(root, body, names[i], joint.segment)
         element = add(root, "joint", name=joint.name, type="revolute")

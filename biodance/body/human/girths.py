@@ -1,4 +1,4 @@
-"""What girths say about masses: the mean person of a survey reshaped to the tape, one more opinion beside the table.
+"""Segment masses from girths: the mean person of a survey reshaped to the tape, one more opinion beside the table.
 
 A part's mass is what all tables and studies give the mean person of a survey of girths, times the volume of the part's
 stack of stadium solids over that of the mean person's: density and the place of cuts enter only by how they differ
@@ -55,10 +55,11 @@ def _studied(sex: Sex) -> Mapping[str, dict[str, float]]:
     return {name: study_masses(name, who) for name, group in studies(sex).items() if group in LIVING}
 
 
-def mean_fraction(kind: str, who: Subject) -> tuple[float, float]:
-    """Return the mean of the published fractions and its standard error, relative."""
-    found = published_fractions(kind, who)
-    return float(np.mean(found)), float(np.std(found, ddof=1) / np.mean(found) / np.sqrt(len(found)))
+@functools.cache
+def mean_fraction(kind: str, sex: Sex) -> tuple[float, float]:
+    """Return the mean of the published fractions of one sex and its standard error, relative."""
+    some = published_fractions(kind, MAN if sex == "M" else WOMAN)
+    return float(np.mean(some)), float(np.std(some, ddof=1) / np.mean(some) / np.sqrt(len(some)))
 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
@@ -118,7 +119,7 @@ _STEP = 0.01
 @dataclass(frozen=True, eq=False)
 class PartSolid:
     """One part of a person: ``ratio`` of its volume to the mean person's, ``sd`` relative, of what the tape leaves
-    uncertain in it, ``said`` by which girths.
+    uncertain in it, ``said`` the girths it rests on.
     """
 
     ratio: float
@@ -128,7 +129,7 @@ class PartSolid:
 
 @dataclass(frozen=True, eq=False)
 class SegmentOpinion:
-    """What girths say about one segment: ``mass`` kg with ``mass_sd``, ``said`` by which of them."""
+    """One measurement of a segment: ``mass`` kg with ``mass_sd``, ``said`` the measures it rests on."""
 
     mass: float
     mass_sd: float
@@ -136,7 +137,7 @@ class SegmentOpinion:
 
 
 def girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -> dict[str, SegmentOpinion]:
-    """Return what the subject's girths say, by segment; segments of which no girth was measured are not in it.
+    """Return the masses from the subject's girths, by segment; segments of which no girth was measured are not in it.
 
     Raises
     ------
@@ -144,27 +145,20 @@ def girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -
         A girth is not known or impossible, or all together miss the body mass by more than 15 %.
     """
     girths = legal_girths(subject.girths)
-    found = {segment: _opinion(segment, reference, skeleton, subject, girths) for segment in SEGMENTS}
-    opinions = {segment: one for segment, one in found.items() if one.said}
-    total = sum(one.mass for one in found.values())
+    every = {segment: _opinion(segment, reference, skeleton, subject, girths) for segment in SEGMENTS}
+    opinions = {segment: one for segment, one in every.items() if one.said}
+    total = sum(one.mass for one in every.values())
     if abs(total / subject.mass - 1) > _CONTRADICTION:
-        raise SessionRefused(_contradiction(total, found, reference, subject))
+        table = {segment: reference.segments[kind_of(segment)].mass * subject.mass for segment in opinions}
+        over = {segment: one.mass - table[segment] for segment, one in opinions.items()}
+        worst = max(over, key=lambda segment: abs(over[segment]))
+        raise SessionRefused(
+            f"[subject] girths_cm: the girths make a body of {total:.1f} kg, but the body mass is {subject.mass:.1f} "
+            f"kg ({100 * (total / subject.mass - 1):+.0f} %, at most {100 * _CONTRADICTION:.0f} % is believed). "
+            f"Farthest from the table: {worst} by {over[worst]:+.1f} kg ({', '.join(opinions[worst].said)}). Measure "
+            "these girths again, or correct mass_kg."
+        )
     return opinions
-
-
-def _contradiction(total: float, found: Mapping[str, SegmentOpinion], reference: Reference, subject: Subject) -> str:
-    over = {
-        segment: one.mass - reference.segments[kind_of(segment)].mass * subject.mass
-        for segment, one in found.items()
-        if one.said
-    }
-    worst = max(over, key=lambda segment: abs(over[segment]))
-    return (
-        f"[subject] girths_cm: the girths make a body of {total:.1f} kg, but the body mass is {subject.mass:.1f} kg "
-        f"({100 * (total / subject.mass - 1):+.0f} %, at most {100 * _CONTRADICTION:.0f} % is believed). Farthest from "
-        f"the table: {worst} by {over[worst]:+.1f} kg ({', '.join(found[worst].said)}). Measure these girths again, or "
-        f"correct mass_kg."
-    )
 
 
 def _opinion(
@@ -174,7 +168,7 @@ def _opinion(
     mine = {name: girths.get(f"{side}{name}", girths.get(name)) for name in usual_girths()}
     person = {kind_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
     survey = read_table("human", "girths").provenance["people"]["mass_kg"][subject.sex]
-    mean, mean_sd = mean_fraction(kind, MAN if subject.sex == "M" else WOMAN)
+    mean, mean_sd = mean_fraction(kind, subject.sex)
     shape, survey_sd = (error_size("solid_mass", what) for what in ("trunk" if kind in _TRUNK else "limb", "survey"))
     own = np.linalg.norm([mean_sd, shape, survey_sd])
     mass = variance = 0.0

@@ -29,8 +29,6 @@ from biodance.settings import STANDARD_GRAVITY, Settings
 
 COM_SIGMAS = 3.0
 """Half width of a CoM box in prior standard deviations."""
-
-
 LUMBAR_HEIGHT = 0.112 / 1.755
 """Stature: height over the hip centres of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II man
 of 1.755 m).
@@ -65,13 +63,7 @@ def sole(skeleton: Skeleton, subject: Subject, side: str) -> Foot:
     segment = f"{side}_foot"
     outline = subject.foot_outline.get(side) or usual_outline(skeleton.lengths[segment], subject.sex)
     corners = sole_corners(outline, subject.sex) - [skeleton.heel_behind_ankle[side], 0.0]
-    return Foot(SEGMENTS.index(segment), np.array([[x, -skeleton.ankle_height[side], z] for x, z in corners]))
-
-
-def _with_feet(skeleton: Skeleton, subject: Subject) -> Skeleton:
-    """Return the skeleton with feet as long as their outlines."""
-    feet = {f"{side}_foot": outline.length for side, outline in subject.foot_outline.items()}
-    return replace(skeleton, lengths={**skeleton.lengths, **feet})
+    return Foot(SEGMENTS.index(segment), np.insert(corners, 1, -skeleton.ankle_height[side], axis=1))
 
 
 ADULT = (18.0, 65.0)
@@ -143,7 +135,8 @@ def assemble(
     gravity: float = STANDARD_GRAVITY,
 ) -> Body:
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
-    skeleton = _with_feet(skeleton, subject)
+    measured = {f"{side}_foot": outline.length for side, outline in subject.foot_outline.items()}
+    skeleton = replace(skeleton, lengths={**skeleton.lengths, **measured})
     usual, boxes = reference(table, subject), shape_boxes(skeleton)
     opinions = body_opinions(usual, skeleton, subject)
     sip = prior(usual, skeleton, subject, opinions)
@@ -171,10 +164,10 @@ def _shape_notes(told: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
     """Return what of the person's shape says something about which masses."""
     if not told:
         return ()
-    said: dict[str, list[str]] = {}
+    by_source: dict[str, list[str]] = {}
     for segment, names in told.items():
-        said.setdefault(", ".join(name for name in names if name != "scan"), []).append(segment)
-    some = [f"{names} for {' and '.join(segments)}" for names, segments in said.items() if names]
+        by_source.setdefault(", ".join(name for name in names if name != "scan"), []).append(segment)
+    some = [f"{names} for {' and '.join(segments)}" for names, segments in by_source.items() if names]
     scanned = ["the scan for all segments"] if "scan" in told.get("pelvis", ()) else []
     words = "; ".join([*some, *scanned]).replace("_", " ")
     return (
@@ -211,15 +204,18 @@ def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers
     left out.
     """
     shoulders = np.mean([skeleton.origins["right_shoulder"], skeleton.origins["left_shoulder"]], axis=0)
-    labels, segments, positions, weights = [], [], [], []
-    for marker in marker_set.markers:
-        if marker.offset is not None:
-            base = shoulders if marker.origin == "mid_shoulder" else np.zeros(3)
-            labels.append(marker.label)
-            segments.append(SEGMENTS.index(marker.segment))
-            positions.append(base + np.array(marker.offset) * normaliser(skeleton, marker.normaliser, marker.segment))
-            weights.append(marker.weight)
-    return SegmentMarkers(tuple(labels), tuple(segments), np.array(positions).reshape(-1, 3), np.array(weights))
+    worn = [marker for marker in marker_set.markers if marker.offset is not None]
+    places = [
+        np.array(marker.offset) * normaliser(skeleton, marker.normaliser, marker.segment)
+        + (shoulders if marker.origin == "mid_shoulder" else 0.0)
+        for marker in worn
+    ]
+    return SegmentMarkers(
+        tuple(marker.label for marker in worn),
+        tuple(SEGMENTS.index(marker.segment) for marker in worn),
+        np.array(places).reshape(-1, 3),
+        np.array([marker.weight for marker in worn]),
+    )
 
 
 def normaliser(skeleton: Skeleton, name: str, segment: str) -> float:

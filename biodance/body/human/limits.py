@@ -67,21 +67,15 @@ def age_factor(anderson: AnthropometricTable, subject: Subject) -> float:
     """Return the strength at the subject's age against 18-25 years, mean over Anderson's six torques of the same
     sex.
     """
-    ratios = [
-        _coefficient(anderson, subject, joint, direction) / _groups(anderson, subject.sex, joint, direction)[0]
-        for joint, direction in _ANDERSON
-    ]
+    young = replace(subject, age=25.0)
+    ratios = [_coefficient(anderson, subject, *one) / _coefficient(anderson, young, *one) for one in _ANDERSON]
     return float(np.mean(ratios))
 
 
-def _groups(anderson: AnthropometricTable, sex: str, joint: str, direction: str) -> Array:
-    rows = anderson.where(joint=joint, direction=direction, sex=sex)
-    return np.array([float(row["C1"]) for row in rows])
-
-
 def _coefficient(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
+    rows = anderson.where(joint=joint, direction=direction, sex=subject.sex)
     age = 25.0 if isnan(subject.age) else subject.age
-    return float(np.interp(age, [25.0, 60.0, 70.0], _groups(anderson, subject.sex, joint, direction)))
+    return float(np.interp(age, [25.0, 60.0, 70.0], [float(row["C1"]) for row in rows]))
 
 
 HAND_TURN = np.radians(120.0)
@@ -112,35 +106,30 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which
     stands tilted.
     """
-    angle, limits = q[body.nq - len(body.joints) :], body.limits
-    tilt = standing_tilt(q)
-    shift = np.array(
-        [tilt * (joint.name.endswith("_hip_flexion") - float(joint.name == "trunk_flexion")) for joint in body.joints]
-    )
-    limits = replace(limits, lower=limits.lower + np.minimum(shift, 0.0), upper=limits.upper + np.maximum(shift, 0.0))
-    turning, ankle = (
-        np.array([joint.name.endswith(end) for joint in body.joints])
-        for end in ("_shoulder_rotation", "_ankle_dorsiflexion")
-    )
-    loaded = np.where(ankle, np.maximum(limits.upper, LOADED_ANKLE), limits.upper)
-    limits = replace(
-        limits, lower=np.where(turning, -HAND_TURN, limits.lower), upper=np.where(turning, HAND_TURN, loaded)
-    )
-    free = _BEYOND * np.array([not joint.name.endswith(HELD) for joint in body.joints])
-    limits = replace(limits, lower=limits.lower - free, upper=limits.upper + free)
-    lower, upper = np.minimum(limits.lower, angle - _SPARE), np.maximum(limits.upper, angle + _SPARE)
+    angle, names, tilt = q[body.nq - len(body.joints) :], [joint.name for joint in body.joints], standing_tilt(q)
+
+    def named(*ends: str) -> Array:
+        return np.array([name.endswith(ends) for name in names], dtype=float)
+
+    shift = tilt * (named("_hip_flexion") - named("trunk_flexion"))
+    lower, upper = body.limits.lower + np.minimum(shift, 0.0), body.limits.upper + np.maximum(shift, 0.0)
+    upper = np.where(named("_ankle_dorsiflexion"), np.maximum(upper, LOADED_ANKLE), upper)
+    lower, upper = (np.where(named("_shoulder_rotation"), *pair) for pair in ((-HAND_TURN, lower), (HAND_TURN, upper)))
+    free = _BEYOND * (1.0 - named(*HELD))
+    lower, upper = lower - free, upper + free
+    low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
     notes = tuple(
-        f"Range of {joint.name} widened to {round(np.degrees(lower[i]))} to {round(np.degrees(upper[i]))} degrees: "
+        f"Range of {name} widened to {round(np.degrees(low[i]))} to {round(np.degrees(high[i]))} degrees: "
         f"{round(np.degrees(angle[i]))} degrees when standing."
-        for i, joint in enumerate(body.joints)
-        if lower[i] < limits.lower[i] or upper[i] > limits.upper[i]
+        for i, name in enumerate(names)
+        if low[i] < lower[i] or high[i] > upper[i]
     )
     lean = round(np.degrees(tilt))
     tilted = (
         f"Pelvis markers stand tilted {lean} degree{'s' * (abs(lean) != 1)} forwards: ranges of hip and trunk flexion "
         f"are widened by as much."
     )
-    return replace(limits, lower=lower, upper=upper), (tilted, *notes)
+    return replace(body.limits, lower=low, upper=high), (tilted, *notes)
 
 
 def with_tracking_limits(body: Body) -> Body:

@@ -130,12 +130,8 @@ class Measures:
 
 def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measures:
     """Return the measures of a subject; what the static trial's file says comes before what the subject record says."""
-    given = {
-        name.lower(): value
-        for source in (subject.measurements, static.measurements)
-        for name, value in source.items()
-        if value > 0
-    }
+    typed_in = {**subject.measurements, **static.measurements}
+    given = {name.lower(): value for name, value in typed_in.items() if value > 0}
     place = posture.landmarks
     middle = (place["right_asis"] + place["left_asis"]) / 2
     width = float(np.linalg.norm(place["right_asis"] - place["left_asis"]))

@@ -1,5 +1,5 @@
-"""What else speaks of a person's segments beside the table: girths, the outlines of the feet, a scan; each with its own
-noise, all weighed in the same way.
+"""Measurements of a person's segments beside the table: girths, the outlines of the feet, a scan; each with its own
+noise, all weighted in the same way.
 """
 
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.human.girths import MAN, WOMAN, SegmentOpinion, girth_opinions, mean_fraction
+from biodance.body.human.girths import SegmentOpinion, girth_opinions, mean_fraction
 from biodance.body.human.scan import read_scan
 from biodance.body.human.scan_parts import ScannedBody, cut_scan
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
@@ -40,17 +40,17 @@ def foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, SegmentOpin
     the outline and the height of the ankle over those of that mean person.
     """
     people = read_table("human", "girths").provenance["people"]
-    mean, mean_sd = mean_fraction("foot", MAN if subject.sex == "M" else WOMAN)
+    mean, mean_sd = mean_fraction("foot", subject.sex)
     stature = people["stature_m"][subject.sex]
     usual = usual_outline(proportion("foot_length", subject.sex) * stature, subject.sex)
     height = proportion("ankle_height", subject.sex) * stature
     own = np.linalg.norm([mean_sd, error_size("solid_mass", "foot"), error_size("solid_mass", "survey")])
-    found = {}
+    opinions = {}
     for side in SIDES:
         area = _area(subject.foot_outline[side], subject.sex) / _area(usual, subject.sex)
         mass = mean * people["mass_kg"][subject.sex] * area * skeleton.ankle_height[side] / height
-        found[f"{side}_foot"] = SegmentOpinion(mass, float(own * mass), ("foot outline",))
-    return found
+        opinions[f"{side}_foot"] = SegmentOpinion(mass, float(own * mass), ("foot outline",))
+    return opinions
 
 
 def _area(outline: FootSizes, sex: Sex) -> float:
@@ -73,7 +73,7 @@ _TRUNK = ("pelvis", "trunk_head")
 @dataclass(frozen=True, eq=False)
 class Opinion:
     """``value`` (n,) of the rows ``where`` (n,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] (120,; kg, m, m²) of all
-    segments with covariance ``noise`` (n, n); ``said`` by segment: what told its mass.
+    segments with covariance ``noise`` (n, n); ``said`` by segment: what its mass was measured by.
     """
 
     where: np.ndarray
@@ -90,21 +90,21 @@ def body_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) ->
     SessionRefused
         One of them cannot be of this person.
     """
-    found = []
+    opinions = []
     if subject.girths:
-        found.append(_of_masses(girth_opinions(reference, skeleton, subject)))
+        opinions.append(_of_masses(girth_opinions(reference, skeleton, subject)))
     if subject.foot_outline:
-        found.append(_of_masses(foot_opinions(skeleton, subject)))
+        opinions.append(_of_masses(foot_opinions(skeleton, subject)))
     if subject.scan:
         scan = read_scan(subject.scan, subject.stature, subject.scan_up)
-        found.append(scan_opinion(cut_scan(scan, skeleton), subject))
-    return tuple(found)
+        opinions.append(scan_opinion(cut_scan(scan, skeleton), subject))
+    return tuple(opinions)
 
 
 def told_by(opinions: tuple[Opinion, ...]) -> dict[str, tuple[str, ...]]:
-    """Return by segment what told its mass beside the table, in the order of the segments."""
-    said = {name: tuple(word for one in opinions for word in one.said.get(name, ())) for name in SEGMENTS}
-    return {name: words for name, words in said.items() if words}
+    """Return by segment what its mass was measured by beside the table, in the order of the segments."""
+    sources = {name: tuple(word for one in opinions for word in one.said.get(name, ())) for name in SEGMENTS}
+    return {name: words for name, words in sources.items() if words}
 
 
 def _of_masses(opinions: Mapping[str, SegmentOpinion]) -> Opinion:
@@ -138,8 +138,11 @@ def scan_opinion(body: ScannedBody, subject: Subject) -> Opinion:
             f"{100 * _CONTRADICTION:.0f} % is believed). Is it the same person, in tight clothes, and mass_kg right?"
         )
     value = np.concatenate([primitives_of(lump) for lump in lumps])
-    sd = np.concatenate([[0.0, *[error_size("scan_com", "any")] * 3, *_tensor_sd(lump)] for lump in lumps])
-    noise = np.diag(sd**2)
+    com_sd, share, sd = error_size("scan_com", "any"), error_size("scan_inertia", "any"), list[float]()
+    for lump in lumps:
+        own = np.diag(lump.inertia) / lump.mass
+        sd += [0.0, *[com_sd] * 3, *(share * np.array([np.sqrt(own[i] * own[j]) for i, j in TENSOR]))]
+    noise = np.diag(np.square(sd))
     noise[::10, ::10] = _mass_noise(mass, body)
     return Opinion(np.arange(value.size), value, noise, dict.fromkeys(SEGMENTS, ("scan",)))
 
@@ -149,31 +152,21 @@ def primitives_of(lump: RigidInertia) -> Array:
     return np.array([lump.mass, *lump.com, *(lump.inertia[i, j] / lump.mass for i, j in TENSOR)])
 
 
-def _tensor_sd(lump: RigidInertia) -> Array:
-    own = np.diag(lump.inertia) / lump.mass
-    return error_size("scan_inertia", "any") * np.array([np.sqrt(own[i] * own[j]) for i, j in TENSOR])
-
-
 def _mass_noise(mass: Array, body: ScannedBody) -> Array:
     """Return the covariance (12, 12) kg² of the masses of a scan."""
     kinds = np.array([kind_of(name) for name in SEGMENTS])
     density = np.array([error_size("scan_density", "trunk" if kind in _TRUNK else "limb") for kind in kinds])
     noise = np.where(kinds[:, None] == kinds, np.outer(density * mass, density * mass), 0.0)
-    surface, cuts = np.array([body.surfaces[name] for name in SEGMENTS]), body.cuts
+    surface = np.array([body.surfaces[name] for name in SEGMENTS])
     noise += error_size("scan_surface", "any") ** 2 * np.outer(surface, surface)
     alike = error_size("left_right_correlation", "mass")
-    for joint, (near, far) in _NEIGHBOURS.items():
-        moved = np.array([_moved(cuts[f"{side}_{joint}"], near, far, side) for side in SIDES])
-        spread = error_size("scan_cut", joint) ** 2
+    for joint, neighbours in _NEIGHBOURS.items():
+        moved = np.zeros((len(SIDES), len(SEGMENTS)))  # kg that a cut moved by a metre gives to every segment
+        for row, side in zip(moved, SIDES, strict=True):
+            near, far = (SEGMENTS.index(kind if kind in _TRUNK else f"{side}_{kind}") for kind in neighbours)
+            row[near] = body.cuts[f"{side}_{joint}"]
+            row[far] = -row[near]
         both = moved.sum(axis=0)
-        noise += spread * ((1 - alike) * moved.T @ moved + alike * np.outer(both, both))
-    across = _moved(cuts["trunk"], *_TRUNK, "")
+        noise += error_size("scan_cut", joint) ** 2 * ((1 - alike) * moved.T @ moved + alike * np.outer(both, both))
+    across = body.cuts["trunk"] * np.array([(name == "pelvis") - float(name == "trunk_head") for name in SEGMENTS])
     return np.asarray(noise + error_size("scan_cut", "trunk") ** 2 * np.outer(across, across))
-
-
-def _moved(slope: float, near: str, far: str, side: str) -> Array:
-    """Return what a cut moved by a metre gives to every segment (12,) kg/m."""
-    out = np.zeros(len(SEGMENTS))
-    for kind, sign in ((near, 1.0), (far, -1.0)):
-        out[SEGMENTS.index(kind if kind in _TRUNK else f"{side}_{kind}")] += sign * slope
-    return out

@@ -122,8 +122,7 @@ def _with_clavicle(body: Body, side: str) -> Body:
     if not seen:
         return body
     place, axes = sternoclavicular(body, side), _axes("clavicle", side)
-    cut = Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), seen, (shoulder,))
-    return _ranged(with_part(body, cut))
+    return _ranged(with_part(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), seen, (shoulder,))))
 
 
 def _with_pronation(body: Body, side: str, landmarks: Mapping[str, tuple[tuple[str, ...], ...]]) -> Body:
@@ -198,11 +197,9 @@ def marker_groups(body: Body) -> tuple[str, ...]:
     """
     places = neck_and_vertex(body)
     neck = np.inf if places is None else float(places[0][1])
-    worn = zip(body.markers.segment, body.markers.position[:, 1], strict=True)
-    return tuple(_group(kind_of(body.links[s]), y > neck) for s, y in worn)
-
-
-def _group(kind: str, above_neck: bool) -> str:
-    if kind == "head" or (kind == "trunk_head" and above_neck):
-        return "head"
-    return "arms" if kind in _ARMS else "trunk" if kind in _TRUNK else "legs"
+    groups = []
+    for segment, height in zip(body.markers.segment, body.markers.position[:, 1], strict=True):
+        kind = kind_of(body.links[segment])
+        head = kind == "head" or (kind == "trunk_head" and height > neck)
+        groups.append("head" if head else "arms" if kind in _ARMS else "trunk" if kind in _TRUNK else "legs")
+    return tuple(groups)

@@ -18,7 +18,7 @@ from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
 from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres
 from biodance.body.human.unseen import widen_unseen, with_unseen_parts
-from biodance.body.parts import Joint, SegmentMarkers
+from biodance.body.parts import SegmentMarkers
 from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
 from biodance.records import SIDES, Array, Subject, Trial
@@ -173,20 +173,14 @@ def static_skeleton(frames: SegmentFrames, posture: StaticPosture, sizes: Measur
         thigh, shank, foot, arm, forearm = (
             f"{side}_{kind}" for kind in ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
         )
-        for joint, parent, child in (
-            ("hip", "pelvis", thigh),
-            ("knee", thigh, shank),
-            ("ankle", shank, foot),
-            ("elbow", arm, forearm),
-        ):
+        for joint, parent, child in (("hip", "pelvis", thigh), ("shoulder", "trunk_head", arm)):
             origins[f"{side}_{joint}"] = local(parent, frames.origin[child])
-        origins[f"{side}_shoulder"] = local("trunk_head", frames.origin[arm])
-        for segment, end in ((thigh, "knee"), (shank, "ankle"), (arm, "elbow")):
-            lengths[segment] = float(np.linalg.norm(origins[f"{side}_{end}"]))
+        for joint, parent, child in (("knee", thigh, shank), ("ankle", shank, foot), ("elbow", arm, forearm)):
+            origins[f"{side}_{joint}"] = local(parent, frames.origin[child])
+            lengths[parent] = float(np.linalg.norm(origins[f"{side}_{joint}"]))
+            turns[f"{side}_{joint}"] = _turn(frames, parent, child)
         lengths[forearm] = float(np.linalg.norm(local(forearm, frames.ends[f"{side}_wrist"])))
         lengths[foot], height[side], behind[side] = _foot(frames, posture, sizes, subject, side)
-        for joint, pair in (("knee", (thigh, shank)), ("ankle", (shank, foot)), ("elbow", (arm, forearm))):
-            turns[f"{side}_{joint}"] = _turn(frames, *pair)
     return Skeleton(lengths, origins, height, behind, sizes.pelvis_width, subject.stature, turns, cut)
 
 
@@ -214,30 +208,15 @@ def static_posture(body: Body, frames: SegmentFrames) -> Array:
     """Return q (30,) of the body in the static trial."""
     from scipy.spatial.transform import Rotation
 
-    angles: dict[str, list[Joint]] = {}
-    for joint in body.joints:
-        group = joint.name.rsplit("_", 1)[0]
-        angles.setdefault(group, []).append(joint)
-    q = np.concatenate(
-        [frames.origin["pelvis"], Rotation.from_matrix(frames.rotation["pelvis"]).as_quat(), np.zeros(len(body.joints))]
-    )
+    q = np.zeros(body.nq)
+    q[:3], q[3:7] = frames.origin["pelvis"], Rotation.from_matrix(frames.rotation["pelvis"]).as_quat()
     for group in JOINTS:
-        chain = angles[group]
-        child = body.segments[chain[-1].segment]
-        relative = chain[0].rotation.T @ frames.rotation[_parent(child)].T @ frames.rotation[child]
-        for joint, angle in zip(chain, chain_angles(relative, np.array([joint.axis for joint in chain])), strict=True):
-            q[7 + body.joints.index(joint)] = angle
+        chain = [i for i, joint in enumerate(body.joints) if joint.name.rsplit("_", 1)[0] == group]
+        first, last = body.joints[chain[0]], body.joints[chain[-1]]
+        above = body.segments[body.joints[first.parent].segment if first.parent >= 0 else 0]
+        relative = first.rotation.T @ frames.rotation[above].T @ frames.rotation[body.segments[last.segment]]
+        q[7 + np.array(chain)] = chain_angles(relative, np.array([body.joints[i].axis for i in chain]))
     return q
-
-
-def _parent(segment: str) -> str:
-    side = segment.split("_")[0]
-    return {
-        "shank": f"{side}_thigh",
-        "foot": f"{side}_shank",
-        "forearm_hand": f"{side}_upper_arm",
-        "upper_arm": "trunk_head",
-    }.get(kind_of(segment), "pelvis")
 
 
 def chain_angles(relative: Array, axes: Array) -> Array:
@@ -247,13 +226,8 @@ def chain_angles(relative: Array, axes: Array) -> Array:
     One axis: any. Two: z then x. Three: z then x then y.
     """
     if len(axes) == 1:
-        spin = (
-            np.array(
-                [relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]]
-            )
-            / 2
-        )
-        return np.array([np.arctan2(axes[0] @ spin, (np.trace(relative) - 1) / 2)])
+        odd = (relative - relative.T) / 2
+        return np.array([np.arctan2(axes[0] @ [odd[2, 1], odd[0, 2], odd[1, 0]], (np.trace(relative) - 1) / 2)])
     if len(axes) == 2:
         angles = [np.arctan2(relative[1, 0], relative[0, 0]), np.arctan2(relative[2, 1], relative[2, 2])]
     else:
@@ -269,8 +243,7 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
         if not low < skeleton.lengths[segment] < high:
             notes.append(
                 f"Warning: {segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be "
-                f"usual at "
-                f"{subject.stature:.2f} m: check its markers, and the stature."
+                f"usual at {subject.stature:.2f} m: check its markers, and the stature."
             )
         other = segment.replace("right_", "left_")
         if other != segment and abs(skeleton.lengths[segment] - skeleton.lengths[other]) > 0.02:

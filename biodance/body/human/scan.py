@@ -14,7 +14,6 @@ from biodance.records import Array
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-
 _ROUNDING = 1e-12
 """m."""
 
@@ -47,7 +46,7 @@ def clip_surface(triangles: Array, point: Array, normal: Array) -> Array:
     edges = crossing_edges(triangles, point, normal)
     whole, tips, roofs = (triangles[count == n] for n in (3, 1, 2))
     apex, roof = (_first(part, above[count == n] == (n == 1)) for part, n in ((tips, 1), (roofs, 2)))
-    one, two = edges[count[_crossed(count)] == 1], edges[count[_crossed(count)] == 2]
+    one, two = (edges[count[(count == 1) | (count == 2)] == n] for n in (1, 2))
     tip = np.stack([apex[:, 0], one[:, 1], one[:, 0]], axis=1)
     left = np.stack([roof[:, 1], roof[:, 2], two[:, 1]], axis=1)
     right = np.stack([roof[:, 1], two[:, 1], two[:, 0]], axis=1)
@@ -60,9 +59,9 @@ def crossing_edges(triangles: Array, point: Array, normal: Array) -> Array:
     above the lid that these edges bound.
     """
     height = _heights(triangles, point, normal)
-    crossed = _crossed((height > 0).sum(axis=1))
-    triangles, height = triangles[crossed], height[crossed]
-    single = (height > 0).sum(axis=1) == 1
+    count = (height > 0).sum(axis=1)
+    crossed = (count == 1) | (count == 2)
+    triangles, height, single = triangles[crossed], height[crossed], count[crossed] == 1
     alone = (height > 0) == single[:, None]
     corner, level = _first(triangles, alone), _first(height[..., None], alone)[..., 0]
     share = (level[:, :1] / (level[:, :1] - level[:, 1:]))[..., None]
@@ -89,10 +88,6 @@ def _heights(triangles: Array, point: Array, normal: Array) -> Array:
     arm = triangles - point
     height = arm[..., 0] * normal[0] + arm[..., 1] * normal[1] + arm[..., 2] * normal[2]
     return np.where(np.abs(height) < _ROUNDING, 0.0, height)
-
-
-def _crossed(count: Array) -> Array:
-    return (count == 1) | (count == 2)
 
 
 def _first(values: Array, marked: Array) -> Array:

@@ -1,5 +1,5 @@
-"""What a scanned body says about the segments: its closed surface cut at the joints of the scaled skeleton, volume
-times density.
+"""Segment masses, centres and inertias of a scanned body: its closed surface cut at the joints of the scaled skeleton,
+volume times density.
 
 Hips, knees, ankles, shoulders and elbows lie where the skeleton's lengths put them in the standing person: legs from
 the soles up, arms from the shoulder towards the finger tips. Planes: across the limb at knee and elbow, level at ankle,
@@ -40,7 +40,7 @@ _HAND = 0.108
 
 @dataclass(frozen=True, eq=False)
 class ScannedBody:
-    """What a scan says: ``lumps`` by segment, each in its segment frame, and ``cuts`` by joint: kg that a metre of the
+    """The segments of a scan: ``lumps``, each in its segment frame, and ``cuts`` by joint: kg that a metre of the
     cut along the limb takes from the segment behind it and gives to the one before;
     ``surfaces`` by segment: kg that a surface a metre farther out would add.
     """

@@ -56,9 +56,8 @@ def standing(static: Trial) -> StaticPosture:
     if not static.marker_set:
         raise TrialRefused(
             f"{where}: its {len(static.markers.names)} labels are of no known marker set. Label them as in "
-            f"anthropometry/marker_sets, "
-            "or describe your own set in a TOML file of that form "
-            "and give it with --markers FILE, or say [markers] file or map in session.toml."
+            "anthropometry/marker_sets, or describe your own set in a TOML file of that form and give it with "
+            "--markers FILE, or say [markers] file or map in session.toml."
         )
     marker_set = read_marker_set(static.marker_set)
     markers = canonical(static.markers, marker_set)
@@ -73,7 +72,10 @@ def standing(static: Trial) -> StaticPosture:
             points[label] = np.median(near if len(near) else track, axis=0)
         (missing if not len(track) else elsewhere if not len(near) else []).append(label)
     corners = _corners(points, marker_set)
-    landmarks = _landmarks(points | corners, marker_set)
+    seen = points | corners
+    one = Markers(tuple(seen), np.zeros(1), np.array(list(seen.values())).reshape(1, -1, 3))
+    tracks = {name: landmark(one, marker_set, name) for name in LANDMARKS}
+    landmarks = {name: track[0] for name, track in tracks.items() if track is not None}
     if not corners:
         landmarks = {name: place for name, place in landmarks.items() if not name.endswith("_knee_axis")}
     points |= corners
@@ -103,12 +105,6 @@ def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Ar
         step = reach * square / np.linalg.norm(square)
         found[marker.label] = middle + (step if step @ (body - middle) > 0 else -step)
     return found
-
-
-def _landmarks(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
-    one = Markers(tuple(points), np.zeros(1), np.array(list(points.values())).reshape(1, -1, 3))
-    found = {name: landmark(one, marker_set, name) for name in LANDMARKS}
-    return {name: place[0] for name, place in found.items() if place is not None}
 
 
 def _refuse_missing(landmarks: Mapping[str, Array], marker_set: MarkerSet, where: str) -> None:

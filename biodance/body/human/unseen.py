@@ -19,6 +19,7 @@ from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array
 
 _THORAX = ("c7", "jugular_notch", "t10", "xiphoid")
+_ARM = ("upper_arm", "forearm_hand")
 ARM_JOINTS = {side: (f"{side}_shoulder", f"{side}_elbow") for side in SIDES}
 """The anatomical joints of an arm, held where it is not seen."""
 
@@ -56,16 +57,15 @@ def with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> S
     hidden: list[str] = []
     for side in SIDES:
         hidden += _arm(mark, upright, side)
-    segments = {f"{side}_{part}" for side in hidden for part in ("upper_arm", "forearm_hand")}
+    segments = {f"{side}_{part}" for side in hidden for part in _ARM}
     worn = {marker.label for marker in posture.marker_set.markers if marker.segment in segments}
     points = {label: place for label, place in posture.points.items() if label not in worn}
     unseen += [joint for side in hidden for joint in ARM_JOINTS[side]]
     if hidden:
         notes.append(
-            f"Warning: the {' and '.join(hidden)} arm{'s' if len(hidden) > 1 else ''} carr"
-            f"{'y' if len(hidden) > 1 else 'ies'} no markers that place elbow and wrist: taken as hanging straight "
-            f"and carried by the trunk as one piece, at the mass of the table. Its swing is not in the simulated "
-            f"wrench."
+            f"Warning: the {' and '.join(hidden)} arm{'s carry' if len(hidden) > 1 else ' carries'} no markers that "
+            "place elbow and wrist: taken as hanging straight and carried by the trunk as one piece, at the mass of "
+            "the table. Its swing is not in the simulated wrench."
         )
     return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
 
@@ -74,9 +74,7 @@ def widen_unseen(body: Body, unseen: tuple[str, ...]) -> Body:
     """Return the body with wider standard deviations of where the mass of its unseen parts is: a posture that nobody
     saw shifts the centre of mass.
     """
-    sizes = {
-        f"{side}_{part}": "arm" for side in SIDES for part in ("upper_arm", "forearm_hand") if f"{side}_elbow" in unseen
-    }
+    sizes = {f"{side}_{part}": "arm" for side in SIDES for part in _ARM if f"{side}_elbow" in unseen}
     sizes |= {"trunk_head": "trunk_head"} if "trunk" in unseen else {}
     if not sizes:
         return body
@@ -93,7 +91,7 @@ def _upright(mark: Mapping[str, Array], lengths: Mapping[str, float]) -> _Uprigh
     width = float(np.linalg.norm(mark["right_asis"] - mark["left_asis"]))
     local = harrington_hip(width, float(np.linalg.norm(middle - mark["mid_psis"])))
     right = unit(rotation[:, 2] * [1.0, 1.0, 0.0])
-    sizes = {f"{kind.removesuffix('_hand')}_length": lengths[kind] for kind in ("upper_arm", "forearm_hand")}
+    sizes = {f"{kind.removesuffix('_hand')}_length": lengths[kind] for kind in _ARM}
     sizes["trunk_length"] = lengths["trunk_head"]
     return _Upright(middle + rotation @ (local * [1.0, 1.0, 0.0]), np.cross(UP, right), right, sizes)
 

@@ -8,7 +8,7 @@ trunk (x forwards, y left, z up). At zero angles the legs are straight and the a
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import RigidInertia, inertial_parameters
+from biodance.body.inertia import RigidInertia, inertial_parameters, turn_inertia
 from biodance.body.parts import UPRIGHT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.prior import robot_covariance
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
@@ -49,21 +49,15 @@ def hoap3() -> Body:
     turns = _zero_posture(joints)
     lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]
     rows = [read_table("robots", "hoap3_joints").row(joint=joint.name) for joint in joints]
-    boxes = np.array(
-        [
-            row_numbers(read_table("robots", "hoap3_boxes").row(segment=s), "x_min y_min z_min x_max y_max z_max")
-            for s in _SEGMENTS
-        ]
-    ).reshape(-1, 2, 3)
+    corners = [read_table("robots", "hoap3_boxes").row(segment=segment) for segment in _SEGMENTS]
+    columns = "x_min y_min z_min x_max y_max z_max"
+    boxes = np.array([row_numbers(row, columns) for row in corners]).reshape(-1, 2, 3)
+    phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
     return Body(
         "HOAP-3",
         _SEGMENTS,
         joints,
-        Sip(
-            _SEGMENTS,
-            np.concatenate([inertial_parameters(lump) for lump in lumps]),
-            robot_covariance(lumps, [_COM_SD] * len(lumps)),
-        ),
+        Sip(_SEGMENTS, phi, robot_covariance(lumps, [_COM_SD] * len(lumps))),
         _limits(rows),
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
@@ -81,25 +75,14 @@ def _joints() -> tuple[Joint, ...]:
         name = row["joint"]
         side, _, kind = name.partition("_")
         if name == "waist_pitch":
-            joints.append(
-                Joint(
-                    name,
-                    -1,
-                    np.array([0.0, 1.0, 0.0]),
-                    UPRIGHT.T,
-                    np.zeros(3),
-                    _SEGMENTS.index("trunk_head"),
-                    "bend forwards",
-                )
-            )
+            carried, y = _SEGMENTS.index("trunk_head"), np.array([0.0, 1.0, 0.0])
+            joints.append(Joint(name, -1, y, UPRIGHT.T, np.zeros(3), carried, "bend forwards"))
             continue
         a, alpha, d, theta = (float(row[column]) for column in ("a_m", "alpha_deg", "d_m", "theta_deg"))
         tilt = elementary_rotation("x", np.radians(alpha))
         rotation, translation = tilt @ elementary_rotation("z", np.radians(theta)), np.array([a, 0.0, reach])
-        parent, reach = (
-            len(joints) - 1,
-            d,
-        )  # the length d lies behind this joint's axis: its frame stays at the proximal end
+        # the length d lies behind this joint's axis: its frame stays at the proximal end
+        parent, reach = len(joints) - 1, d
         if kind in ("hip_yaw", "shoulder_pitch"):
             parent, base, place = _base(kind, side, joints)
             rotation, translation = base @ rotation, place + base @ translation
@@ -134,7 +117,7 @@ def _lump(row: TableRow, turn: Array) -> RigidInertia:
     mass, *com = row_numbers(row, "mass_kg com_x com_y com_z")
     xx, yy, zz, xy, xz, yz = row_numbers(row, "Ixx Iyy Izz Ixy Ixz Iyz")
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return RigidInertia(mass, turn.T @ np.array(com), turn.T @ inertia @ turn)
+    return turn_inertia(RigidInertia(mass, np.array(com), inertia), turn.T)
 
 
 def _limits(rows: list[TableRow]) -> JointLimits:

@@ -1,5 +1,5 @@
-"""A robot's body told otherwise: in the axes of a person who stands, and at another size at which the same angles are
-the same movement (Froude 1861).
+"""A robot's body in the axes of a standing person, and its dynamically similar model (Froude 1861): the body of another
+size at which the same angles are the same movement.
 
 Whoever designs a dance wants root and feet with x forwards, y up, z right while the feet are flat (ISB, as in the human
 body). Frames of robots lie as their makers like; they are turned here, and what is written in them (parameters with
@@ -17,7 +17,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.frames import place_at_zero, written_in
-from biodance.body.parts import Foot, JointLimits
+from biodance.body.parts import Foot
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, Sip
 
@@ -49,9 +49,8 @@ def standing_frames(body: Body) -> Body:
             )
         ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
         ahead /= np.linalg.norm(ahead)
-        body = reframed(
-            body, foot.segment, turn.T @ np.stack([ahead, up, np.cross(ahead, up)], axis=1), _ankle(body, foot.segment)
-        )
+        axes = np.stack([ahead, up, np.cross(ahead, up)], axis=1)
+        body = reframed(body, foot.segment, turn.T @ axes, _ankle(body, foot.segment))
     return body
 
 
@@ -115,12 +114,11 @@ def likeness(body: Body, to: Likeness) -> Body:
         body,
         joints=tuple(replace(joint, translation=length * joint.translation) for joint in body.joints),
         sip=Sip(body.segments, units * body.sip.phi, np.outer(units, units) * body.sip.covariance),
-        limits=JointLimits(
-            limits.lower,
-            limits.upper,
-            limits.velocity / to.time,
-            mass * length * limits.torque_lower,
-            mass * length * limits.torque_upper,
+        limits=replace(
+            limits,
+            velocity=limits.velocity / to.time,
+            torque_lower=mass * length * limits.torque_lower,
+            torque_upper=mass * length * limits.torque_upper,
         ),
         markers=replace(body.markers, position=length * body.markers.position),
         boxes=length * body.boxes,

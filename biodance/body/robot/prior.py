@@ -22,11 +22,9 @@ def robot_covariance(lumps: list[RigidInertia], com_sd: list[float]) -> Array:
     out = np.zeros((10 * len(lumps), 10 * len(lumps)))
     for i, (lump, com) in enumerate(zip(lumps, com_sd, strict=True)):
         size = RELATIVE_INERTIA_SD * np.trace(lump.inertia) / lump.mass / 3
-        jacobian = parameter_jacobian(lump)
-        block = slice(10 * i, 10 * i + 10)
-        out[block, block] = (
-            jacobian @ np.diag([RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6]) ** 2 @ jacobian.T
-        )
+        jacobian, block = parameter_jacobian(lump), slice(10 * i, 10 * i + 10)
+        sd = np.diag([RELATIVE_MASS_SD * lump.mass, *[com] * 3, *[size] * 6])
+        out[block, block] = jacobian @ sd**2 @ jacobian.T
     return out
 
 

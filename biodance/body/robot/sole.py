@@ -25,14 +25,11 @@ def mesh_file(urdf: Path, name: str) -> Path:
         There is no such file; the message says where it was looked for.
     """
     plain = name.removeprefix("file://").removeprefix("model://")
-    if not name.startswith(_PACKAGE):
-        places = [urdf.parent / plain]
-    else:
+    places = [urdf.parent / plain]
+    if name.startswith(_PACKAGE):
         package, _, rest = name.removeprefix(_PACKAGE).partition("/")
         above = urdf.resolve().parents
-        places = [folder / package / rest for folder in above] + [
-            folder / rest for folder in above if folder.name == package
-        ]
+        places = [*(one / package / rest for one in above), *(one / rest for one in above if one.name == package)]
     for place in places:
         if place.is_file():
             return place

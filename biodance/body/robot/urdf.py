@@ -13,13 +13,13 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.export import refuse_impossible
 from biodance.body.frames import place_at_zero
-from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters
+from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters, turn_inertia
 from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
 from biodance.body.robot.likeness import reframed
 from biodance.body.robot.prior import com_deviation, extended, is_point, is_possible, robot_covariance, solid
 from biodance.body.robot.sole import match_faces, sole_outline
 from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
-from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.errors import BiodanceError, FileRefused, known_index
 from biodance.records import SIDES, Array, Sip
 
 
@@ -59,14 +59,13 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
     """
     file = read_urdf_file(path)
     for foot in feet:
-        if foot not in file.links:
-            raise UnknownName.of(f"link of {file.path}", foot, tuple(file.links))
+        known_index(f"link of {file.path}", foot, tuple(file.links))
     joints, limits, carriers, owner = _tree(file)
     heavy = [carrier for carrier in carriers if carrier.lumps]
     if not carriers[0].lumps:
         raise FileRefused(
             f"{file.path}: the root link {carriers[0].link} has no mass, nor has what is fixed to it. Give it an "
-            f"<inertial>."
+            "<inertial>."
         )
     for foot in feet:
         if owner[foot] not in heavy or owner[foot] is carriers[0]:
@@ -80,10 +79,8 @@ def read_urdf(path: str | Path, *, feet: tuple[str, str], mend: bool = False) ->
 
 def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[_Carrier], *, mend: bool) -> Body:
     """Return the body without soles, its root as in the file; ``heavy`` the links that move and have mass."""
-    segments, lumps = (
-        tuple(carrier.link for carrier in heavy),
-        [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy],
-    )
+    segments = tuple(carrier.link for carrier in heavy)
+    lumps = [combine_inertias(*c.lumps) if len(c.lumps) > 1 else c.lumps[0] for c in heavy]
     carried = {carrier.joint: i for i, carrier in enumerate(heavy)}
     boxes = np.array([_box(carrier, lump) for carrier, lump in zip(heavy, lumps, strict=True)])
     broken = [i for i, lump in enumerate(lumps) if mend and lump.mass > 0 and not is_possible(lump)]
@@ -100,9 +97,11 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         np.concatenate([np.minimum(boxes[:, :1], com), np.maximum(boxes[:, 1:], com)], axis=1),
-        notes=(
-            *_notes(file, heavy, [c.link for c, lump in zip(heavy, lumps, strict=True) if is_point(lump)]),
-            *_mended([segments[i] for i in broken]),
+        notes=_notes(
+            file,
+            guessed=[carrier.link for carrier in heavy if not carrier.corners.size],
+            points=[segment for segment, lump in zip(segments, lumps, strict=True) if is_point(lump)],
+            mended=[segments[i] for i in broken],
         ),
     )
     try:
@@ -142,9 +141,8 @@ def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dic
     for name, link in file.links.items():
         (turn, place), carrier = frame[name], owner[name]
         if link.lump is not None:
-            carrier.lumps.append(
-                RigidInertia(link.lump.mass, turn @ link.lump.com + place, turn @ link.lump.inertia @ turn.T)
-            )
+            turned = turn_inertia(link.lump, turn)
+            carrier.lumps.append(replace(turned, com=turned.com + place))
         carrier.shapes += [corners @ turn.T + place for corners in link.shapes]
         carrier.hulls += [corners @ turn.T + place for corners in link.hulls]
         carrier.unread += link.unread
@@ -182,23 +180,19 @@ def _box(carrier: _Carrier, lump: RigidInertia) -> Array:
     return np.stack([lump.com - half, lump.com + half])
 
 
-def _mended(links: list[str]) -> list[str]:
-    said = "Mended, since no body has their mass, centre and inertia: solid boxes in place of"
-    return [f"{said} {', '.join(links)}."] if links else []
+def _notes(file: UrdfFile, *, guessed: list[str], points: list[str], mended: list[str]) -> tuple[str, ...]:
+    def joints(field: str, value: str) -> list[str]:
+        return [connection.name for connection in file.connections if getattr(connection, field) == value]
 
-
-def _notes(file: UrdfFile, heavy: list[_Carrier], points: list[str]) -> tuple[str, ...]:
-    guessed = [carrier.link for carrier in heavy if not carrier.corners.size]
-    turning = [c.name for c in file.connections if c.kind == "continuous"]
-    notes = [f"No boxes in the file, taken from the inertia instead: {', '.join(guessed)}."] if guessed else []
-    notes += [f"Continuous joints are used within half a turn to either side: {', '.join(turning)}."] if turning else []
-    held = {why: ", ".join(c.name for c in file.connections if c.frozen == why) for why in ("mimic", "idle")}
-    notes += [f"Joints that mimic others are held where these are at zero: {held['mimic']}."] if held["mimic"] else []
-    notes += [f"Joints without speed and torque are held at zero: {held['idle']}."] if held["idle"] else []
-    notes += (
-        [f"Point masses in the file, of which the boxes say how sure they are: {', '.join(points)}."] if points else []
-    )
-    return tuple(notes)
+    notes = {
+        "No boxes in the file, taken from the inertia instead:": guessed,
+        "Continuous joints are used within half a turn to either side:": joints("kind", "continuous"),
+        "Joints that mimic others are held where these are at zero:": joints("frozen", "mimic"),
+        "Joints without speed and torque are held at zero:": joints("frozen", "idle"),
+        "Point masses in the file, of which the boxes say how sure they are:": points,
+        "Mended, since no body has their mass, centre and inertia: solid boxes in place of": mended,
+    }
+    return tuple(f"{sentence} {', '.join(names)}." for sentence, names in notes.items() if names)
 
 
 def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
@@ -215,8 +209,8 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     up, ahead = np.eye(3)[axis], np.eye(3)[0]
     if _backwards(feet, place, np.cross(ahead, up)):
         ahead = -ahead
-    soles = _soles(file, feet, place, up, ahead)
     sideways = np.cross(ahead, up)
+    soles = _soles(file, feet, place, np.stack([ahead, up, sideways]))
     right, left = (float(place[side][1] @ sideways) for side in SIDES)
     if not right > left:
         raise FileRefused(
@@ -239,9 +233,11 @@ def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]],
 
 
 def _soles(
-    file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], up: Array, ahead: Array
+    file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], axes: Array
 ) -> dict[str, Array]:
-    """Return the outlines (P, 3) m of both soles in the frames of the feet."""
+    """Return the outlines (P, 3) m of both soles in the frames of the feet; ``axes`` (3, 3), rows: forwards, up and to
+    the right in the root's frame.
+    """
     soles = {}
     for side, carrier in feet.items():
         if not carrier.corners.size:
@@ -249,8 +245,7 @@ def _soles(
             raise FileRefused(
                 f"{file.path}: the {side} foot {carrier.link} shows no sole, since {why}. Give it a collision <box>."
             )
-        turn, _ = place[side]
-        axes = np.stack([ahead, up, np.cross(ahead, up)]) @ turn
-        soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, axes)
+        own = axes @ place[side][0]
+        soles[side] = sole_outline(f"{file.path}: the foot {carrier.link}", carrier.shapes, carrier.hulls, own)
     soles["right"], soles["left"] = match_faces(soles["right"], soles["left"])
     return soles

@@ -5,7 +5,7 @@ fixed) with their placements and limits. Transmissions, sensors and colours do n
 wiki.ros.org/urdf/XML.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, fromstring
 
@@ -22,6 +22,9 @@ _KINDS = ("revolute", "continuous", "fixed")
 """Types of joints that a body can have."""
 _TURN = np.pi
 """rad: range of a continuous joint to either side."""
+_X = np.array([1.0, 0.0, 0.0])
+"""Axis of a joint that names none."""
+_X.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +54,11 @@ class Connection:
     child: str
     rotation: Array
     translation: Array
-    axis: Array
-    lower: float
-    upper: float
-    velocity: float
-    effort: float
+    axis: Array = _X
+    lower: float = 0.0
+    upper: float = 0.0
+    velocity: float = 0.0
+    effort: float = 0.0
     frozen: str = ""
 
 
@@ -152,7 +155,7 @@ def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | Non
 
 def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]:
     """Return the corners (8, 3) of the boxes around all shapes that are not meshes."""
-    found = []
+    boxes = []
     for element in elements:
         geometry = element.find("geometry")
         shape = next(iter(geometry), None) if geometry is not None else None
@@ -162,22 +165,21 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
             half = _row(path, shape, "size", what) / 2
         elif shape.tag in ("cylinder", "sphere"):
             radius = _number(path, shape, "radius", what)
-            half = np.array(
-                [radius, radius, radius if shape.tag == "sphere" else _number(path, shape, "length", what) / 2]
-            )
+            half = np.full(3, radius)
+            half[2] = radius if shape.tag == "sphere" else _number(path, shape, "length", what) / 2
         else:
             raise FileRefused(f"{path}: {what} has the shape <{shape.tag}>; legal are box, cylinder, sphere and mesh.")
         turn, place = placement(path, element, what)
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-        found.append(signs * half @ turn.T + place)
-    return tuple(found)
+        boxes.append(signs * half @ turn.T + place)
+    return tuple(boxes)
 
 
 def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
-    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; what cannot be read is said in
+    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; why one cannot be read is added to
     ``unread``.
     """
-    found = []
+    hulls = []
     for element in elements:
         mesh = element.find("geometry/mesh")
         if mesh is None:
@@ -185,10 +187,10 @@ def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]
         scale = _row(path, mesh, "scale", what, "1 1 1")
         turn, place = placement(path, element, what)
         try:
-            found.append(mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
+            hulls.append(mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
         except FileRefused as error:
             unread.append(str(error))
-    return tuple(found)
+    return tuple(hulls)
 
 
 def _connection(path: Path, element: Element, links: set[str]) -> Connection:
@@ -209,12 +211,11 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
             raise FileRefused(f"{path}: the {tag} of {what} is {link!r}, which is no link of the file. Correct it.")
         ends.append(link)
     rotation, translation = placement(path, element, what)
+    fixed = Connection(name, "fixed", ends[0], ends[1], rotation, translation)
     if kind == "fixed":
-        return Connection(
-            name, kind, ends[0], ends[1], rotation, translation, np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 0.0
-        )
+        return fixed
     given = element.find("axis")
-    axis = _row(path, given, "xyz", what) if given is not None else np.array([1.0, 0.0, 0.0])
+    axis = _row(path, given, "xyz", what) if given is not None else _X
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
         raise FileRefused(f"{path}: the axis of {what} has no direction ({axis}). Give xyz of an axis.")
@@ -224,10 +225,10 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
         slide, turn = (offset, 0.0) if kind == "prismatic" else (0.0, offset)
         held = rotation @ axis_rotation(axis, np.array([turn]))[0]
         place = translation + slide * rotation @ axis
-        return Connection(name, "fixed", ends[0], ends[1], held, place, axis, 0.0, 0.0, 0.0, 0.0, frozen="mimic")
+        return replace(fixed, rotation=held, translation=place, axis=axis, frozen="mimic")
     limits = _limits(path, element, kind, what)
     if not limits:
-        return Connection(name, "fixed", ends[0], ends[1], rotation, translation, axis, 0.0, 0.0, 0.0, 0.0, "idle")
+        return replace(fixed, axis=axis, frozen="idle")
     return Connection(name, kind, ends[0], ends[1], rotation, translation, axis, *limits)
 
 

@@ -6,6 +6,7 @@ import hashlib
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -67,9 +68,7 @@ class AnthropometricTable:
     provenance: Mapping[str, Any]
 
     def where(self, **wanted: str) -> tuple[TableRow, ...]:
-        """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``; may
-        be empty.
-        """
+        """Return the rows whose columns equal the wanted texts, for example ``where(segment="foot", sex="F")``."""
         return _rows_where(self, tuple(wanted.items()))
 
     def row(self, **wanted: str) -> TableRow:
@@ -80,13 +79,12 @@ class AnthropometricTable:
         UnknownName
             No row, or more than one, matches.
         """
-        found = self.where(**wanted)
-        if len(found) != 1:
+        rows = self.where(**wanted)
+        if len(rows) != 1:
             column, text = next(iter(wanted.items()))
-            raise UnknownName.of(
-                f"{column} of table {self.name} (with {wanted})", text, sorted({row[column] for row in self.rows})
-            )
-        return found[0]
+            legal = sorted({row[column] for row in self.rows})
+            raise UnknownName.of(f"{column} of table {self.name} (with {wanted})", text, legal)
+        return rows[0]
 
 
 @functools.cache
@@ -112,13 +110,17 @@ def read_table(family: str, name: str) -> AnthropometricTable:
         The numbers are not those that the provenance describes (sha256).
     """
     path = locate(f"anthropometry/{family}", name, ".csv")
-    data = path.read_bytes()
     provenance = read_toml(path.with_suffix(".toml"))
-    digest = hashlib.sha256(data).hexdigest()
-    if provenance.get("sha256") != digest:
+    refuse_changed(path, provenance.get("sha256", ""))
+    rows = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8")))
+    return AnthropometricTable(name, tuple(MappingProxyType(row) for row in rows), MappingProxyType(provenance))
+
+
+def refuse_changed(path: Path, sha256: str) -> None:
+    """Raise BiodanceError if a table is not the one whose ``sha256`` its provenance gives."""
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    if digest != sha256:
         raise BiodanceError(
             f"{path}: the numbers were changed since {path.stem}.toml was written (sha256 {digest}). "
             "Restore the file, or describe your change in the .toml and put this sha256 there."
         )
-    rows = csv.DictReader(io.StringIO(data.decode()))
-    return AnthropometricTable(name, tuple(MappingProxyType(row) for row in rows), MappingProxyType(provenance))

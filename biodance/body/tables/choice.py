@@ -17,8 +17,8 @@ from biodance.body.tables.anthropometry import COUNT, KINDS, Reference, normalis
 from biodance.body.tables.de_leva import de_leva
 from biodance.body.tables.published import dumas, study, winter, zatsiorsky
 from biodance.body.tables.segment_data import FAMILY, SegmentTable, read_segment_table
-from biodance.errors import BiodanceError, FileRefused, UnknownName
-from biodance.records import Array, Subject
+from biodance.errors import BiodanceError, FileRefused, known_index
+from biodance.records import Subject
 
 _AXES = "xyz"
 FULL = 0.02
@@ -87,20 +87,12 @@ def _lump(
     com, inertia = np.array(base.segments[kind].com) * stretch, np.array(base.segments[kind].inertia) * stretch**2
     wider = np.ones(3)
     for i, axis in enumerate(_AXES):
-        place, radius = (_metres(table, kind, quantity, axis, subject, length) for quantity in ("com", "gyration"))
-        com[i] = com[i] if place is None else place
-        wider[i] = 1.0 if radius is None else abs(radius) / np.sqrt(inertia[i, i])
-    return RigidInertia(mass, com, mass * _widened(inertia, wider))
-
-
-def _widened(inertia: Array, factor: Array) -> Array:
-    """Return the tensor with its radii of gyration multiplied by ``factor`` (3,), correlations kept."""
-    return inertia * np.outer(factor, factor)
-
-
-def _metres(table: SegmentTable, kind: str, quantity: str, axis: str, subject: Subject, length: float) -> float | None:
-    found = table.find(kind, quantity, axis, sex=subject.sex)
-    return None if found is None else found.of(subject) * (length if found.unit == "length" else 1.0)
+        if place := table.find(kind, "com", axis, sex=subject.sex):
+            com[i] = place.of(subject) * (length if place.unit == "length" else 1.0)
+        if radius := table.find(kind, "gyration", axis, sex=subject.sex):
+            metres = radius.of(subject) * (length if radius.unit == "length" else 1.0)
+            wider[i] = abs(metres) / np.sqrt(inertia[i, i])
+    return RigidInertia(mass, com, mass * (inertia * np.outer(wider, wider)))  # correlations are kept
 
 
 BASE = "de_leva_1996"
@@ -148,11 +140,6 @@ def trunk_joint(table: str) -> str:
     return str(found.get("trunk_joint") or trunk_joint(found.get("completed_by", BASE)))
 
 
-def _known(table: str, sex: str) -> bool:
-    """Return whether a whole table of that name speaks of a sex."""
-    return table in FAMILY.files() and table not in NO_TABLES and sex in read_segment_table(table).sexes
-
-
 def reference(table: str, subject: Subject) -> Reference:
     """Return the reference person of one table: ``de_leva_1996``, ``dumas_2018``, ``winter_2009``, ``zatsiorsky_2002``
     (men), a study of segment masses, for example ``pavol_2002`` (older adults) or ``jensen_1986_12y``, or a user's own
@@ -168,17 +155,15 @@ def reference(table: str, subject: Subject) -> Reference:
     table = str(table)
     if table in studies(subject.sex):
         return study(table, subject)
-    if not table.endswith(FAMILY.suffix) and not _known(table, subject.sex) and table != "zatsiorsky_2002":
-        raise UnknownName.of(
-            f"table of segment inertial parameters for sex {subject.sex}", table, table_names(subject.sex)
-        )
-    found = read_segment_table(table)
-    if found.layout == "model":
-        return completed(found, subject, reference(str(found.provenance.get("completed_by", BASE)), subject))
-    if found.layout not in LAYOUTS or LAYOUTS[found.layout](subject).table != table:
+    shipped = table in FAMILY.files() and table not in NO_TABLES and subject.sex in read_segment_table(table).sexes
+    if not shipped and not table.endswith(FAMILY.suffix) and table != "zatsiorsky_2002":
+        known_index(f"table of segment inertial parameters for sex {subject.sex}", table, table_names(subject.sex))
+    own = read_segment_table(table)
+    if own.layout == "model":
+        return completed(own, subject, reference(str(own.provenance.get("completed_by", BASE)), subject))
+    if own.layout not in LAYOUTS or LAYOUTS[own.layout](subject).table != table:
         raise BiodanceError(
-            f"{table}: the layout {found.layout!r} is that of a published table. Write the rows in the segments of "
-            f"the model and "
-            'layout = "model", or no layout.'
+            f"{table}: the layout {own.layout!r} is that of a published table. Write the rows in the segments of the "
+            'model and layout = "model", or no layout.'
         )
-    return LAYOUTS[found.layout](subject)
+    return LAYOUTS[own.layout](subject)

@@ -8,7 +8,6 @@ points ``biodance.segment_tables``, or by the path of a user's own file.
 
 import csv
 import functools
-import hashlib
 import io
 import math
 from collections.abc import Mapping
@@ -17,8 +16,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from biodance.body.tables.anthropometry import refuse_changed
 from biodance.discovery import DataFamily
-from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.errors import FileRefused, UnknownName
 from biodance.lab.plain_text import read_text
 from biodance.library import read_toml
 from biodance.records import Subject
@@ -134,7 +134,8 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
             f"table away."
         )
     provenance = read_toml(beside) if beside.is_file() else {}
-    _refuse_changed(path, provenance)
+    if "sha256" in provenance:
+        refuse_changed(path, provenance["sha256"])
     numbers: dict[Key, Number] = {}
     groups: dict[tuple[str, str], str] = {}
     for line, row in _rows(path):
@@ -152,15 +153,6 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
     return SegmentTable(name, MappingProxyType(numbers), MappingProxyType(groups), layout, MappingProxyType(provenance))
 
 
-def _refuse_changed(path: Path, provenance: Mapping[str, Any]) -> None:
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    if provenance.get("sha256", digest) != digest:
-        raise BiodanceError(
-            f"{path}: the numbers were changed since {path.stem}.toml was written (sha256 {digest}). "
-            "Restore the file, or describe your change in the .toml and put this sha256 there."
-        )
-
-
 def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     """Return the rows of a table, checked, each with its line in the file; what a file leaves out is empty."""
     reader = csv.DictReader(io.StringIO(read_text(path)))
@@ -172,34 +164,33 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
         raise FileRefused(
             f"{path}: the table {what}. Legal are {', '.join(REQUIRED)}, and optional {', '.join(OPTIONAL)}."
         )
-    found = []
+    rows = []
     for line, cells in enumerate(reader, start=2):
         if None in cells or None in cells.values():
             raise FileRefused(
                 f"{path}, row {line}: has not {len(columns)} cells as the header has. Correct its commas."
             )
         row = dict.fromkeys(OPTIONAL, "") | {name: str(cell).strip() for name, cell in cells.items()}
-        _check(path, line, row)
-        found.append((line, row))
-    return found
+        _refuse_illegal(path, line, row)
+        rows.append((line, row))
+    return rows
 
 
-def _check(path: Path, line: int, row: Mapping[str, str]) -> None:
+def _refuse_illegal(path: Path, line: int, row: Mapping[str, str]) -> None:
     """Refuse a row with an illegal word."""
-    _legal(path, line, "sex", row["sex"], SEXES)
-    _legal(path, line, "quantity", row["quantity"], tuple(_LEGAL))
-    axes, units = _LEGAL[row["quantity"]]
-    _legal(path, line, f"axis of {row['quantity']}", row["axis"], axes)
-    _legal(path, line, f"unit of {row['quantity']}", row["unit"], units)
+    quantity = row["quantity"]
+    axes, units = _LEGAL.get(quantity, ((row["axis"],), (row["unit"],)))
+    for column, what, legal in (
+        ("sex", "sex", SEXES),
+        ("quantity", "quantity", tuple(_LEGAL)),
+        ("axis", f"axis of {quantity}", axes),
+        ("unit", f"unit of {quantity}", units),
+    ):
+        if row[column] not in legal:
+            words = ", ".join(name or "(empty)" for name in legal)
+            raise FileRefused(f"{path}, row {line}: the {what} is {row[column]!r}. Legal: {words}.")
     if not row["segment"]:
         raise FileRefused(f"{path}, row {line}: names no segment. Write its name.")
-
-
-def _legal(path: Path, line: int, what: str, value: str, legal: tuple[str, ...]) -> None:
-    if value not in legal:
-        raise FileRefused(
-            f"{path}, row {line}: the {what} is {value!r}. Legal: {', '.join(name or '(empty)' for name in legal)}."
-        )
 
 
 def _number(path: Path, line: int, row: Mapping[str, str]) -> Number:
