@@ -5,7 +5,6 @@ The hiding side (`biodance.virtual_lab`) knows nothing of the effects; the findi
 """
 
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -116,14 +115,6 @@ def test_a_clipped_channel_is_named_before_any_statistics(tmp_path: Path, monkey
     diagnosis = diagnose_session(result, effects=("clipping", "plate_offset")).diagnosis
     assert diagnosis.findings[0].effect == "clipping"
     assert [gate.effect for gate in diagnosis.gates if not gate.ok] == ["clipping"]
-
-
-@pytest.fixture
-def data() -> Path:
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
-    return Path(folder)
 
 
 def standing(data: Path, folder: Path, name: str, text: str = "") -> Path:

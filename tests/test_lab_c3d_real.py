@@ -1,8 +1,5 @@
 """Real recordings: every number equal to another library's, every fact as measured on the files."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,14 +7,6 @@ from biodance.lab.c3d.raw import read_raw
 from biodance.lab.c3d.read import read_c3d
 
 ZOO = {"HC030A": ("01", "05", 45.8, 1.48), "HC032A": ("01", "03", 60.3, 1.58), "HC038A": ("01", "11", 56.8, 1.74)}
-
-
-@pytest.fixture(scope="module")
-def data():
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
-    return Path(folder)
 
 
 def test_every_file_has_the_numbers_that_another_library_reads(data):

@@ -1,21 +1,10 @@
 """Plates of real laboratories against a second source: the scale in the clinic, the maker's own export, the feet."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from biodance.lab.c3d.read import read_c3d
 from biodance.lab.weight import standing_mass
-
-
-@pytest.fixture(scope="module")
-def data():
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
-    return Path(folder)
 
 
 @pytest.mark.parametrize("subject", ["HC030A", "HC032A", "HC038A"])

@@ -2,7 +2,6 @@
 by byte.
 """
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +23,6 @@ FAULTS = (
     "plate_gain:target=Fz,gain=0.04", "plate_offset:target=Mx,offset=8", "plate_position:target=plate1:x,shift=0.02",
     "plate_rotation:target=plate1:z,angle=0.07", "time_delay:delay=0.02", "labels_swapped:target=LKNE/RKNE",
 )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def data() -> Path:
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
-    return Path(folder)
 
 
 def written(path: Path, out: Path, text: str) -> Trial:
