@@ -59,7 +59,7 @@ class Visibility:
         """
         if self.found is None:
             return 0.0
-        rows = self.causes[index].basis @ np.stack(unit_directions(self.causes[index]), axis=1)
+        rows = self.causes[index].basis @ np.stack(unit_directions(self.causes[index]), axis=1).astype(float)
         with np.errstate(divide="ignore"):
             return float((1.0 / self.found.problem.felt(rows)).max())
 
