@@ -64,8 +64,8 @@ def with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> S
         notes.append(
             f"Warning: the {' and '.join(hidden)} arm{'s' if len(hidden) > 1 else ''} carr"
             f"{'y' if len(hidden) > 1 else 'ies'} no markers that place elbow and wrist: taken as hanging straight "
-            f"and carried by the trunk as one piece, at the mass of the table. Its swing is not in the simulated "
-            f"wrench."
+            f"and carried by the trunk as one piece, at the mass of the table. "
+            f"How arms swing is not in the simulated wrench."
         )
     return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
 
