@@ -61,7 +61,7 @@ def sessions(data: Path) -> None:
             except BiodanceError as error:
                 print(f"| {name} | - | - | - | refused: {error} |", flush=True)
                 continue
-        first = said.partition(" Beside it: ")[0].partition("; ")[0]
+        first = said.partition(" Also: ")[0].partition("; ")[0]
         worn = ", ".join(sorted({trial.trial.worn or "none" for trial in result.trials}))
         print(f"| {name} | {worn} | {_unseen(result)} | {'; '.join(map(_near, result.trials))} | {first} |", flush=True)
 

@@ -17,12 +17,12 @@ from biodance.cli.session import print_reported
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import STRANGE, UNASKED
-from biodance.pipeline.attention import headline, session_attention, told
+from biodance.pipeline.attention import _checked, headline, session_attention, told
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.trial_result import Check
-from biodance.records.attention import Judged
+from biodance.records.attention import Attention, Judged, told_together
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document
 from biodance.report.documents.plain import to_text
 from biodance.report.documents.session import results_document
@@ -131,7 +131,13 @@ def test_checks_of_one_limit_are_said_together_and_a_refused_file_without_its_pa
     checks = [Check(name, f"walk_{k}", f"{k} % of weight", "at most 5 % of weight", False, "") for k in (6, 7)]
     refused = Judged("b.asc", 0.0, "/home/lab/b.asc: does not say columns. Write it.", missed=True)
     first = headline(WHOLE, "3 s", (STATIC, refused), tuple(checks))
-    assert f"{name} (walk_6 6 % of weight, walk_7 7 % of weight; should be at most 5 % of weight)" in first.text
+    assert f"{name} (walk_6, walk_7)" in first.text
+    lines = [_checked(check, ()) for check in checks]
+    assert [one.trial for one in lines] == ["walk_6", "walk_7"]
+    other = Attention("warn", "6 %, should be at most 4 %.", "walk_6", name)
+    together = told_together([*lines, other, first])
+    assert [one.trial for one in together] == ["", "walk_6", ""]
+    assert together[0].text == "walk_6 6 % of weight, walk_7 7 % of weight, should be at most 5 % of weight."
     assert "because: does not say columns" in first.text
     assert "/home" not in first.text
 

@@ -62,8 +62,8 @@ LOUD = (
     "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
 )
 STANDING = (
-    "Only quiet standing was judged: sway, soft tissue and a plate's zero look alike there, so no cause that has a "
-    "size is named from it. A few squats or steps on the plates tell them apart."
+    "Only quiet standing could be compared with the whole body: sway, soft tissue and a plate's zero look alike there, "
+    "so this comparison names no cause that has a size. A few squats on the plates tell them apart."
 )
 
 

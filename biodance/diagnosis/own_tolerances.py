@@ -65,10 +65,10 @@ def own_tolerances(
     if factor > MORE:
         found = widened_by(found, factor)
         notes.append(
-            f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times in the first "
-            f"quartile): soft tissue and joints, and what they leave in the forces, were taken for so many times as "
-            f"large, and a fault must be larger to be seen. Tolerances learned on sessions of your own laboratory "
-            f"without fault (biodance learn) hold for it."
+            f"Markers are farther from the body than where tolerances were learned ({factor:.1f} times, for the "
+            f"quarter of them that follows best): soft tissue and joints, and what they leave in the forces, were "
+            f"taken for so many times as large, and a fault must be larger to be seen. Tolerances learned on sessions "
+            f"of your own laboratory without fault (biodance learn) hold for it."
         )
     standing = tuple(look for look in chosen if look.trial.role == "static" and look.seconds > 0)
     if standing:

@@ -20,6 +20,8 @@ _ALONG = 1
 """The axis along the spine in the frames of pelvis and trunk."""
 ODDS = np.log(2.0)
 """Log evidence by which sides each on their own must be more probable than sides alike, which most people have."""
+_TOLD = 1.0
+"""mm: a joint of the trunk nearer to the table's cut than this is not told."""
 
 
 def goes_along(prior: Sip, body: Body) -> bool:
@@ -95,13 +97,14 @@ def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip,
         trunk, gain = body.segment_index("trunk_head"), evidence[best] - evidence[not along, apart]
         off = 1e3 * float(np.linalg.norm((placed[1].com - placed[0].com)[trunk]))
         where = "is taken along with the joint" if along else "stays where the table has it"
-        words.append(
-            f"The trunk turns {off:.0f} mm from where the table cuts it from the pelvis. Its matter {where}: more "
-            f"probable by a natural logarithm of {gain:.1f}."
-        )
+        if off >= _TOLD:
+            words.append(
+                f"The trunk turns {off:.0f} mm from where the table cuts it from the pelvis. Its matter {where} "
+                f"(logarithm of the Bayes factor {gain:.1f})."
+            )
     if apart:
         words.append(
-            f"The masses of the right and left side are taken each on its own: more probable than sides as alike as "
-            f"the table expects by a natural logarithm of {evidence[best] - evidence[along, False]:.1f}."
+            f"The masses of the right and left side are taken each on its own, not as alike as the table expects "
+            f"(logarithm of the Bayes factor {evidence[best] - evidence[along, False]:.1f})."
         )
     return choices[best], apart, tuple(words)

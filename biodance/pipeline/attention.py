@@ -15,7 +15,7 @@ from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or
 from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
-from biodance.records.attention import WARNING, Attention, Judged, Level, strongest_first, without_path
+from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, Level, strongest_first, without_path
 
 _FITS = "the forces fit this body, but "
 """Beginning of the doubt about a body whose residual is as without fault."""
@@ -104,22 +104,24 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
     elif one.doubt.startswith(_FITS):
-        level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}{beside}."
-        text += _MOVE if one.doubt.endswith(_ONLY_STOOD) else _MEND
+        level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}."
+        text += (_MOVE if one.doubt.endswith(_ONLY_STOOD) else _MEND) + _sentence(beside)
     elif not (one.adequacy and rests_on):
         partly = any(TOO_SHORT in row.why_not for row in judged) or any(
             check.what.startswith(_FORCES) for check in outside
         )
         whole = f" for {SHORTEST_RUN:g} s without a break" if partly else ""
         level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
-        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}{beside}.{_heard(one)}"
-        text += _MOVE if where else _MEND
+        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}.{_heard(one)}"
+        text += (_MOVE if where else _MEND) + _sentence(beside)
     elif one.doubt:
         level = "warn"
-        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}; but {one.doubt}{beside}.{_COMPARE}"
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}; but {one.doubt}.{_COMPARE}"
+        text += _sentence(beside)
     elif _only_strange(one):
         level = "warn"
-        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}{beside}.{like}{_COMPARE}"
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}.{like}{_COMPARE}"
+        text += _sentence(beside)
     else:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}{like}"
     return Attention(level, text.strip(), about=ABOUT)
@@ -165,7 +167,7 @@ def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
     """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
     cause = cause_of(check.what, findings)
     then = f"{cause}, which was found, may explain it." if cause else check.advice
-    text = f"{check.value}, should be {check.limit}. {then[:1].upper()}{then[1:]}".strip()
+    text = f"{check.value}{LIMIT_TOLD}{check.limit}. {then[:1].upper()}{then[1:]}".strip()
     return Attention("note" if cause else "warn", text, check.where, check.what)
 
 
@@ -191,7 +193,7 @@ def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
             why = without_path(_short(row.why_not), row.trial).removeprefix(f"Trial {row.trial}: ")
             missed.setdefault(why, []).append(row.trial)
     parts = [f"; not judged: {listed(names)}, because: {why}" for why, names in missed.items()]
-    parts += [f"; judged only by steps on plates: {listed(stepped_only)}"] if stepped_only else []
+    parts += [f"; only the steps on plates were judged of {listed(stepped_only)}"] if stepped_only else []
     return "".join(parts) + (f"; outside the limit: {_named_checks(outside)}" if outside else "")
 
 
@@ -201,11 +203,11 @@ def _explained(checks: tuple[Check, ...]) -> str:
 
 
 def _named_checks(checks: tuple[Check, ...]) -> str:
-    """Return the checks in words, each once with its limit and the trials that it was held against."""
-    alike: dict[tuple[str, str], list[str]] = {}
+    """Return the checks in words, each once with the trials that it was held against: values stand below."""
+    alike: dict[str, list[str]] = {}
     for one in checks:
-        alike.setdefault((one.what, one.limit), []).append(f"{one.where} {one.value}")
-    return listed([f"{what} ({listed(said)}; should be {limit})" for (what, limit), said in alike.items()])
+        alike.setdefault(one.what, []).append(one.where)
+    return listed([f"{what} ({listed(where)})" for what, where in alike.items()])
 
 
 def _short(reason: str) -> str:
@@ -215,11 +217,7 @@ def _short(reason: str) -> str:
 def _heard(one: Diagnosis) -> str:
     """Return that the witnesses were asked, as a sentence; "" where they saw nobody on a plate."""
     trials = len({o.trial for o in one.witnesses.observations if o.witness != _EMPTY}) if one.witnesses else 0
-    return (
-        f" Plates and clocks, judged alone, are as without fault in {trials} trial{'s' * (trials > 1)}."
-        if trials
-        else ""
-    )
+    return f" Plates and clocks, judged alone, look right in {trials} trial{'s' * (trials > 1)}." if trials else ""
 
 
 def stepped(rows: tuple[Judged, ...], heard: Testimony | None) -> tuple[Judged, ...]:
@@ -238,7 +236,7 @@ def stepped(rows: tuple[Judged, ...], heard: Testimony | None) -> tuple[Judged, 
 def _sentence(beside: str) -> str:
     """Return what goes on a sentence as one of its own."""
     text = beside.removeprefix("; ")
-    return f" Beside it: {text}." if text else ""
+    return f" Also: {text}." if text else ""
 
 
 def _only_strange(one: Diagnosis) -> bool:
@@ -271,7 +269,7 @@ def _incomplete(one: Diagnosis, rests_on: str) -> str:
     if STRANGE in one.notes or alarming(one.adequacy) > LIMIT:
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
     return (
-        f"What else there is to see in {rests_on} is as without fault."
+        f"Apart from that, {rests_on} look like a session without fault."
         if rests_on and one.adequacy
         else "Whether the forces fit the body was not judged."
     )

@@ -1,7 +1,7 @@
 """What a person must see first, and what a verdict rests on: the same records on page, terminal and in JSON."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Level = Literal["fail", "warn", "note"]
@@ -9,6 +9,8 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
+LIMIT_TOLD = ", should be "
+"""Between the value of a check and its limit, in a sentence about it."""
 
 
 @dataclass(frozen=True)
@@ -44,3 +46,24 @@ def without_path(reason: str, file: str) -> str:
     """Return a refusal without the path of the ``file`` in front, where the file is named beside it anyway."""
     path, colon, rest = reason.partition(": ")
     return rest if colon and path.endswith(file) else reason
+
+
+def told_together(found: Iterable[Attention]) -> tuple[Attention, ...]:
+    """Return the sentences with those of one check and limit put into one that names its trials, each in its order:
+    five lines that differ in a number say less than one.
+    """
+    alike: dict[tuple[str, str, str], list[Attention]] = {}
+    for one in found:
+        said = one.text.partition(LIMIT_TOLD)[2]
+        alike.setdefault((one.level, one.about, said) if said and one.trial else ("", one.trial, one.text), []).append(
+            one
+        )
+    return tuple(_together(rows) for rows in alike.values())
+
+
+def _together(rows: list[Attention]) -> Attention:
+    """Return one sentence for all trials of ``rows``."""
+    if len(rows) == 1:
+        return rows[0]
+    values = ", ".join(f"{one.trial} {one.text.partition(LIMIT_TOLD)[0]}" for one in rows)
+    return replace(rows[0], text=f"{values}{LIMIT_TOLD}{rows[0].text.partition(LIMIT_TOLD)[2]}", trial="")

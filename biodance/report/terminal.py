@@ -12,7 +12,7 @@ from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
 from biodance.pipeline.results import SessionResult
-from biodance.records.attention import Attention, without_path
+from biodance.records.attention import Attention, told_together, without_path
 from biodance.report.wording import format_number, millimetres, named, size_seen, told_sizes, trial_and_subject
 
 
@@ -89,8 +89,8 @@ def print_initialised(found: dict[str, Any], console: Console) -> None:
 
 def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
     """Print what a person must see: the verdict's sentence, then the others with their place, strongest first."""
-    for row in sorted(found, key=lambda row: str(row["about"]) != ABOUT):
-        one = Attention(row["level"], row["text"], row["trial"], row["about"])
+    records = [Attention(row["level"], row["text"], row["trial"], row["about"]) for row in found]
+    for one in sorted(told_together(records), key=lambda one: one.about != ABOUT):
         if one.about == ABOUT:
             console.print(f"[bold]{escape(one.text)}[/]", soft_wrap=True)
         else:
@@ -235,19 +235,12 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
 
 
 def _print_witnesses(found: dict[str, Any], console: Console) -> None:
-    """Print which causes the witnesses saw, how well, what they could not tell apart, and to what they were blind."""
-    seen = [row for row in found["witness_table"] if row["witnesses"]]
+    """Print how many causes the witnesses could have seen, and where it stands how well."""
     if not found["witnesses"]:
         return
-    table = Table("cause", "seen to", "by the witnesses", "not told from", box=None, pad_edge=False)
-    for row in seen:
-        by = ", ".join(name.replace("_", " ") for name in row["witnesses"])
-        cause = f"{row['effect'].replace('_', ' ')} {row['target']}"
-        table.add_row(escape(cause), escape(f"± {row['sd']:.2g} {row['unit']}"), by, escape(", ".join(row["alike"])))
-    console.print(table)
-    blind = [f"{row['effect'].replace('_', ' ')} {row['target']}" for row in found["witness_table"] if row not in seen]
-    if blind:
-        _line(console, f"witnesses are blind to: {', '.join(blind)}")
+    seen, blind = (sum(bool(row["witnesses"]) is looked for row in found["witness_table"]) for looked in (True, False))
+    text = f"witnesses (feet, clocks, empty plates) could see {seen} causes and are blind to {blind}: how small, and "
+    _line(console, f"{text}what is not told from what, stands in the page and in results.json")
 
 
 def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:

@@ -65,7 +65,7 @@ def with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> S
         notes.append(
             f"Warning: the {' and '.join(hidden)} arm{'s carry' if len(hidden) > 1 else ' carries'} no markers that "
             "place elbow and wrist: taken as hanging straight and carried by the trunk as one piece, at the mass of "
-            "the table. Its swing is not in the simulated wrench."
+            "the table. How arms swing is not in the simulated wrench."
         )
     return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
 

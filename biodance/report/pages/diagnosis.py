@@ -20,6 +20,7 @@ from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNEL_TITLES, CHANNELS
+from biodance.records.attention import told_together
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
 from biodance.report.pages.template import print_sheet, render, template_text
@@ -205,7 +206,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         result=result,
         one=one,
         answer=answer(one),
-        others=[(trial_and_subject(said), said.text) for said in one.attention if said.about != ABOUT],
+        others=[(trial_and_subject(said), said.text) for said in told_together(one.attention) if said.about != ABOUT],
         failures={**result.failures, **found.failures},
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),

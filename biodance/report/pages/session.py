@@ -18,7 +18,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session_frames import SessionReplay
 from biodance.pipeline.trial_result import Check, TrialResult
 from biodance.records import CHANNELS
-from biodance.records.attention import Attention
+from biodance.records.attention import Attention, told_together
 from biodance.report.figures.session import (
     marker_figure,
     place_words,
@@ -177,7 +177,7 @@ def page(
         loaded=bool(replay and replay.load),
         sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
         headline=next((one for one in said if one.about == ABOUT), None),
-        attention=[(trial_and_subject(one), one.text) for one in said if one.about != ABOUT],
+        attention=[(trial_and_subject(one), one.text) for one in told_together(said) if one.about != ABOUT],
         tiles=key_figures(result),
         contents=_contents(f"{diagnosis}{identified}{movement}", replayed=replay is not None),
         check_table=check_table(result),
