@@ -102,12 +102,8 @@ def _folder(name: str) -> MachineFinding:
 
 def _browser() -> MachineFinding:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    return MachineFinding(
-        "chromium (page tests)",
-        bool(found),
-        False,
-        found or "apt-get install chromium; only the tests of the pages use it.",
-    )
+    text = found or "apt-get install chromium; only the tests of the pages use it."
+    return MachineFinding("chromium (page tests)", bool(found), False, text)
 
 
 def _writable() -> MachineFinding:

@@ -76,7 +76,7 @@ def surfaces(verdict: Diagnosis, check: Check, judged: tuple[Judged, ...]) -> di
     numbers = json.loads(to_text(diagnosis_document(found)))
     screen = StringIO()
     console = Console(file=screen, width=1000)
-    print_session(result, attention_document(first), console)
+    print_session(result, {"attention": attention_document(first)}, console)
     print_diagnosis(numbers, console)
     pages = (
         page(result, made, attention=first, diagnosis=diagnosis_section(found)),
@@ -158,7 +158,7 @@ def test_standing_still_has_no_correlation_on_the_terminal() -> None:
     screen = StringIO()
     moved = next(one for one in FULL.trials if one.comparison is not None)
     still = replace(moved, trial=replace(moved.trial, role="static"))
-    print_session(replace(FULL, trials=(still, moved)), (), Console(file=screen, width=200))
+    print_session(replace(FULL, trials=(still, moved)), {"attention": ()}, Console(file=screen, width=200))
     rows = [line.split() for line in screen.getvalue().splitlines() if line.startswith(moved.trial.name)]
     assert rows[0][-1] == "–"
     assert float(rows[1][-1].replace("−", "-")) <= 1

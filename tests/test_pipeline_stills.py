@@ -127,14 +127,6 @@ def test_pictures_are_drawn_where_the_machine_can(result):
     assert min(warm.mean(), cold.mean()) > 0.003  # a left and a right side
 
 
-def test_a_still_survives_the_way_to_the_child(result):
-    still = posture_still(result.body, result.body.neutral, "one")
-    back = solid._record(json.loads(json.dumps(solid._plain(still))))
-    for name in ("bones", "boxes", "rotations", "positions", "markers", "plates", "com", "load"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(still, name))
-    assert (back.sides, back.box_sides, back.trial) == (still.sides, still.box_sides, "one")
-
-
 @pytest.mark.parametrize(
     "code", ["import os; os.abort()", "print('[]')", "print('no json')", "import time; time.sleep(30)"]
 )

@@ -13,6 +13,7 @@ from biodance.batch.rows import ROW_TYPES
 from biodance.batch.work import Outcome
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
+from biodance.report.files import write_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,15 +60,11 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     is replaced whole.
     """
     table = summary_table(outcomes)
-    parquet, text = folder / ".summary.parquet.part", folder / ".summary.csv.part"
-    table.to_parquet(parquet, index=False)
-    table.to_csv(text, index=False, lineterminator="\n")
-    parquet.replace(folder / "summary.parquet")
-    text.replace(folder / "summary.csv")
-    page = folder / f".{_PAGE}.part"
+    table.to_parquet(folder / ".summary.parquet.part", index=False)
+    (folder / ".summary.parquet.part").replace(folder / "summary.parquet")
     alike = [one.text for one in likenesses(left_in_archive(folder, [one.name for one in outcomes]))]
-    page.write_text(_page(name, outcomes, table, left_out, _links(folder, outcomes), alike), encoding="utf-8")
-    page.replace(folder / _PAGE)
+    page = _page(name, outcomes, table, left_out, _links(folder, outcomes), alike)
+    write_files(folder, {"summary.csv": table.to_csv(index=False, lineterminator="\n"), _PAGE: page})
 
 
 def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":

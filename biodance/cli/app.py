@@ -10,15 +10,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter, Token
 
 from biodance.version import __version__
 
 if TYPE_CHECKING:
-    from biodance.records import Session
+    from rich.console import Console
 
+    from biodance.records import Session
 
 DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 
@@ -43,16 +44,22 @@ def print_json(document: object) -> None:
     sys.stdout.write(to_text(document))
 
 
+def show(document: Any, printed: "Callable[[Any, Console], None]", *, json: bool, path: Path | None = None) -> None:
+    """Write what was found to stdout: one JSON document, or as ``printed`` for a person and the ``path`` to look at."""
+    from rich.console import Console
+
+    print_json(document) if json else printed(document, Console())
+    if path is not None and not json:
+        sys.stdout.write(f"{path}\n")
+
+
 _COUNTED = re.compile(r"(?P<done>\d+) of (?P<all>\d+)")
 _EVERY = 5.0
 """s between two lines where stderr is no terminal: a short run says nothing, a log of a long one stays short."""
 
 
 class TimeLeft:
-    """What a stage still takes, from the items that it has done: told words with "3 of 11" in them.
-
-    ``clock`` returns s.
-    """
+    """What a stage still takes, from the items that it has done: told words with "3 of 11" in them; ``clock`` in s."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock

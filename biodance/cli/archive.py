@@ -1,6 +1,5 @@
 """Commands on the archive of a laboratory: all its sessions, its plates over time, its own tolerances."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +16,7 @@ from biodance.cli.app import (
     print_json,
     progress,
     say,
+    show,
     whole,
 )
 
@@ -76,8 +76,6 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     archive
         Folder with session folders at any depth, or with a table trials.csv beside text recordings of one plate.
     """
-    from rich.console import Console
-
     from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.plates import judge_plates
@@ -89,11 +87,7 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
         found = judge_plates(archive, tell=tell)
         tell("writing the page")
         document = write_plates(found, folder)
-    if json:
-        print_json(document)
-    else:
-        print_plates(document, Console())
-        sys.stdout.write(f"{folder / 'report.html'}\n")
+    show(document, print_plates, json=json, path=folder / "report.html")
     return NEEDS_A_PERSON if found.judgement.findings or found.refused else DONE
 
 
@@ -111,8 +105,6 @@ def learn_command(
     archive
         Folder with session folders at any depth.
     """
-    from rich.console import Console
-
     from biodance.pipeline.learn import learn_laboratory
     from biodance.report.laboratory import learned_document, print_learned, refuse_existing, write_lab_file
 
@@ -120,10 +112,5 @@ def learn_command(
     with progress() as tell:
         found = learn_laboratory(archive, tell=tell)
         write_lab_file(found, out)
-    document = learned_document(found)
-    if json:
-        print_json(document)
-    else:
-        print_learned(document, Console())
-        sys.stdout.write(f"{out}\n")
+    show(learned_document(found), print_learned, json=json, path=out)
     return NEEDS_A_PERSON if found.left_out else DONE

@@ -1,6 +1,5 @@
 """The command diagnose: what the simulation of a session gets wrong, and what naming it gains."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -17,8 +16,8 @@ from biodance.cli.app import (
     Results,
     RobotFile,
     app,
-    print_json,
     progress,
+    show,
 )
 from biodance.cli.identify import diagnose_robot
 from biodance.cli.session import examine_with_reference, tabled
@@ -40,8 +39,6 @@ def foresee_command(
     dance
         The file dance.npz that `biodance dance` wrote.
     """
-    from rich.console import Console
-
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
     from biodance.report.files import refuse_page
@@ -57,10 +54,7 @@ def foresee_command(
         if out is not None:
             page = foresight_page(document, f"the dance “{protocol}”" if protocol else "the dance")
             out.write_text(page, encoding="utf-8", newline="\n")
-    if json:
-        print_json(document)
-    else:
-        print_foresight(document, Console())
+    show(document, print_foresight, json=json)
     return DONE
 
 
@@ -92,8 +86,6 @@ def diagnose_command(
     if robot.given:
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
         return diagnose_robot(session, results, robot, for_people)
-    from rich.console import Console
-
     from biodance.pipeline import front
     from biodance.pipeline.accepted import write_mended
     from biodance.pipeline.attention import is_well
@@ -116,9 +108,5 @@ def diagnose_command(
         tabled(result, place, found.diagnosis, movement=moved)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
     results.show_page(folder)
-    if results.json:
-        print_json(document)
-    else:
-        print_diagnosis(document, Console())
-        sys.stdout.write(f"{folder / 'report.html'}\n")
+    show(document, print_diagnosis, json=results.json, path=folder / "report.html")
     return DONE if is_well(found.diagnosis) and not document["failures"] else NEEDS_A_PERSON

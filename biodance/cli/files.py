@@ -19,6 +19,7 @@ from biodance.cli.app import (
     print_json,
     progress,
     say,
+    show,
 )
 
 
@@ -71,17 +72,12 @@ def doctor_command(*, json: JsonOption = False) -> int:
     """Say what works on this machine, and how to mend what does not."""
     from dataclasses import asdict
 
-    from rich.console import Console
-
     from biodance.doctor import examine_machine
     from biodance.report.terminal import print_findings
 
     with progress() as tell:
         findings = examine_machine(tell=tell)
-    if json:
-        print_json([asdict(finding) for finding in findings])
-    else:
-        print_findings(findings, Console())
+    show([asdict(one) for one in findings] if json else findings, print_findings, json=json)
     return DONE if all(finding.works for finding in findings if finding.needed) else NEEDS_A_PERSON
 
 
@@ -97,16 +93,11 @@ def init_command(session: Path, *, subject: str | None = None, json: JsonOption 
     subject
         The person, where C3D files hold several.
     """
-    from rich.console import Console
-
     from biodance.lab.session.write import init_session
     from biodance.report.terminal import print_initialised
 
     found = init_session(session, subject_name=subject)
-    if json:
-        print_json(found)
-    else:
-        print_initialised(found, Console())
+    show(found, print_initialised, json=json)
     return NEEDS_A_PERSON if found["refused"] or not found["marker_set"] else DONE
 
 
@@ -121,17 +112,12 @@ def inspect_command(
     paths
         Files, or folders whose recordings are all read.
     """
-    from rich.console import Console
-
     from biodance.lab.inspect import inspect_paths
     from biodance.report.terminal import print_inspected
 
     with progress() as tell:
         records = inspect_paths(paths, subject=subject, markers=markers, tell=tell)
-    if json:
-        print_json(records)
-    else:
-        print_inspected(records, Console())
+    show(records, print_inspected, json=json)
     states = {record["status"] for record in records}
     if states == {"refused"}:
         more = f" Nor can the other {len(records) - 1}." if len(records) > 1 else ""

@@ -1,6 +1,5 @@
 """The command identify: a person, or a robot."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,8 +15,8 @@ from biodance.cli.app import (
     Results,
     RobotFile,
     app,
-    print_json,
     progress,
+    show,
 )
 from biodance.cli.session import examine_with_reference, tabled
 
@@ -53,16 +52,10 @@ def examine_robot(
 
 def diagnose_robot(recording: Path, results: Results, robot: RobotFile, for_people: tuple[str, ...]) -> int:
     """Say what about a robot or its laboratory is not as drawn, and return the exit code."""
-    from rich.console import Console
-
     from biodance.report.terminal import print_robot_diagnosis
 
     result, folder, found = examine_robot(recording, results, robot, for_people)
-    if results.json:
-        print_json(found)
-    else:
-        print_robot_diagnosis(found, Console())
-        sys.stdout.write(f"{folder / 'report.html'}\n")
+    show(found, print_robot_diagnosis, json=results.json, path=folder / "report.html")
     return NEEDS_A_PERSON if result.needs_a_person else DONE
 
 
@@ -114,13 +107,7 @@ def _given(options: "dict[str, object]") -> tuple[str, ...]:
 
 def _told_identified(result: "SessionResult | RobotResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
     """Print what was identified and return the exit code."""
-    from rich.console import Console
-
     from biodance.report.terminal import print_identification
 
-    if json:
-        print_json(found)
-    else:
-        print_identification(found, Console())
-        sys.stdout.write(f"{folder / 'report.html'}\n")
+    show(found, print_identification, json=json, path=folder / "report.html")
     return NEEDS_A_PERSON if result.needs_a_person else DONE

@@ -1,12 +1,13 @@
 """The command that takes a recording in frame by frame, as a laboratory would send it."""
 
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, MarkersFile, Set, app, print_json, progress, say
+from biodance.cli.app import DONE, NEEDS_A_PERSON, JsonOption, MarkersFile, Set, app, progress, say, show
 
 if TYPE_CHECKING:
     from biodance.diagnosis.watch import LiveWarning
@@ -40,8 +41,6 @@ def live_command(
     subject
         The person, where C3D files hold several.
     """
-    from rich.console import Console
-
     from biodance.pipeline.stream import body_and_stream, replay
     from biodance.report.live import LivePage, live_document, print_live, state_line, warning_line
     from biodance.settings import assignments
@@ -67,8 +66,5 @@ def live_command(
         if shown:
             shown.end(found.state, found.cause)
     document = live_document(found)
-    if json:
-        print_json(document)
-    else:
-        print_live(found, document, Console())
+    show(document, partial(print_live, found), json=json)
     return NEEDS_A_PERSON if found.warnings or found.cause else DONE

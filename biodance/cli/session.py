@@ -1,6 +1,6 @@
 """The command report, and what the commands on a session share."""
 
-import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,9 +14,9 @@ from biodance.cli.app import (
     Reading,
     Results,
     app,
-    print_json,
     progress,
     say,
+    show,
 )
 
 if TYPE_CHECKING:
@@ -80,15 +80,9 @@ def tabled(
 
 def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:
     """Print what was reported and return the exit code."""
-    from rich.console import Console
-
     from biodance.report.terminal import print_session
 
-    if json:
-        print_json(found)
-    else:
-        print_session(result, found["attention"], Console())
-        sys.stdout.write(f"{folder / 'report.html'}\n")
+    show(found, partial(print_session, result), json=json, path=folder / "report.html")
     if result.stopped:
         say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
         return STOPPED

@@ -54,16 +54,8 @@ def mass_check(subject: Subject, standing: QuietStanding | None, limits: CheckLi
     if standing is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
         return []
     difference = abs(100 * (standing.mass / subject.mass - 1))
-    return [
-        _upper(
-            _MASS,
-            standing.trial,
-            difference,
-            limits.mass,
-            "%",
-            "Weigh again, or check the plates' zero.",
-        )
-    ]
+    advice = "Weigh again, or check the plates' zero."
+    return [_upper(_MASS, standing.trial, difference, limits.mass, "%", advice)]
 
 
 def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:
@@ -72,16 +64,8 @@ def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[
         return []
     distance = 1000 * float(np.hypot(standing.com_ahead, standing.com_left))
     advice = "Check the plates' place in the lab, and the markers of pelvis and trunk."
-    return [
-        _upper(
-            "centre of mass off the centre of pressure, standing",
-            standing.trial,
-            distance,
-            1000 * limits.standing,
-            "mm",
-            advice,
-        )
-    ]
+    what = "centre of mass off the centre of pressure, standing"
+    return [_upper(what, standing.trial, distance, 1000 * limits.standing, "mm", advice)]
 
 
 def trial_checks(result: TrialResult, mass: float) -> list[Check]:
@@ -91,48 +75,23 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
     name, limits, found = result.trial.name, result.trial.settings.checks, []
     if result.fit:
         advice = "See the worst marker in the trial's figure: placed, labelled and filled rightly?"
-        found.append(_upper(_MARKERS[0], name, 1000 * result.fit.total_rms, 1000 * limits.marker_rms, "mm", advice))
-        found.append(
-            _upper(
-                _MARKERS[1],
-                name,
-                1000 * result.fit.total_max,
-                1000 * limits.marker_largest,
-                "mm",
-                advice,
-            )
-        )
+        far = (result.fit.total_rms, limits.marker_rms), (result.fit.total_max, limits.marker_largest)
+        for what, (size, limit) in zip(_MARKERS, far, strict=True):
+            found.append(_upper(what, name, 1000 * size, 1000 * limit, "mm", advice))
         found += _group_check(result.fit.by_group, name, limits, advice)
     if result.motion is not None:
         share = 100 * float(np.mean(~result.motion.determined))
-        found.append(
-            _upper("posture left open", name, share, limits.open, "%", "See the gaps: which segment lost its markers?")
-        )
+        advice = "See the gaps: which segment lost its markers?"
+        found.append(_upper("posture left open", name, share, limits.open, "%", advice))
     if result.gaps:
-        found.append(
-            _upper(
-                "markers not seen",
-                name,
-                result.gaps_percent,
-                limits.gaps,
-                "%",
-                "Fill the gaps in the capture software.",
-            )
-        )
+        advice = "Fill the gaps in the capture software."
+        found.append(_upper("markers not seen", name, result.gaps_percent, limits.gaps, "%", advice))
     comparison = result.comparison
     if comparison and result.trial.role != "static":
         seconds = comparison.used.sum() * float(np.median(np.diff(comparison.time)))
         advice = "Step onto the plates only, or record more of the trial on them."
-        found.append(
-            Check(
-                "fully measured",
-                name,
-                f"{seconds:.2f} s",
-                f"at least {limits.seconds:g} s",
-                seconds >= limits.seconds,
-                advice,
-            )
-        )
+        least, inside = f"at least {limits.seconds:g} s", seconds >= limits.seconds
+        found.append(Check("fully measured", name, f"{seconds:.2f} s", least, inside, advice))
     if comparison and comparison.used.any():
         share = 100 * float(np.max(comparison.rms[:3])) / (mass * result.trial.settings.gravity)
         advice = "See the trial's wrench figure: is it an offset, a delay or a scale?"

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
 from biodance.body.robot.hoap3 import hoap3
-from biodance.body.solids import segment_solids
+from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
@@ -31,6 +31,8 @@ _NO_TRIAL = (
 )
 MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids", "rerun")
 """Formats that need a recording beside the body."""
+_SEVERAL = ("opensim", "bids")
+"""Those of them that hold several trials."""
 
 
 def legal_formats() -> tuple[str, ...]:
@@ -102,116 +104,118 @@ def export(
         raise UnknownName.of("format", format, legal_formats())
     if trial is not None and format not in MOTION_FORMATS:
         raise BiodanceError(_NO_TRIAL.format(format))
-    out = Path(out)
+    target = _Target(Path(out), format, subject, meshes)
     if isinstance(source, str | Path) and str(source) in _SHIPPED and not Path(str(source)).exists():
-        return _robot(str(source), out, format, meshes)
+        return _robot(str(source), target)
     if isinstance(source, SessionResult):
-        return _of_result(source, out, format, trial, meshes, subject=subject)
+        return _of_result(source, trial, target)
     session = source if isinstance(source, Session) else None
     if session is None:
         folder = Path(source) if isinstance(source, str | Path) else Path()
         if kept_body(folder).is_file():
-            return _of_kept(folder, out, format, trial, meshes, subject=subject)
+            return _of_kept(folder, trial, target)
         session = read_session(folder, subject_name=subject, markers=markers, tell=tell)
     if format == "trc":
-        return _markers(_chosen(session, trial), out)
+        return target.markers(prepare_trial(_chosen(session, trial)).trial)
     if format == "mot":
         one = _chosen(session, trial)
         session = replace(session, trials=tuple(t for t in session.trials if t.role == "static" or t is one))
         trial = one.name
-    return _of_result(examine(session, tell=tell), out, format, trial, meshes, subject=subject)
+    return _of_result(examine(session, tell=tell), trial, target)
 
 
-def _of_kept(
-    folder: Path, out: Path, format: str, trial: str | None, meshes: Path | None, *, subject: str | None
-) -> tuple[Path, str]:
+@dataclass(frozen=True)
+class _Target:
+    """What to write: a file or folder ``out`` of a ``format``; ``subject`` chooses the person of a C3D file, ``meshes``
+    the folder with the solids of the segments. Every method returns the path and what it holds.
+    """
+
+    out: Path
+    format: str
+    subject: str | None = None
+    meshes: Path | None = None
+
+    def _solids(self, body: Body) -> SegmentSolids | None:
+        return None if self.meshes is None else segment_solids(body, self.meshes)
+
+    def body(self, body: Body, words: str) -> tuple[Path, str]:
+        """Write a body; ``words`` say where its parameters come from."""
+        return write_model(body, self.out, format=self.format, source=words, solids=self._solids(body)), words
+
+    def markers(self, trial: Trial) -> tuple[Path, str]:
+        """Write the markers of a prepared trial."""
+        if trial.markers is None:
+            raise TrialRefused(f"Trial {trial.name}: it has no markers to write.")
+        said = f"Markers of trial {trial.name}, gaps filled where they were short; mm, y up."
+        return write_trc(self.out, trial.markers), said
+
+    def coordinates(self, body: Body, motion: Motion, name: str) -> tuple[Path, str]:
+        """Write the joint coordinates of a trial."""
+        written = write_mot(self.out, opensim_coordinates(body, motion))
+        return written, f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
+
+    def trials(self, session: Session, found: tuple[TrialResult, ...], body: Body, words: str) -> tuple[Path, str]:
+        """Write what was found in some trials of a session, or in the only one."""
+        one, out = found[0], self.out
+        match self.format:
+            case "trc":
+                return self.markers(one.trial)
+            case "c3d":
+                return results_into_c3d(one, body, out, source=words, subject=self.subject)
+            case "rerun":
+                said = f"Trial {one.name} for the viewer: rerun {out.name}"
+                return write_rerun(one, body, out, solids=self._solids(body)), said
+            case "bids":
+                moved = ", ".join(write_bids_folder(session, found, body, out)) or "no trial"
+                return out, f"BIDS motion dataset of {session.folder.name}; angles and events of {moved}."
+        written = write_opensim_folder(found, body, out, source=words, solids=self._solids(body))
+        ready = [done.trial for done in written if done.dynamics]
+        told = f"Inverse dynamics is set up for {', '.join(ready)}." if ready else "No plate measures all in any trial."
+        return out, f"Model, markers, motions and forces of {', '.join(done.trial for done in written)}. {told} {words}"
+
+
+def _of_kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, str]:
     """Write what a results folder keeps; nothing is tracked or identified again."""
-    if format not in MOTION_FORMATS:
-        body, words = read_body(kept_body(folder))
-        return _model(body, out, format, words, meshes), words
+    if target.format not in MOTION_FORMATS:
+        return target.body(*read_body(kept_body(folder)))
     if folder.is_file():
-        raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {format}.")
+        raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {target.format}.")
     kept = read_kept(folder)
     names = tuple(kept.motions)
     if trial is not None and trial not in names:
         raise UnknownName.of(f"trial in {folder}", trial, names)
     chosen = names if trial is None else (trial,)
-    if format not in ("opensim", "bids") and len(chosen) != 1:
+    if target.format not in _SEVERAL and len(chosen) != 1:
         raise TrialRefused(f"{folder}: holds the trials {', '.join(names)}. Choose one with --trial.")
-    if format == "mot":
-        return _coordinates(kept.body, kept.motions[chosen[0]], chosen[0], out)
-    session, found = kept_trials(kept, chosen, subject=subject)
-    if format == "bids":
-        return _bids(session, found, kept.body, out)
-    if format == "rerun":
-        return _rerun(found[0], kept.body, out, meshes)
-    if format == "trc":
-        return _prepared_markers(found[0].trial, out)
-    if format == "c3d":
-        return results_into_c3d(found[0], kept.body, out, source=kept.source, subject=subject)
-    return _opensim(found, kept.body, out, kept.source, meshes)
+    if target.format == "mot":
+        return target.coordinates(kept.body, kept.motions[chosen[0]], chosen[0])
+    session, found = kept_trials(kept, chosen, subject=target.subject)
+    return target.trials(session, found, kept.body, kept.source)
 
 
-def _of_result(
-    result: SessionResult, out: Path, format: str, trial: str | None, meshes: Path | None, *, subject: str | None
-) -> tuple[Path, str]:
+def _of_result(result: SessionResult, trial: str | None, target: _Target) -> tuple[Path, str]:
     """Write what was found in a session, see `export`."""
-    if format == "trc":
-        return _markers(_chosen(result.session, trial), out)
-    if format == "mot":
+    if target.format == "trc":
+        return target.markers(prepare_trial(_chosen(result.session, trial)).trial)
+    if target.format == "mot":
         one = result[_chosen(result.session, trial).name]
         if result.body is None or one.motion is None:
             raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason or result.body_source}")
-        return _coordinates(result.body, one.motion, one.name, out)
+        return target.coordinates(result.body, one.motion, one.name)
     body, words = body_of_result(result)
+    if target.format not in MOTION_FORMATS:
+        return target.body(body, words)
+    if target.format not in _SEVERAL:
+        trial = _chosen(result.session, trial).name
     chosen = result.trials if trial is None else (result[trial],)
-    if format == "bids":
-        return _bids(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, out)
-    if format == "rerun":
-        return _rerun(result[_chosen(result.session, trial).name], body, out, meshes)
-    if format == "opensim":
-        return _opensim(chosen, body, out, words, meshes)
-    if format == "c3d":
-        name = _chosen(result.session, trial).name
-        one = next(found for found in result.trials if found.trial.name == name)
-        return results_into_c3d(one, body, out, source=words, subject=subject)
-    return _model(body, out, format, words, meshes), words
+    return target.trials(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, words)
 
 
-def _rerun(one: TrialResult, body: Body, out: Path, meshes: Path | None) -> tuple[Path, str]:
-    solids = None if meshes is None else segment_solids(body, meshes)
-    return write_rerun(one, body, out, solids=solids), f"Trial {one.name} for the viewer: rerun {out.name}"
-
-
-def _bids(session: Session, found: tuple[TrialResult, ...], body: Body, out: Path) -> tuple[Path, str]:
-    """Write the session as a BIDS dataset."""
-    moved = write_bids_folder(session, found, body, out)
-    return out, f"BIDS motion dataset of {session.folder.name}; angles and events of {', '.join(moved) or 'no trial'}."
-
-
-def _opensim(
-    chosen: tuple[TrialResult, ...], body: Body, out: Path, source: str, meshes: Path | None
-) -> tuple[Path, str]:
-    """Write the folder for OpenSim, of some trials."""
-    solids = None if meshes is None else segment_solids(body, meshes)
-    written = write_opensim_folder(chosen, body, out, source=source, solids=solids)
-    ready = [one.trial for one in written if one.dynamics]
-    told = f"Inverse dynamics is set up for {', '.join(ready)}." if ready else "No plate measures all in any trial."
-    return out, f"Model, markers, motions and forces of {', '.join(one.trial for one in written)}. {told} {source}"
-
-
-def _model(body: Body, out: Path, format: str, source: str, meshes: Path | None) -> Path:
-    """Write the body in a model format, with the solids of ``meshes`` where there are some."""
-    solids = None if meshes is None else segment_solids(body, meshes)
-    return write_model(body, out, format=format, source=source, solids=solids)
-
-
-def _robot(name: str, out: Path, format: str, meshes: Path | None) -> tuple[Path, str]:
-    if format in MOTION_FORMATS:
-        raise SessionRefused(f"{name}: is a robot and no trial. Give a session folder to export {format}.")
+def _robot(name: str, target: _Target) -> tuple[Path, str]:
+    if target.format in MOTION_FORMATS:
+        raise SessionRefused(f"{name}: is a robot and no trial. Give a session folder to export {target.format}.")
     body = _SHIPPED[name]()
-    words = " ".join(body.notes)
-    return _model(body, out, format, words, meshes), words
+    return target.body(body, " ".join(body.notes))
 
 
 def body_of_result(result: SessionResult) -> tuple[Body, str]:
@@ -261,18 +265,3 @@ def _chosen(session: Session, name: str | None) -> Trial:
             f"{session.folder}: holds the trials {', '.join(trial.name for trial in session)}. Choose one with --trial."
         )
     return moving[0]
-
-
-def _markers(trial: Trial, out: Path) -> tuple[Path, str]:
-    return _prepared_markers(prepare_trial(trial).trial, out)
-
-
-def _prepared_markers(trial: Trial, out: Path) -> tuple[Path, str]:
-    if trial.markers is None:
-        raise TrialRefused(f"Trial {trial.name}: it has no markers to write.")
-    return write_trc(out, trial.markers), f"Markers of trial {trial.name}, gaps filled where they were short; mm, y up."
-
-
-def _coordinates(body: Body, motion: Motion, name: str, out: Path) -> tuple[Path, str]:
-    written = write_mot(out, opensim_coordinates(body, motion))
-    return written, f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."

@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from biodance.lab.session.read import visit_words
 from biodance.library import PACKAGE
@@ -17,18 +16,8 @@ from biodance.settings import Value
 from biodance.version import __version__
 
 LIBRARIES = (
-    "numpy",
-    "scipy",
-    "numba",
-    "llvmlite",
-    "pin",
-    "cvxpy",
-    "clarabel",
-    "pandas",
-    "ezc3d",
-    "trimesh",
-    "pyvista",
-    "matplotlib",
+    *("numpy", "scipy", "numba", "llvmlite", "pin", "cvxpy", "clarabel"),
+    *("pandas", "ezc3d", "trimesh", "pyvista", "matplotlib"),
 )
 _UNKNOWN = "unknown"
 
@@ -49,18 +38,6 @@ class Provenance:
     inputs: Mapping[str, str]
     settings: Mapping[str, Value]
     visit: Mapping[str, str] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return all fields as plain dictionaries."""
-        return {
-            "created_utc": self.created,
-            "commit": self.commit,
-            "versions": dict(self.versions),
-            "blas": self.blas,
-            "inputs_sha256": dict(self.inputs),
-            "settings": dict(self.settings),
-            "visit": dict(self.visit),
-        }
 
 
 def now() -> str:

@@ -97,9 +97,9 @@ def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
             console.print(f"look: [bold]{escape(trial_and_subject(one))}[/]: {escape(one.text)}", soft_wrap=True)
 
 
-def print_session(result: SessionResult, attention: Sequence[dict[str, Any]], console: Console) -> None:
+def print_session(result: SessionResult, found: dict[str, Any], console: Console) -> None:
     """Print all that needs a person, then one line a trial."""
-    print_attention(attention, console)
+    print_attention(found["attention"], console)
     table = Table(box=None, pad_edge=False)
     for heading in ("trial", "role", "state", "markers RMS", "frames", "Fz RMS", "Fz cc"):
         table.add_column(heading, overflow="fold")

@@ -22,7 +22,7 @@ from biodance.report.documents.diagnosis import attention_document, diagnosis_do
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
 from biodance.report.documents.plain import plain_values, to_text
-from biodance.report.documents.session import movement_document, results_document
+from biodance.report.documents.session import movement_document, provenance_document, results_document
 from biodance.report.files import write_files
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
@@ -91,7 +91,7 @@ def write_identification(
         "judged": judged_document(identified_trials(result)),
         **identification_document(found),
         "movement": movement_document(movement) if movement else None,
-        "provenance": made.as_dict(),
+        "provenance": provenance_document(made),
     }
     told: dict[str, Any] = plain_values(numbers)
     page = _page(result, made, movement=movement)
@@ -121,7 +121,7 @@ def write_diagnosis(
         **diagnosis_document(found),
         "movement": movement_document(movement) if movement else None,
         "failures": failures,
-        "provenance": made.as_dict(),
+        "provenance": provenance_document(made),
     }
     files = {PAGE: diagnosis_page(result, found, made)}
     if accepted:

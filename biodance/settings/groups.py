@@ -1,4 +1,4 @@
-"""The groups of settings, and the numbers that are no choice."""
+"""The groups of settings, each field with its unit, meaning and legal range; and the numbers that are no choice."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -48,9 +48,8 @@ class Group:
     def __post_init__(self) -> None:
         for one in fields(self):
             if "legal" in one.metadata:
-                object.__setattr__(
-                    self, one.name, _legal_value(_key(self.name, one.name), getattr(self, one.name), one)
-                )
+                value = _legal_value(_key(self.name, one.name), getattr(self, one.name), one)
+                object.__setattr__(self, one.name, value)
 
     def rows(self) -> tuple[Setting, ...]:
         """Return the group's own settings in order.
@@ -125,16 +124,8 @@ FilterKind: TypeAlias = Literal["butterworth", "critically_damped"]
 class FilterSettings(Group):
     """The low-pass of joint coordinates and forces, forwards and backwards (no delay).
 
-    Parameters
-    ----------
-    kind : {"butterworth", "critically_damped"}
-        The critically damped filter does not overshoot (Robertson & Dowling 2003, doi:10.1016/S1050-6411(03)00080-4).
-    order : int
-        Order of one of the two passes.
-    cutoff : float
-        Hz at which both passes together are 3 dB down.
-    force_cutoff : float or "same"
-        Hz for the forces; "same" as the joint coordinates, or the difference of the two appears in the residual.
+    The critically damped one does not overshoot (Robertson & Dowling 2003, doi:10.1016/S1050-6411(03)00080-4). Another
+    cut-off for the forces than for the joint coordinates appears in the residual.
     """
 
     name = "filter"
@@ -150,15 +141,7 @@ class FilterSettings(Group):
 
 @dataclass(frozen=True)
 class GapSettings(Group):
-    """Markers that were not seen for a while.
-
-    Parameters
-    ----------
-    bridged : float
-        s: a gap up to this long is bridged by a spline; a longer one only where its segment's other markers tell.
-    often : float
-        % of the frames from which on an unseen marker is a warning.
-    """
+    """Markers that were not seen for a while; a longer gap is only filled where its segment's other markers tell."""
 
     name = "gaps"
     bridged: float = number_field(0.2, 0.0, 2.0, "s", "longest gap of a marker that a spline bridges")
@@ -167,29 +150,7 @@ class GapSettings(Group):
 
 @dataclass(frozen=True)
 class ContactRules(Group):
-    """When a foot may touch the ground, and when a plate is loaded.
-
-    Parameters
-    ----------
-    height : float
-        m: a point of the sole lower than this over a surface may touch it.
-    speed : float
-        m/s: ... where it is also slower than this.
-    around : float
-        s before and after that in which it may touch, too.
-    still : float
-        m/s: a foot rests where all points of its sole are slower ...
-    lasting : float
-        s: ... for this long.
-    force : float
-        N: a plate that carries less is not loaded.
-    loaded : float
-        Share of the trial's largest vertical force from which a plate is loaded.
-    pressed : float
-        The same, from which its centre of pressure is held against the soles on it.
-    outside : float
-        m: a median distance of the centre of pressure from the soles larger than this is said.
-    """
+    """When a foot may touch the ground, and when a plate is loaded."""
 
     name = "contact"
     height: float = number_field(
@@ -211,19 +172,7 @@ class ContactRules(Group):
 
 @dataclass(frozen=True)
 class StandingRules(Group):
-    """What counts as quiet standing on the plates.
-
-    Parameters
-    ----------
-    force : float
-        N: nobody stands on plates that carry less.
-    sway : float
-        Share of its median within which the vertical force stays.
-    shortest : float
-        s that it must last.
-    still : float
-        m within which the typical marker stays.
-    """
+    """What counts as quiet standing on the plates."""
 
     name = "standing"
     force: float = number_field(100.0, 20.0, 500.0, "N", "nobody stands on plates that carry less vertical force")
@@ -238,25 +187,6 @@ class CheckLimits(Group):
 
     The RMS marker distance follows OpenSim's user guide, the force Hicks et al. 2015 (doi:10.1115/1.4029304); the
     largest distance is a hand's breadth, the mass shoes, clothes and a meal; the others are the project's own.
-
-    Parameters
-    ----------
-    mass : float
-        % between the mass on the plates and the declared mass.
-    marker_rms, marker_largest : float
-        m, distance of the markers to the model.
-    marker_legs, marker_trunk, marker_arms, marker_head : float
-        m, RMS distance of the markers of one part of the body; legs with the pelvis.
-    gaps : float
-        % of marker samples not seen.
-    open : float
-        % of frames in which the markers seen do not fix the posture.
-    seconds : float
-        s of a trial in which the plates measure all ground contact.
-    force : float
-        % of body weight, RMS difference of measured and simulated force, worst axis.
-    standing : float
-        m between mean centre of mass and mean centre of pressure in quiet standing.
     """
 
     name = "checks"

@@ -130,6 +130,11 @@ def _optional_joints(shown: ShownJoints) -> dict[str, Any]:
     return {"optional_joints": joints, "optional_joints_force": forces}
 
 
+def provenance_document(made: Provenance) -> dict[str, Any]:
+    """Return which software made a result, from which files, with which settings."""
+    return keyed(made, "created_utc=created commit versions blas inputs_sha256=inputs settings visit")
+
+
 def results_document(result: SessionResult, provenance: Provenance) -> dict[str, Any]:
     """Return all of ``result`` as one JSON document; null where a step was refused or does not exist in this
     version.
@@ -153,5 +158,5 @@ def results_document(result: SessionResult, provenance: Provenance) -> dict[str,
         "identification": found and identification_document(found),
         "added_mass": found and added_mass_document(found.search),
         "diagnosis": None,
-        "provenance": provenance.as_dict(),
+        "provenance": provenance_document(provenance),
     }

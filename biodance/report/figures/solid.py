@@ -1,16 +1,13 @@
 """A sheet of postures as a shaded picture by pyvista, drawn in a child process: without GL libraries VTK kills the
 process that draws.
 
-The child reads stills as JSON from stdin and writes a PNG, as JSON, to stdout. Whatever goes wrong in it, the parent
-gets None.
+The child reads pickled stills from stdin and writes a PNG to stdout. Whatever goes wrong in it, the parent gets None.
 """
 
-import json
+import pickle
 import subprocess
 import sys
-from base64 import b64decode, b64encode
 from collections.abc import Sequence
-from dataclasses import fields
 from importlib.util import find_spec
 from typing import Any
 
@@ -38,51 +35,17 @@ def sheet_png(stills: Sequence[Still]) -> bytes | None:
     """
     if find_spec("pyvista") is None or not stills:
         return None
-    question = json.dumps([_plain(still) for still in stills])
     try:
         child = subprocess.run(
             [sys.executable, "-m", "biodance.report.figures.solid"],
-            input=question.encode(),
+            input=pickle.dumps(list(stills)),
             capture_output=True,
             timeout=_PATIENCE,
             check=False,
         )
-        picture = b64decode(json.loads(child.stdout)) if child.returncode == 0 else b""
-    except (subprocess.TimeoutExpired, OSError, ValueError, TypeError):
+    except (subprocess.TimeoutExpired, OSError):
         return None
-    return picture if picture.startswith(PNG) else None
-
-
-def _plain(still: Still) -> dict[str, Any]:
-    values = {field.name: getattr(still, field.name) for field in fields(still)}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-
-
-def _record(answer: dict[str, Any]) -> Still:
-    """Return the still that `_plain` took apart."""
-    shapes = {
-        "bones": (-1, 2, 3),
-        "markers": (-1, 3),
-        "plates": (-1, 4, 3),
-        "boxes": (-1, 2, 3),
-        "rotations": (-1, 3, 3),
-        "positions": (-1, 3),
-    }
-    found: dict[str, Any] = {}
-    for name, value in answer.items():
-        texts = (
-            isinstance(value, list)
-            and all(isinstance(entry, str) for entry in value)
-            and name in ("sides", "box_sides")
-        )
-        found[name] = (
-            tuple(value)
-            if texts
-            else np.array(value, dtype=float).reshape(shapes.get(name, -1))
-            if isinstance(value, list)
-            else value
-        )
-    return Still(**found)
+    return child.stdout if child.returncode == 0 and child.stdout.startswith(PNG) else None
 
 
 def _body(plotter: Any, still: Still) -> None:
@@ -147,5 +110,4 @@ def _draw_sheet(stills: Sequence[Still]) -> bytes:
 
 
 if __name__ == "__main__":
-    given = [_record(one) for one in json.load(sys.stdin)]
-    sys.stdout.write(json.dumps(b64encode(_draw_sheet(given)).decode("ascii")))
+    sys.stdout.buffer.write(_draw_sheet(pickle.load(sys.stdin.buffer)))
