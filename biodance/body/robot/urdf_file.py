@@ -5,7 +5,7 @@ fixed) with their placements and limits. Transmissions, sensors and colours do n
 wiki.ros.org/urdf/XML.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, fromstring
 
@@ -24,7 +24,6 @@ _TURN = np.pi
 """rad: range of a continuous joint to either side."""
 _X = np.array([1.0, 0.0, 0.0])
 """Axis of a joint that names none."""
-_X.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +53,7 @@ class Connection:
     child: str
     rotation: Array
     translation: Array
-    axis: Array = _X
+    axis: Array = field(default_factory=_X.copy)
     lower: float = 0.0
     upper: float = 0.0
     velocity: float = 0.0
