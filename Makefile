@@ -43,6 +43,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,docs]"
+	$(BIN)/python -m compileall -q biodance # pip leaves an editable package as text
 	touch $(STAMP)
 
 clean:
