@@ -22,7 +22,7 @@ from biodance.effects import gates
 from biodance.errors import SessionRefused
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
-from biodance.pipeline.looked_at import cases_of, looked_at, soft_tissue
+from biodance.pipeline.looked_at import cases_of, looked_at, skin_of, soft_tissue
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.provenance import now
@@ -162,7 +162,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    own = noise_of_instruments(session.trials, soft_tissue(looks))
+    own = noise_of_instruments(session.trials, soft_tissue(looks), skin_of(result.body, looks))
     seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)

@@ -16,8 +16,9 @@ from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Array, Role, Trial, runs
 from biodance.records.attention import Judged
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.session_noise import added_noise, of_zeros, with_own_noise, with_zeros
-from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
+from biodance.uncertainty.session_noise import added_noise, of_marker_errors, of_zeros, with_own_noise, with_zeros
+from biodance.uncertainty.skin_unrest import excess_unrest, skin_unrest
+from biodance.uncertainty.tolerances import Tolerances, shipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,13 +147,11 @@ def own_tolerances(
     cameras and plates as ``recorded`` shows it, with the unrest of a person who stands still where standing is looked
     at, and with trial means no surer than a plate's zero.
     """
-    found, notes = known or shipped(), []
-    usable_looks = [look for look in chosen if look.motion.q.size]
-    if recorded and usable_looks:
-        middle = np.array([look.motion.q[len(look.motion.q) // 2] for look in usable_looks[:_POSTURES]])
-        about = standing_point(tuple(map(_fit, chosen)))
-        added = added_noise(body, recorded, middle, about, known=found.instruments)
-        found = with_own_noise(found, added, float(body.sip.mass.sum()))
+    found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
+    postures = np.array([look.motion.q[len(look.motion.q) // 2] for look in chosen if look.motion.q.size])[:_POSTURES]
+    about = standing_point(tuple(map(_fit, chosen)))
+    if recorded and postures.size:
+        found = with_own_noise(found, added_noise(body, recorded, postures, about, known=found.instruments), mass)
     factor = soft_tissue(chosen) / found.instruments.distance
     if factor > MORE:
         found = widened_by(found, factor)
@@ -162,10 +161,13 @@ def own_tolerances(
             f"large, and a fault must be larger to be seen. Tolerances learned on sessions of your own laboratory "
             f"without fault (biodance learn) hold for it."
         )
+    restless = excess_unrest(skin_of(body, chosen), found.instruments.skin)
+    if restless.any():
+        found = with_own_noise(found, of_marker_errors(body, postures, about, restless), mass)
     standing = tuple(look for look in chosen if look.trial.role == "static" and seconds_of(look) > 0)
     if standing:
-        shaken = unrest(body, standing, standing_point(tuple(map(_fit, chosen))))
-        found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / body.sip.mass.sum()) ** 2)
+        shaken = unrest(body, standing, about)
+        found = with_own_noise(found, shaken, mass)
         size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
         notes.append(
             f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
@@ -174,7 +176,7 @@ def own_tolerances(
             f"larger to be seen."
         )
     zeros = of_zeros([run for look in chosen for run in _runs_of(look)])
-    return Own(with_zeros(found, zeros, float(body.sip.mass.sum())), tuple(notes), believed=factor <= _TOO_FAR)
+    return Own(with_zeros(found, zeros, mass), tuple(notes), believed=factor <= _TOO_FAR)
 
 
 def widened_by(known: Tolerances, factor: float) -> Tolerances:
@@ -195,6 +197,11 @@ def soft_tissue(chosen: tuple[Look, ...]) -> float:
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
     return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
+
+
+def skin_of(body: Body, chosen: tuple[Look, ...]) -> Array:
+    """Return the `skin_unrest` (B, 3) of the trials of people who move."""
+    return skin_unrest(body, ((one.trial, one.motion, one.use) for one in chosen if one.trial.role != "static"))
 
 
 def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
