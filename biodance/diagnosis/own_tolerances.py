@@ -12,8 +12,9 @@ from biodance.diagnosis.spectrum import spectrum, thinned
 from biodance.identification.statistics import standing_point
 from biodance.records import Array, Trial
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.session_noise import added_noise, of_zeros, with_own_noise, with_zeros
-from biodance.uncertainty.tolerances import REFERENCE_PERSON, Tolerances, shipped
+from biodance.uncertainty.session_noise import added_noise, of_marker_errors, of_zeros, with_own_noise, with_zeros
+from biodance.uncertainty.skin_unrest import excess_unrest, skin_unrest
+from biodance.uncertainty.tolerances import Tolerances, shipped
 
 _POSTURES = 4
 """Postures in which the way from marker noise to wrench is computed."""
@@ -56,11 +57,10 @@ def own_tolerances(
     at, and with trial means no surer than a plate's zero.
     """
     found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
-    tracked = [look for look in chosen if look.motion.q.size]
-    if recorded and tracked:
-        middle = np.array([look.motion.q[len(look.motion.q) // 2] for look in tracked[:_POSTURES]])
-        about = standing_point(tuple(look.fit for look in chosen))
-        found = with_own_noise(found, added_noise(body, recorded, middle, about, known=found.instruments), mass)
+    postures = np.array([look.motion.q[len(look.motion.q) // 2] for look in chosen if look.motion.q.size])[:_POSTURES]
+    about = standing_point(tuple(look.fit for look in chosen))
+    if recorded and postures.size:
+        found = with_own_noise(found, added_noise(body, recorded, postures, about, known=found.instruments), mass)
     factor = soft_tissue(chosen) / found.instruments.distance
     if factor > MORE:
         found = widened_by(found, factor)
@@ -70,10 +70,13 @@ def own_tolerances(
             f"taken for so many times as large, and a fault must be larger to be seen. Tolerances learned on sessions "
             f"of your own laboratory without fault (biodance learn) hold for it."
         )
+    restless = excess_unrest(skin_of(body, chosen), found.instruments.skin)
+    if restless.any():
+        found = with_own_noise(found, of_marker_errors(body, postures, about, restless), mass)
     standing = tuple(look for look in chosen if look.trial.role == "static" and look.seconds > 0)
     if standing:
-        shaken = unrest(body, standing, standing_point(tuple(look.fit for look in chosen)))
-        found = replace(found, noise=found.noise + shaken * (REFERENCE_PERSON / mass) ** 2)
+        shaken = unrest(body, standing, about)
+        found = with_own_noise(found, shaken, mass)
         size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
         notes.append(
             f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
@@ -102,6 +105,11 @@ def soft_tissue(chosen: tuple[Look, ...]) -> float:
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
     return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
+
+
+def skin_of(body: Body, chosen: tuple[Look, ...]) -> Array:
+    """Return the `skin_unrest` (B, 3) of the trials of people who move."""
+    return skin_unrest(body, ((one.trial, one.motion, one.use) for one in chosen if one.trial.role != "static"))
 
 
 def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.changes import move_marker
+from biodance.body.tables.error_sizes import error_size
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.errors import TrialRefused
@@ -18,6 +19,7 @@ from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.motion.track import track
 from biodance.records import Array, Markers
+from biodance.uncertainty.response import neighbours
 
 
 class MarkerMisplaced(Effect):
@@ -57,16 +59,23 @@ class MarkerMisplaced(Effect):
         )
 
     def measured(self, theta: Array, *cases: Case) -> Array:
-        """Return the mean place (3,) m of the marker beside the one in the model, over postures tracked without it:
-        a posture that follows the marker hides half of how far it has moved.
+        """Return the place (3,) m of the marker beside the one in the model, upright, over postures tracked without it:
+        a posture that follows the marker hides half of how far it has moved. What goes with the joints beside its
+        segment is skin that slides over bone, and no marker that has moved.
         """
         found = [one for one in map(self._beside, cases) if one is not None]
-        seen = np.concatenate([one[np.isfinite(one).all(axis=1)] for one in found] or [np.empty((0, 3))])
-        return seen.mean(axis=0) if len(seen) else theta
+        if not found:
+            return theta
+        apart, angles = map(np.concatenate, zip(*found, strict=True))
+        slides = error_size("slide", "marker") / error_size("soft_tissue", "marker") * angles
+        inner = np.eye(len(apart)) + slides @ slides.T  # covariance of one axis beside its place, per skin's variance
+        weight = np.linalg.solve(inner, np.ones(len(apart)))
+        return np.asarray(weight @ apart / weight.sum()) if len(apart) else theta
 
-    def _beside(self, case: Case) -> Array | None:
-        """Return (F, 3) m, axes of its segment: where the marker lies beside its place in the model, once a second, in
-        postures that do not follow it; None where it is not there or the others determine no posture.
+    def _beside(self, case: Case) -> tuple[Array, Array] | None:
+        """Return (F, 3) m, axes of its segment: where the marker lies beside its place in the model, once a second
+        where it is seen, in postures that do not follow it, and the angles (F, n) beside its segment there; None where
+        it is not there or the others determine no posture.
         """
         markers, body = case.trial.markers, case.body
         if markers is None or self.target not in markers:
@@ -75,13 +84,15 @@ class MarkerMisplaced(Effect):
         names = [name for name in markers.names if name != self.target]
         others = Markers(tuple(names), markers.time[every], markers.select(names).xyz[every])
         try:
-            pose = poses(body, solve_ik(body, others, guess=case.motion.q[every]).q)
+            q = solve_ik(body, others, guess=case.motion.q[every]).q
         except TrialRefused:
             return None
-        index = body.markers.names.index(self.target)
+        pose, index = poses(body, q), body.markers.names.index(self.target)
         segment = body.markers.segment[index]
         apart = markers[self.target][every] - pose.points([segment], body.markers.position[[index]])[:, 0]
-        return np.asarray(np.einsum("tij,ti->tj", pose.rotation[:, segment], apart))
+        local = np.einsum("tij,ti->tj", pose.rotation[:, segment], apart)
+        seen = np.isfinite(local).all(axis=1)
+        return local[seen], q[seen, 7 if body.n_root else 0 :][:, neighbours(body)[:, segment] > 0]
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked again with the marker at its true place."""

@@ -17,7 +17,7 @@ from biodance.diagnosis.archive.norms import (
 )
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_by
-from biodance.diagnosis.own_tolerances import soft_tissue
+from biodance.diagnosis.own_tolerances import skin_of, soft_tissue
 from biodance.diagnosis.problem import problem
 from biodance.effects import gates
 from biodance.errors import SessionRefused
@@ -163,7 +163,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    own = noise_of_instruments(session.trials, soft_tissue(looks))
+    own = noise_of_instruments(session.trials, soft_tissue(looks), skin_of(result.body, looks))
     seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)

@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
-from biodance.motion.kinematics import place_jacobian, poses
+from biodance.motion.kinematics import Poses, place_jacobian, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
@@ -80,8 +80,9 @@ def plate_noise(plates: Iterable[Plate]) -> Array:
 
 
 def carried(body: Body, q: Array, about: Array) -> Array:
-    """Return (6, 6): covariance of the wrench about ``about`` (3,) m per m² of marker noise and (rad/s)^4, in the
-    posture ``q`` (nq,): what white marker noise becomes in a second derivative.
+    """Return (3, 6, 6): covariance of the wrench about ``about`` (3,) m per m² of independent noise of all markers in
+    the posture ``q`` (nq,): of what is displaced and has weight; per (rad/s)², of that beside what is accelerated
+    (negative: a place and its second derivative are opposite); per (rad/s)⁴, of what is accelerated.
     """
     pose = poses(body, q[None])
     segment = list(body.markers.segment)
@@ -97,18 +98,35 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     rows = np.vstack([np.zeros(body.nv), np.eye(body.nv)]) @ turn.T
     still = Motion(np.arange(len(rows)) / 100.0, np.tile(q, (len(rows), 1)), np.zeros_like(rows), rows)
     value = predict_wrench(body, still).value
-    per = Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
-    return np.asarray(per @ spread @ per.T)
+    moved = Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
+    hung = _hung(body, pose)
+    both = moved @ spread @ hung.T
+    return np.stack([hung @ spread @ hung.T, -(both + both.T), moved @ spread @ moved.T])
+
+
+def _hung(body: Body, pose: Poses) -> Array:
+    """Return (6, nv): what displacing the tangent of a posture adds to the wrench because every segment has weight."""
+    every = list(range(len(body.segments)))
+    centres = place_jacobian(body, pose, every, pose.points(every, body.sip.com))[0].reshape(len(every), 3, -1)
+    lifted = np.cross(centres, -body.gravity, axisa=1, axisc=1)
+    return np.concatenate([np.zeros((3, centres.shape[2])), np.einsum("s,sij->ij", body.sip.mass, lifted)])
+
+
+def of_marker_errors(body: Body, postures: Array, about: Array, power: Array) -> Array:
+    """Return (B, 6, 6): covariance of one coefficient per band that markers add to the wrench residual which err by
+    ``power`` (B, 3) per axis: m² times the powers 0, 2 and 4 of the angular frequency; mean over the ``postures``
+    (n, nq).
+    """
+    return np.einsum("bk,kij->bij", power, np.mean([carried(body, q, about) for q in postures], axis=0))
 
 
 def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float) -> Array:
     """Return (B, 6, 6): covariance of one coefficient per band that marker noise of ``noise`` m at ``rate`` Hz adds to
     the wrench residual, mean over the ``postures`` (n, nq).
     """
-    lever = np.mean([carried(body, q, about) for q in postures], axis=0)
-    edges = np.array(BANDS.edges)
-    power = (2 * np.pi) ** 4 * np.diff(edges**5) / (5 * np.diff(edges))
-    return np.asarray(noise**2 * min(1.0, BANDS.rate / rate) * power[:, None, None] * lever)
+    edges = 2 * np.pi * np.array(BANDS.edges)
+    power = np.stack([np.diff(edges**k) / k / np.diff(edges) for k in (1, 3, 5)], axis=1)
+    return of_marker_errors(body, postures, about, noise**2 * min(1.0, BANDS.rate / rate) * power)
 
 
 def of_plates(density: Array, count: int) -> Array:
@@ -162,4 +180,9 @@ def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:
     """Return tolerances whose noise grows by ``added`` (B, 6, 6), for a person of ``mass`` kg: limits and adequacy
     follow.
     """
-    return replace(known, noise=known.noise + added * (REFERENCE_PERSON / mass) ** 2)
+    return replace(known, noise=known.noise + added * _relative(mass))
+
+
+def _relative(mass: float) -> float:
+    """Return what a covariance of a person of ``mass`` kg is multiplied by for the `REFERENCE_PERSON`."""
+    return (REFERENCE_PERSON / mass) ** 2

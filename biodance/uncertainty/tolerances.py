@@ -49,11 +49,15 @@ class InstrumentNoise:
     marker_distance : float
         m: root mean square distance of a marker to the body, first quartile over the markers; NaN = that of the table
         of sizes.
+    skin : tuple of float
+        (B,) m per axis and coefficient, by band: what markers do on the body that no movement explains
+        (`skin_unrest`).
     """
 
     camera: float = 1.0e-4
     plate: tuple[float, ...] = (0.0077, 0.0077, 0.0304, 0.0068, 0.0099, 0.0032)
     marker_distance: float = float("nan")
+    skin: tuple[float, ...] = (3.8e-3, 3.8e-3, 1.8e-3, 5.0e-4, 1.6e-4)
 
     @property
     def distance(self) -> float:
@@ -196,6 +200,7 @@ def _instruments(raw: Mapping[str, Any]) -> InstrumentNoise:
         float(raw.get("camera_m", usual.camera)),
         tuple(map(float, raw.get("plate_n_per_root_hz", usual.plate))),
         float(raw.get("marker_distance_m", usual.marker_distance)),
+        tuple(map(float, raw.get("skin_m", usual.skin))),
     )
 
 
@@ -227,6 +232,7 @@ def _instruments_text(found: InstrumentNoise, prefix: str) -> list[str]:
         f"camera_m = {found.camera:.4g}",
         f"plate_n_per_root_hz = [{', '.join(f'{x:.4g}' for x in found.plate)}]",
         *([f"marker_distance_m = {found.marker_distance:.4g}"] if known else []),
+        f"skin_m = [{', '.join(f'{x:.4g}' for x in found.skin)}]",
     ]
 
 

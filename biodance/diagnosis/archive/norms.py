@@ -43,26 +43,31 @@ def sway(cop: Array) -> float:
     return float(np.sqrt(np.var(cop, axis=0).sum()))
 
 
-def noise_of_instruments(trials: Sequence[Trial], distance: float) -> InstrumentNoise:
+def noise_of_instruments(trials: Sequence[Trial], distance: float, skin: Array) -> InstrumentNoise:
     """Return how quiet the recordings of a session are; ``distance`` m of a typical marker to the moving body, NaN
-    where nothing moved.
+    where nothing moved; ``skin`` (B, 3) its `skin_unrest`.
     """
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
     density = plate_noise(plate for one in trials for plate in one.plates)
-    return InstrumentNoise(camera_noise(markers), tuple(density.tolist()), distance if distance > 0 else float("nan"))
+    far = distance if distance > 0 else float("nan")
+    return InstrumentNoise(camera_noise(markers), tuple(density.tolist()), far, tuple(np.sqrt(skin[:, 0]).tolist()))
 
 
 def usual_noise(found: Sequence[InstrumentNoise]) -> InstrumentNoise:
     """Return the middle of several sessions; what none shows is that which comes with biodance."""
     usual = InstrumentNoise()
-    cameras = [one.camera for one in found if one.camera > 0]
-    plates = [[one.plate[i] for one in found if one.plate[i] > 0] or [usual.plate[i]] for i in range(len(usual.plate))]
-    distances = [one.marker_distance for one in found if np.isfinite(one.marker_distance)]
+    plates, skins = zip(*(one.plate for one in found), strict=True), zip(*(one.skin for one in found), strict=True)
     return InstrumentNoise(
-        float(np.median(cameras or [usual.camera])),
-        tuple(float(np.median(some)) for some in plates),
-        float(np.median(distances or [usual.marker_distance])),
+        _middle([one.camera for one in found], usual.camera),
+        tuple(map(_middle, plates, usual.plate)),
+        _middle([one.marker_distance for one in found], usual.marker_distance),
+        tuple(map(_middle, skins, usual.skin)),
     )
+
+
+def _middle(some: Sequence[float], usual: float) -> float:
+    """Return the median of the sessions that show a size; the ``usual`` one where none does."""
+    return float(np.median([one for one in some if one > 0] or [usual]))
 
 
 def seen_by_witnesses(trials: Sequence[Trial], session: str, mass: float) -> list[Seen]:

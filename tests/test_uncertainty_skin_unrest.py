@@ -1,0 +1,140 @@
+"""Skin that moves by itself: measured from the markers, and carried into the forces as it really is."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from diagnosed_sessions import CORNERS, body, known, looks, motion, noise
+
+from biodance.diagnosis.adequacy import LIMIT, alarming
+from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.problem import Look
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
+from biodance.motion.track import track
+from biodance.pipeline.looked_at import own_tolerances
+from biodance.records import Array, Markers, Motion, Wrench
+from biodance.spatial import wrench_about_origin, wrench_about_point
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.session_noise import of_marker_errors
+from biodance.uncertainty.skin_unrest import excess_unrest, skin_unrest
+
+GENTLE = 0.3
+"""Share of the synthetic movement that tracking follows from its own start."""
+
+
+def worn(moving: Motion, local: Array) -> Markers:
+    """Return the markers of the body in a motion, displaced by ``local`` (T, K, 3) m on their segments."""
+    one = body()
+    pose, segment = poses(one, moving.q), list(one.markers.segment)
+    place = pose.points(segment, one.markers.position)
+    return Markers(one.markers.names, moving.time, place + np.einsum("tkij,tkj->tki", pose.rotation[:, segment], local))
+
+
+def waves(time: Array, seed: int, size: float, hertz: tuple[float, float] = (0.35, 0.95)) -> Array:
+    """Return (T, K, 3) m: every axis of every marker at a frequency of its own."""
+    rng, shape = np.random.default_rng(seed), (len(body().markers.names), 3)
+    speed, phase = 2 * np.pi * rng.uniform(*hertz, shape), rng.uniform(0, 2 * np.pi, shape)
+    return size * np.sin(speed * time[:, None, None] + phase)
+
+
+def dressed(look: Look, local: Array) -> Look:
+    """Return a look at the true motion, with markers displaced by ``local`` (T, K, 3) m."""
+    return replace(look, trial=replace(look.trial, markers=worn(look.motion, local)))
+
+
+def filmed(look: Look, local: Array) -> Look:
+    """Return a look whose motion is tracked from markers displaced by ``local`` (T, K, 3) m."""
+    one = dressed(look, local)
+    return replace(one, motion=track(body(), one.trial))
+
+
+@cache
+def restless(size: float = 0.0016) -> tuple[Look, ...]:
+    """Return a session of a person who moves gently and whose skin waves by ``size`` m; nothing else is wrong."""
+    found = []
+    for k, look in enumerate(looks(5)):
+        moving, rng = look.motion, np.random.default_rng(k)
+        q = body().neutral + GENTLE * (moving.q - body().neutral)
+        gentle = replace(moving, q=q, v=GENTLE * moving.v, a=GENTLE * moving.a)
+        value = predict_wrench(body(), gentle).value
+        value = value + wrench_about_origin(noise(rng, len(value)), CORNERS.mean(axis=0))
+        plate = replace(look.trial.plates[0], wrench=Wrench(moving.time, value))
+        one = replace(look, motion=gentle, trial=replace(look.trial, plates=(plate,)))
+        found.append(filmed(one, waves(moving.time, k, size)))
+    return tuple(found)
+
+
+def seen(some: tuple[Look, ...]) -> Array:
+    return skin_unrest(body(), ((one.trial, one.motion, one.use) for one in some))
+
+
+def test_what_goes_with_the_movement_is_no_unrest() -> None:
+    """A marker that has moved, skin that a joint pulls along and skin that sags tell nothing; a wave is told whole."""
+    session = looks(3, trials=6)
+    pulled = [0.02 * one.motion.q[:, 7:8, None] * np.ones((len(body().markers.names), 3)) + 0.03 for one in session]
+    assert np.sqrt(seen(tuple(map(dressed, session, pulled)))[:, 0]).max() < 1e-9
+    waving = [
+        local + waves(one.motion.time, k, 0.004) for k, (one, local) in enumerate(zip(session, pulled, strict=True))
+    ]
+    power = seen(tuple(map(dressed, session, waving)))
+    there = 0.5 * 0.004**2 * BANDS.rate / 2 / (BANDS.edges[3] - BANDS.edges[2])
+    assert power[2, 0] == pytest.approx(there, rel=0.3)
+    assert power[2, 1] / power[2, 0] == pytest.approx((2 * np.pi * 0.65) ** 2, rel=0.25)
+    assert max(power[3:, 0]) < 0.1 * power[2, 0]
+
+
+def test_markers_that_nobody_sees_and_trials_too_short_tell_nothing() -> None:
+    one = restless()[0]
+    assert not skin_unrest(body(), []).any()
+    assert not seen((replace(one, trial=replace(one.trial, markers=None)),)).any()
+    assert not seen((replace(one, use=np.arange(one.use.size) < 40),)).any()
+    fewer = tuple(
+        replace(some, trial=replace(some.trial, markers=some.trial.markers.select(some.trial.markers.names[:-3])))
+        for some in restless()
+    )
+    np.testing.assert_allclose(seen(fewer)[2], seen(restless())[2], rtol=0.1)
+
+
+def test_the_unrest_of_the_skin_reaches_the_forces_as_it_does_in_truth() -> None:
+    """A body that stands still under waving markers: what tracking makes of it, in forces and moments."""
+    one, look = body(), looks(3, trials=1)[0]
+    quiet = replace(motion(3), q=np.tile(one.neutral, (600, 1)), v=np.zeros((600, one.nv)), a=np.zeros((600, one.nv)))
+    found = [filmed(replace(look, motion=quiet), waves(quiet.time, k, 0.004)) for k in range(4)]
+    about = np.array([0.0, 0.0, 0.0])
+    square, count = np.zeros(6), 0
+    for some in found:
+        wrench = predict_wrench(one, some.motion).value - predict_wrench(one, quiet).value
+        rows = BANDS.coefficients(wrench_about_point(wrench, about)[::2])
+        here = BANDS.of(len(rows)) == 2
+        square, count = square + np.sum(rows[here] ** 2, axis=0), count + here.sum()
+    power = seen(tuple(found))
+    expected = np.diag(of_marker_errors(one, one.neutral[None], about, power)[2])
+    ratio = np.sqrt(expected / (square / count))
+    assert ratio.min() > 0.7, ratio
+    assert ratio.max() < 1.5, ratio
+
+
+def test_only_more_unrest_than_usual_makes_the_forces_louder() -> None:
+    calm = own_tolerances(body(), looks(5), known=known()).tolerances
+    here = own_tolerances(body(), restless(), known=known()).tolerances
+    more = np.array([np.diag(b) for b in here.noise - calm.noise])
+    assert (more[2] > 0.005).all()
+    assert np.abs(more[4]).max() < 1e-12
+    power = np.array([[1e-4, 1.0, 1.0]] * len(BANDS))
+    assert not excess_unrest(power, (0.011,) * len(BANDS)).any()
+    share = excess_unrest(power, (0.008,) * len(BANDS))[:, 0] / 1e-4
+    np.testing.assert_allclose(share, [0.36, 0.36, 0.36, 0.36, 0.0])
+
+
+def test_restless_skin_is_no_alarm() -> None:
+    """Taken for as quiet as elsewhere, waves of 1.6 mm are forces that nothing explains."""
+    own = own_tolerances(body(), restless(), known=known()).tolerances
+    worst = []
+    for under in (known(), own):
+        found = diagnose_trials(body(), restless(), tolerances=under).diagnosis
+        assert not found.findings
+        worst.append(alarming(found.adequacy))
+    assert worst[0] > 2 * LIMIT
+    assert worst[1] < LIMIT
