@@ -9,11 +9,11 @@ from diagnosed_sessions import CORNERS, body, known, looks, motion, noise
 
 from biodance.diagnosis.adequacy import LIMIT, alarming
 from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.problem import Look
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
-from biodance.pipeline.looked_at import own_tolerances
 from biodance.records import Array, Markers, Motion, Wrench
 from biodance.spatial import wrench_about_origin, wrench_about_point
 from biodance.uncertainty.bands import BANDS
