@@ -172,6 +172,13 @@ class JointTree:
             paths.append((*(paths[joint.parent] if joint.parent >= 0 else ()), index))
         return tuple(paths)
 
+    def path_to(self, link: int) -> tuple[int, ...]:
+        """Return the indices of the joints from the root to one of the `links`, the one that carries it last; none for
+        the root's segment.
+        """
+        carrier = self.segment_joint[link]
+        return self.paths[carrier] if carrier != NO_JOINT else ()
+
     def place_on_segment(self, joint: int) -> tuple[int, Array]:
         """Return which segment a joint hangs on, and where.
 
