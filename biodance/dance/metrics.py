@@ -94,22 +94,13 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
         state = dance.state(phase, time)
         gram = gram + dynamic_grams(state, every) / _RATE
         dynamic.append(total(weight, gram, parts.second)[0])
-        paths.append(
-            ZmpPath(
-                phase.posture - 1, phase.stance, zmp_path(straight.state(phase, time).wrench), zmp_path(state.wrench)
-            )
-        )
+        paths.append(ZmpPath(phase.posture - 1, phase.stance, straight.state(phase, time).zmp, state.zmp))
     bounds = [
         float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)
     ]
     return DanceMetrics(
         static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths)
     )
-
-
-def zmp_path(wrench: Array) -> Array:
-    """Return the zero-moment point (T, 2) m on the ground of wrenches (T, 6) about the lab origin."""
-    return np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / wrench[:, 2:3]
 
 
 def criterion_of(body: Body, motion: Motion) -> tuple[float, float]:

@@ -166,14 +166,12 @@ def _nothing(state: State) -> tuple[float, Array]:
 
 
 def off_centre(state: State) -> tuple[float, Array]:
-    """Return the mean squared distance (dm²) of the zero-moment point to the middle of the support, and its slopes."""
-    wrench, slopes = state.wrench, state.wrench_slopes
-    lift = wrench[:, 2:3]
-    point = np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / lift
-    turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
-    moved = (turned - point[None, :, :, None] * slopes[:, :, None, 2]) / lift[None, :, :, None]
-    gap = point - state.stance.centre
-    return 100 * float(np.mean(np.sum(gap**2, axis=1))), 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, moved)
+    """Return the mean squared distance (dm²) of the zero-moment point from the middle of the support, and its slopes
+    (3, T, n).
+    """
+    gap = state.zmp - state.stance.centre
+    slopes = 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes)
+    return 100 * float(np.mean(np.sum(gap**2, axis=1))), slopes
 
 
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
