@@ -22,6 +22,7 @@ from biodance.dance.problem.excitation import (
 )
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
+from biodance.dance.transitions.move import straight_way
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Motion
 
@@ -34,8 +35,6 @@ infinite.
 POOR = 30.0
 """Condition number above which a segment was hardly tilted, so that gravity does not tell where along it the mass is.
 """
-_THIRDS = np.array([[0.20987654], [0.79012346]])
-"""Share of the way at one and two thirds of the time for least jerk: 10 s³ - 15 s⁴ + 6 s⁵."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +86,7 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
         if parts.first[i] and weight[i] > 0 and condition(grams[i][np.ix_(parts.first[i], parts.first[i])])[0] > POOR
     ]
     gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
-    straight = replace(dance, via=dance.postures[:-1, None] + _THIRDS * np.diff(dance.postures, axis=0)[:, None])
+    straight = replace(dance, via=straight_way(dance.postures[:-1], dance.postures[1:]))
     dynamic, paths = [], []
     for phase in (phase for phase in dance.phases if phase.kind == "move"):
         time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * _RATE) + 1)

@@ -48,8 +48,8 @@ without the reserve on the coarse grid.
 
 
 def straight_way(start: Array, end: Array) -> Array:
-    """Return the via points (2, n) of the smoothest move from ``start`` to ``end`` (n,)."""
-    return np.asarray(start + _THIRDS[:, None] * (end - start))
+    """Return the via points (..., 2, n) of the smoothest moves from ``start`` to ``end`` (..., n)."""
+    return np.asarray(start[..., None, :] + _THIRDS[:, None] * (end - start)[..., None, :])
 
 
 @dataclass(frozen=True, eq=False)
