@@ -18,9 +18,9 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
-from biodance.dance.postures.posture import anyhow
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.person import HEALTHY, fit_to_person
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of

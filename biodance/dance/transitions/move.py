@@ -13,7 +13,7 @@ import numpy as np
 from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
-from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
+from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, anyhow, free_coordinates, minimise
 from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
@@ -161,10 +161,6 @@ def _logarithm(gram: Array) -> tuple[Array, Array]:
     return np.log(value), slope / value[..., None, None]
 
 
-def _nothing(state: State) -> tuple[float, Array]:
-    return 0.0, np.zeros((3, *state.x.shape))
-
-
 def off_centre(state: State) -> tuple[float, Array]:
     """Return the mean squared distance (dm²) of the zero-moment point from the middle of the support, and its slopes
     (3, T, n).
@@ -222,7 +218,7 @@ def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     one is broken.
     """
     time = task.grid(CHECK)
-    problem = task.problem(via, [], time, reserve=BETWEEN, objective=_nothing)
+    problem = task.problem(via, [], time, reserve=BETWEEN, objective=anyhow)
     found = Evaluation(problem, problem.state(np.empty(0)).judged)
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)
