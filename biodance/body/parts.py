@@ -173,8 +173,23 @@ class JointTree:
         return tuple(paths)
 
     def path_to(self, link: int) -> tuple[int, ...]:
-        """Return the indices of the joints from the root to one of the `links`, the one that carries it last; none for
-        the root's segment.
+        """Return the joints between the root and a segment or part.
+
+        Parameters
+        ----------
+        link : int
+            Index in ``links``.
+
+        Returns
+        -------
+        tuple of int
+            Indices in ``joints`` from the root outwards, the joint that carries the link last; empty for the root's
+            segment.
+
+        Examples
+        --------
+        >>> len(result.body.path_to(result.body.segment_index("right_foot")))
+        6
         """
         carrier = self.segment_joint[link]
         return self.paths[carrier] if carrier != NO_JOINT else ()
