@@ -238,7 +238,7 @@ def main(folder: str, dancers: str) -> None:
     place.mkdir(parents=True, exist_ok=True)
     dance = known_dance(human(Subject(65.0, 1.75, "F", 33.0)))
     body, plan = dance.body, dance.motion(12.5)
-    noise = typical_noise(np.asarray(predict_wrench(body, plan).cop().mean(axis=0)))
+    noise = typical_noise(predict_wrench(body, plan))
     rows = []
     for seed in range(int(dancers)):
         kept, motion = place / f"{seed}.npz", performed(dance, seed)

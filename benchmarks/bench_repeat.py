@@ -50,7 +50,7 @@ def main(path: str, performers: str = "20") -> None:
     """Print a row a performer and how many gain more from what is proposed."""
     dance = Dance.load(Path(path))
     plan, body = PlannedDance(dance), dance.body
-    noise = typical_noise(np.asarray(predict_wrench(body, dance.motion(12.5)).cop().mean(axis=0)))
+    noise = typical_noise(predict_wrench(body, dance.motion(12.5)))
     free = [
         p.posture
         for p in dance.phases

@@ -49,7 +49,7 @@ def test_before_the_dance_stands_the_table_and_more_dance_is_never_worse(motion:
 
 def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_table(motion: Motion) -> None:
     wrench = predict_wrench(BODY, motion)
-    noise = typical_noise(wrench.cop().mean(axis=0))
+    noise = typical_noise(wrench)
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
     belief = posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))

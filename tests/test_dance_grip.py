@@ -12,8 +12,9 @@ from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip
 from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import ATTEMPTS, KEPT, anyhow, initial_guess, posture_at, solve
+from biodance.dance.postures.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.person import fit_to_person, read_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import palm

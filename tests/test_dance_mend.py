@@ -11,9 +11,10 @@ from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures.exchange import alike
 from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import KEPT, anyhow, initial_guess, solve
+from biodance.dance.postures.posture import KEPT, initial_guess, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.plan import Plan
 from biodance.dance.transitions import context, planner
 from biodance.dance.transitions import schedule as schedule_module

@@ -12,9 +12,10 @@ from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.postures import search
 from biodance.dance.postures.exchange import exchange, extremes
-from biodance.dance.postures.posture import KEPT, Posture, anyhow, initial_guess, posture_at, solve
+from biodance.dance.postures.posture import KEPT, Posture, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import condition, excitation_blocks, smooth_condition
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.stance import seat, stance
 from biodance.errors import BiodanceError
 from biodance.records import Subject

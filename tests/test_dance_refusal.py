@@ -11,8 +11,9 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.dance.limits import family
-from biodance.dance.postures.posture import KEPT, anyhow, initial_guess, refuse, solve
+from biodance.dance.postures.posture import KEPT, initial_guess, refuse, solve
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.person import HEALTHY, PersonLimits, limit_body
 from biodance.dance.problem.stance import Stance, stance
 from biodance.errors import BiodanceError

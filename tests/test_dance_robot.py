@@ -18,12 +18,12 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
-from biodance.dance.postures.posture import anyhow
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.person import HEALTHY, fit_to_person
 from biodance.dance.problem.plan import read_plan
-from biodance.dance.problem.shapes import capsule_pairs, pairs_of, unchecked_pairs
+from biodance.dance.problem.shapes import capsule_pairs, pairs_of
 from biodance.dance.problem.stance import _WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.problem.state import Closure, close_legs
 from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, robot_plan, robot_rows
@@ -142,10 +142,10 @@ def test_feet_stand_no_wider_than_weight_can_be_shifted() -> None:
 
 def test_what_must_not_touch_follows_from_the_tree(tmp_path: Path) -> None:
     person = human(Subject(65.0, 1.75, "F", 33.0))
-    assert pairs_of(person)[0] == capsule_pairs(person)
+    assert pairs_of(person).limbs == capsule_pairs(person)
     (tmp_path / "robot.urdf").write_text(biped())
     body = standing_frames(read_urdf(tmp_path / "robot.urdf", feet=("r_sole", "l_sole")))
-    limbs, boxes = ({frozenset((body.segments[i], body.segments[j])) for i, j in pairs} for pairs in pairs_of(body))
+    limbs, boxes = ({frozenset((body.segments[i], body.segments[j])) for i, j in pairs} for pairs in pairs_of(body)[:2])
     assert {
         frozenset(pair)
         for pair in (("r_tibia", "l_tibia"), ("r_pad", "l_tibia"), ("r_ulna", "l_ulna"), ("r_ulna", "l_femur"))
@@ -153,10 +153,10 @@ def test_what_must_not_touch_follows_from_the_tree(tmp_path: Path) -> None:
     assert frozenset(("r_femur", "r_tibia")) not in limbs
     assert {frozenset(pair) for pair in (("r_ulna", "chest"), ("l_ulna", "base"))} <= boxes
     assert frozenset(("r_clavicle", "chest")) not in boxes
-    assert unchecked_pairs(body) == unchecked_pairs(person) == ()
+    assert pairs_of(body).unchecked == pairs_of(person).unchecked == ()
     wide = np.array(body.boxes)
     wide[body.segment_index("l_ulna")] *= 6.0
-    coarse = unchecked_pairs(replace(body, boxes=wide))
+    coarse = pairs_of(replace(body, boxes=wide)).unchecked
     assert any("l_ulna" in pair for pair in coarse)
     assert all("l_ulna" in pair for pair in coarse)
 

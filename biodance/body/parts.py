@@ -172,6 +172,28 @@ class JointTree:
             paths.append((*(paths[joint.parent] if joint.parent >= 0 else ()), index))
         return tuple(paths)
 
+    def path_to(self, link: int) -> tuple[int, ...]:
+        """Return the joints between the root and a segment or part.
+
+        Parameters
+        ----------
+        link : int
+            Index in ``links``.
+
+        Returns
+        -------
+        tuple of int
+            Indices in ``joints`` from the root outwards, the joint that carries the link last; empty for the root's
+            segment.
+
+        Examples
+        --------
+        >>> len(result.body.path_to(result.body.segment_index("right_foot")))
+        6
+        """
+        carrier = self.segment_joint[link]
+        return self.paths[carrier] if carrier != NO_JOINT else ()
+
     def place_on_segment(self, joint: int) -> tuple[int, Array]:
         """Return which segment a joint hangs on, and where.
 

@@ -21,7 +21,7 @@ from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Motion
+from biodance.records import Array, Motion, Wrench
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.caution import widened
@@ -66,7 +66,7 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
     s, increasing.
     """
     wrench = predict_wrench(body, motion)
-    noise = typical_noise(np.asarray(wrench.cop().mean(axis=0)))
+    noise = typical_noise(wrench)
     size = 10 * len(body.segments)
     H, kinematics, plates = np.zeros((size, size)), *np.zeros((2, size, 1))
     beliefs, start = [belief_after(body, H, Mismatch(kinematics, plates))], motion.time[0]
@@ -84,12 +84,12 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
     return Expectation(body.segments, np.concatenate([[0.0], ends]), mass, com, inertia, share)
 
 
-def typical_noise(about: Array) -> Noise:
-    """Return the noise of a typical session about the standing point ``about`` (3,) m; a coefficient's variance
-    grows with the rate.
+def typical_noise(wrench: Wrench) -> Noise:
+    """Return the noise of a typical session about the mean centre of pressure of the planned ``wrench``; the variance
+    of a coefficient grows with the rate.
     """
     covariance = _RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
-    return Noise(covariance, about, Bands(BANDS.edges, _RATE))
+    return Noise(covariance, np.asarray(wrench.cop().mean(axis=0)), Bands(BANDS.edges, _RATE))
 
 
 def typical_sizes() -> Sizes:

@@ -22,6 +22,7 @@ from biodance.dance.problem.excitation import (
 )
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
+from biodance.dance.transitions.move import straight_way
 from biodance.motion.kinematics import segment_motion
 from biodance.records import Array, Motion
 
@@ -34,8 +35,6 @@ infinite.
 POOR = 30.0
 """Condition number above which a segment was hardly tilted, so that gravity does not tell where along it the mass is.
 """
-_THIRDS = np.array([[0.20987654], [0.79012346]])
-"""Share of the way at one and two thirds of the time for least jerk: 10 s³ - 15 s⁴ + 6 s⁵."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,29 +86,20 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
         if parts.first[i] and weight[i] > 0 and condition(grams[i][np.ix_(parts.first[i], parts.first[i])])[0] > POOR
     ]
     gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
-    straight = replace(dance, via=dance.postures[:-1, None] + _THIRDS * np.diff(dance.postures, axis=0)[:, None])
+    straight = replace(dance, via=straight_way(dance.postures[:-1], dance.postures[1:]))
     dynamic, paths = [], []
     for phase in (phase for phase in dance.phases if phase.kind == "move"):
         time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * _RATE) + 1)
         state = dance.state(phase, time)
         gram = gram + dynamic_grams(state, every) / _RATE
         dynamic.append(total(weight, gram, parts.second)[0])
-        paths.append(
-            ZmpPath(
-                phase.posture - 1, phase.stance, zmp_path(straight.state(phase, time).wrench), zmp_path(state.wrench)
-            )
-        )
+        paths.append(ZmpPath(phase.posture - 1, phase.stance, straight.state(phase, time).zmp, state.zmp))
     bounds = [
         float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)
     ]
     return DanceMetrics(
         static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths)
     )
-
-
-def zmp_path(wrench: Array) -> Array:
-    """Return the zero-moment point (T, 2) m on the ground of wrenches (T, 6) about the lab origin."""
-    return np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / wrench[:, 2:3]
 
 
 def criterion_of(body: Body, motion: Motion) -> tuple[float, float]:

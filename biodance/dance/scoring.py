@@ -136,7 +136,7 @@ def score_performance(
         raise BiodanceError("No trial with role fit has motion and plates, so nobody knows how the dance was danced.")
     brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
     plan = _in_joints_of(body, dance, brief.motion(_RATE))
-    noise = typical_noise(np.asarray(predict_wrench(body, plan).cop().mean(axis=0)))
+    noise = typical_noise(predict_wrench(body, plan))
     planned = _shares(body, worth_of(body, plan, noise=noise))
     parts = [worth_of(body, motion, use, noise=noise) for motion, use in recorded if use.any()]
     reached = sum(parts[1:], parts[0])

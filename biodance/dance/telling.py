@@ -71,7 +71,7 @@ class Telling:
 def telling_of(dance: Dance) -> Telling:
     """Return by what the parts of ``dance`` are judged."""
     plan = dance.motion(_RATE)
-    noise = typical_noise(np.asarray(predict_wrench(dance.body, plan).cop().mean(axis=0)))
+    noise = typical_noise(predict_wrench(dance.body, plan))
     weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened(dance.body.sip).covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))

@@ -49,7 +49,7 @@ def poses(body: Body, q: Array) -> Poses:
     else:
         root_rotation, root_position = np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3))
     rotation, position = np.empty((frames, n, 3, 3)), np.empty((frames, n, 3))
-    parent, turn, translation, _ = _tree(body)
+    parent, turn, translation, _ = joint_arrays(body)
     angles = np.array(q[:, body.nq - n :])
     place_joints(parent, turn, translation, root_rotation, root_position, angles, rotation, position)
     segments = _of_segments(body, root_rotation, rotation), _of_segments(body, root_position, position)
@@ -90,7 +90,7 @@ def segment_motion(body: Body, motion: Motion, *, pose: Poses | None = None) -> 
         acc_root = np.einsum("tij,tj->ti", turn, motion.a[:, :3] + cross(angular, linear))
     rate, rate2 = np.array(motion.v[:, body.n_root :]), np.array(motion.a[:, body.n_root :])
     root = np.stack([w_root, dw_root, acc_root, pose.root_position])
-    parent, _, _, axis = _tree(body)
+    parent, _, _, axis = joint_arrays(body)
     omega, alpha, acc = moved = np.empty((3, frames, n, 3))
     move_joints(parent, axis, pose.joint_rotation, pose.joint_position, root, rate, rate2, moved)
     pairs = (w_root, omega), (dw_root, alpha), (acc_root, acc)
@@ -122,9 +122,9 @@ def centre_of_mass(body: Body, motion: Motion) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
-    """Return the joint before each (n,), the parts (n, 3, 3, 3) of its rotation (see `place_joints`), its translation
-    (n, 3) m and axis (n, 3).
+def joint_arrays(body: Body) -> tuple[Index, Array, Array, Array]:
+    """Return the joints of ``body`` as compiled code takes them: parent (n,), -1 the root; the three terms (n, 3, 3, 3)
+    of the rotation, which is term 0 + sin term 1 + (1 - cos) term 2; translation (n, 3) m; axis (n, 3).
     """
     axis = np.array([joint.axis for joint in body.joints], dtype=float).reshape(-1, 3)
     fixed = np.array([joint.rotation for joint in body.joints], dtype=float).reshape(-1, 3, 3)
@@ -136,12 +136,10 @@ def _tree(body: Body) -> tuple[Index, Array, Array, Array]:
 
 @lru_cache(maxsize=8)
 def below(body: Body) -> Array:
-    """Return (n, N + P) 1 where a segment, or a part of one, hangs on a joint; read-only."""
+    """Return (n, N + P) 1 where a joint moves a segment or a part of one, else 0; read-only."""
     table = np.zeros((len(body.joints), len(body.segment_joint)))
-    for s, j in enumerate(body.segment_joint):
-        while j >= 0:
-            table[j, s] = 1.0
-            j = body.joints[j].parent
+    for link in range(table.shape[1]):
+        table[list(body.path_to(link)), link] = 1.0
     table.setflags(write=False)
     return table
 
@@ -197,7 +195,7 @@ def _placed_joints(body: Body, pose: Poses) -> PlacedJoints:
     """Return the joints as the compiled code takes them: contiguous arrays, so that there is one type of them."""
     known = pose.joint_rotation, pose.joint_position, pose.root_position
     rotation, origin, root = (np.ascontiguousarray(one) for one in known)
-    return PlacedJoints(_tree(body)[3], rotation, origin, root, body.n_root)
+    return PlacedJoints(joint_arrays(body)[3], rotation, origin, root, body.n_root)
 
 
 def _axes_before(body: Body, pose: Poses, segment: list[int]) -> Iterator[tuple[int, Index, Array]]:

@@ -18,6 +18,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.records import Array, Motion
+from biodance.records.arrays import rate_of
 from biodance.spatial import cross, quaternion_conjugate, quaternion_matrix, quaternion_product
 
 _DEGREE = 5
@@ -56,7 +57,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
         return Motion(time, q, np.zeros((1, body.nv)), np.zeros((1, body.nv)), joint_names=names)
     chart = chart_of(body)
     rough = np.asarray(q).T
-    even, first, second = _slow(chart, rough, _rate(time), settings)
+    even, first, second = _slow(chart, rough, rate_of(time), settings)
     posture, v, a = (np.empty((len(time), count)) for count in (body.nq, body.nv, body.nv))
     for start in range(0, len(time), _BLOCK):
         part = slice(start, start + _BLOCK)
@@ -122,10 +123,6 @@ def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:
     return spline(time, nu=1).T, spline(time, nu=2).T
 
 
-def _rate(time: Array) -> float:
-    return float((len(time) - 1) / (time[-1] - time[0]))
-
-
 def _check(time: Array, q: Array, settings: LowPass) -> None:
     """Refuse what cannot be smoothed."""
     bad = np.isnan(q).any(axis=1)
@@ -141,10 +138,10 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
         raise TrialRefused(
             f"The frames are not evenly spaced: {steps[frame]:g} s after frame {frame}, {np.median(steps):g} s usually."
         )
-    need = max(settings.shortest(_rate(time)), _DEGREE + 1)
+    need = max(settings.shortest(rate_of(time)), _DEGREE + 1)
     if len(time) < need:
         raise TrialRefused(
-            f"{len(time)} frames at {_rate(time):g} Hz are too few for velocities behind a low-pass at "
+            f"{len(time)} frames at {rate_of(time):g} Hz are too few for velocities behind a low-pass at "
             f"{settings.cutoff:g} Hz: "
             f"at least {need} are needed. Record longer, or use one frame as a static pose."
         )

@@ -24,7 +24,7 @@ from biodance.dance.metrics import dance_metrics
 from biodance.dance.performers import OF_PERFORMERS
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.shapes import unchecked_pairs
+from biodance.dance.problem.shapes import pairs_of
 from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.dance.verify import Margin, broken
 from biodance.errors import BiodanceError
@@ -205,6 +205,6 @@ def make_robot_dance(
     found = make_dance(
         body, robot_plan(body, plan), person, limits=limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS
     )
-    coarse = unchecked_pairs(body)
+    coarse = pairs_of(body).unchecked
     words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
     return replace(found, notes=(*body.notes, *words, *found.notes))

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.metrics import zmp_path
 from biodance.dance.problem.stance import Phase
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
+from biodance.spatial import zero_moment_point
 from biodance.virtual_lab.faults.causes import Hidden, hide
 from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.dancing import USUAL_PERFORMER, Performer, Shown, copy_dance
@@ -60,9 +60,8 @@ def _shown(dance: Dance, motion: Motion, phases: list[Phase], name: str) -> Show
     rows = (motion.time >= phases[0].start - 1e-9) & (motion.time <= phases[-1].end + 1e-9)
     part = motion.at(rows)
     raised = np.max([_raised(dance, phase, part.time) for phase in phases], axis=0)
-    return Shown(
-        name, dance.body, part, phases[0].stance.ankle, raised, zmp_path(predict_wrench(dance.body, part).value)
-    )
+    point = zero_moment_point(predict_wrench(dance.body, part).value)[:, :2]
+    return Shown(name, dance.body, part, phases[0].stance.ankle, raised, point)
 
 
 def _raised(dance: Dance, phase: Phase, time: Array) -> Array:

@@ -24,5 +24,5 @@ def freer_dance(body: Body, plan: Plan, *, seed: int = 0) -> Dance:
     stances = support_sequence(body, free)
     steps = Walk(DesignContext.alone(body, free, seed)).choose(stances)
     x, hold = np.array([step.x for step in steps]), np.full(len(steps), plan.hold)
-    via, move = np.array([straight_way(*ends) for ends in pairwise(x)]), np.full(len(x) - 1, plan.move)
+    via, move = straight_way(x[:-1], x[1:]), np.full(len(x) - 1, plan.move)
     return Dance(plan.name, body, x, stances, hold, via, move, tuple(under(*pair) for pair in pairwise(stances)), seed)

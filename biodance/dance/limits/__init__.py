@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from biodance.dance.limits._checked import NOTHING, CheckedMotion, Copied, ForImprecise, Remaining
+from biodance.dance.problem.nlp import FAR, Margins
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
@@ -39,19 +40,6 @@ __all__ = [
     "repeated",
     "unconcerned",
 ]
-FAR = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class Margins:
-    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as
-    far as needed.
-
-    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
-    """
-
-    value: Array
-    slopes: Array
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:

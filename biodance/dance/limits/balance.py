@@ -33,14 +33,9 @@ class Balance(Limit):
         return 0.2 if stance.over is None else super().hold_reserve(stance)
 
     def margins(self, state: State) -> Margins:
-        """Return distance inside every edge of the reduced support, (T, edges) m."""
+        """Return the distance of the zero-moment point inside every edge of the reduced support, (T, edges) m."""
         normals, offsets = state.stance.reduced(self.share)
-        wrench, slopes = state.wrench, state.wrench_slopes
-        lift = wrench[:, 2]
-        point = np.stack([-wrench[:, 4] / lift, wrench[:, 3] / lift], axis=1)
-        turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
-        moved = (turned - point[None, :, :, None] * slopes[:, :, None, 2]) / lift[None, :, None, None]
-        return Margins(point @ normals.T + offsets, normals @ moved)
+        return Margins(state.zmp @ normals.T + offsets, normals @ state.zmp_slopes)
 
     def check(self, motion: CheckedMotion) -> Remaining:
         """Return the distance (T, 1) m inside the reduced base, drawn from where the soles really are, of all feet that

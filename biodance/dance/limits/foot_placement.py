@@ -71,13 +71,11 @@ LIMIT = FootPlacement
 
 
 def _measured(body: Body, side: str, knee: float) -> tuple[int, float] | None:
-    """Return the segment that begins at the hip and the way m from there to the ankle with the knee bent by ``knee``
-    rad, measured on the body; None where hip or ankle is no single point.
+    """Return the segment that begins at the hip, and the hip-ankle distance m of the body with the knee bent by
+    ``knee`` rad; None where the axes of hip or ankle do not meet in a point.
     """
     foot = body.feet[side].segment
-    path = [body.segment_joint[foot]]
-    while body.joints[path[0]].parent >= 0:
-        path.insert(0, body.joints[path[0]].parent)
+    path = body.path_to(foot)
     spread = [body.joints[j].translation for j in (*path[1:3], *path[5:])]
     if not np.allclose(spread, 0.0, atol=1e-12):
         return None

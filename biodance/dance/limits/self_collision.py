@@ -10,7 +10,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.limits import FAR, CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
-from biodance.dance.problem.shapes import Solids
+from biodance.dance.problem.shapes import Solids, points_apart, points_off_box, points_on_axis
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import Poses
 from biodance.records import Array
@@ -238,24 +238,19 @@ def solid_distances(body: Body, pose: Poses) -> tuple[Array, list[str]]:
 
 
 def _axis(solids: Solids, pose: Poses, segment: int) -> tuple[Array, float]:
-    """Return points (T, K, 3) m on the axis of a capsule and half the way between them, m."""
-    a, b = solids.axis[segment]
-    points = a + np.linspace(0, 1, _POINTS)[:, None] * (b - a)
-    return pose.points([segment] * _POINTS, points), float(np.linalg.norm(b - a)) / (_POINTS - 1) / 2
+    """Return points (T, K, 3) m on the axis of a capsule and half the distance m between neighbours."""
+    a, b = ends = solids.axis[segment]
+    return points_on_axis(pose, segment, ends, _POINTS), float(np.linalg.norm(b - a)) / (_POINTS - 1) / 2
 
 
 def _limbs_at_least(solids: Solids, pose: Poses, i: int, j: int) -> Array:
     (a, near), (b, far) = _axis(solids, pose, i), _axis(solids, pose, j)
-    apart = np.linalg.norm(a[:, :, None] - b[:, None], axis=3).min(axis=(1, 2))
-    return np.asarray(apart - near - far - solids.radius[i] - solids.radius[j])
+    return np.asarray(points_apart(a, b) - near - far - solids.radius[i] - solids.radius[j])
 
 
 def _box_at_least(body: Body, solids: Solids, pose: Poses, limb: int, box: int) -> Array:
     points, near = _axis(solids, pose, limb)
-    local = np.einsum("tji,tkj->tki", pose.rotation[:, box], points - pose.position[:, box, None])
-    low, high = body.boxes[box]
-    beyond = np.maximum(np.maximum(low - local, local - high), 0.0)
-    return np.asarray(np.linalg.norm(beyond, axis=2).min(axis=1) - near - solids.radius[limb])
+    return np.asarray(points_off_box(body, pose, points, box) - near - solids.radius[limb])
 
 
 class _Shapes:

@@ -67,11 +67,6 @@ def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Arr
     return x
 
 
-def anyhow(state: State) -> tuple[float, Array]:
-    """Objective of a posture that need only keep its limits."""
-    return 0.0, np.zeros((3, *state.x.shape))
-
-
 _ITERATIONS = 30
 MILD = 0.3
 """Share of the neighbours' joint angles that a posture in between keeps: it is a rest."""

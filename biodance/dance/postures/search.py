@@ -18,7 +18,6 @@ from biodance.dance.postures.posture import (
     KEPT,
     Exciting,
     Posture,
-    anyhow,
     initial_guess,
     posture_at,
     refuse,
@@ -26,6 +25,7 @@ from biodance.dance.postures.posture import (
 )
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, static_grams
+from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 

@@ -76,11 +76,11 @@ class Chain(Sendable):
 
     @cached_property
     def ancestors(self) -> Array:
-        """(n, n) 1 where coordinate i moves link k (row k, column i, itself included)."""
-        table = np.eye(self.size)
-        for k in range(1, self.size):
-            above = self.body.joints[k - ROOT].parent if k >= ROOT else k - 1 - ROOT
-            table[k] += table[max(above, -1) + ROOT if k >= ROOT else k - 1]
+        """(n, n) 1 where coordinate i (column) moves link k (row), else 0; a link is moved by its own coordinate."""
+        table = np.zeros((self.size, self.size))
+        table[:, :ROOT] = np.tril(np.ones((self.size, ROOT)))
+        for joint, path in enumerate(self.body.paths):
+            table[ROOT + joint, ROOT + np.array(path)] = 1.0
         return table
 
     @cached_property

@@ -25,16 +25,25 @@ them.
 """
 
 
-class ConstraintMargins(Protocol):
-    """What is left of a constraint: ``value`` (T, m) >= 0 where it holds, ``slopes`` (k, T, m, n) by x, v, a."""
+def anyhow(state: State) -> tuple[float, Array]:
+    """Objective of a problem that has none: any point that keeps the limits will do."""
+    return 0.0, np.zeros((3, *state.x.shape))
 
-    @property
-    def value(self) -> Array:
-        """(T, m)."""
 
-    @property
-    def slopes(self) -> Array:
-        """(k, T, m, n)."""
+FAR = 2.0
+"""Scales from its limit beyond which the slopes of a margin do not count."""
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as
+    far as needed.
+
+    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
+    """
+
+    value: Array
+    slopes: Array
 
 
 class Constraint(Protocol):
@@ -48,7 +57,7 @@ class Constraint(Protocol):
     def scale(self) -> float:
         """A noticeable amount of it."""
 
-    def margins(self, state: State) -> ConstraintMargins:
+    def margins(self, state: State) -> Margins:
         """Return what is left of it in every sample."""
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +53,19 @@ def box_pairs(body: Body) -> list[tuple[int, int]]:
     return [(arm, body.segment_index(box)) for arm in arms for box in BOXES]
 
 
-def pairs_of(body: Body) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Return the pairs of limbs, and of a limb and a box, that must not touch: by name in a person's body, else by the
-    tree.
+class Pairs(NamedTuple):
+    """Pairs of segments (indices) to keep apart: ``limbs`` two limbs, ``boxes`` a limb and a box. ``unchecked`` names
+    those that cannot be kept apart because they overlap at zero angles.
     """
-    return (capsule_pairs(body), box_pairs(body)) if _is_named(body) else tree_pairs(body)[:2]
+
+    limbs: list[tuple[int, int]]
+    boxes: list[tuple[int, int]]
+    unchecked: tuple[str, ...] = ()
 
 
-def unchecked_pairs(body: Body) -> tuple[str, ...]:
-    """Return the pairs of a robot's segments that should be kept apart and cannot, in words (`tree_pairs`)."""
-    return () if _is_named(body) else tree_pairs(body)[2]
+def pairs_of(body: Body) -> Pairs:
+    """Return the pairs of segments that must not touch: by name in a person's body, else by the tree."""
+    return Pairs(capsule_pairs(body), box_pairs(body)) if _is_named(body) else tree_pairs(body)
 
 
 def _is_named(body: Body) -> bool:
@@ -86,7 +90,7 @@ class Solids:
     @lru_cache(maxsize=8)
     def of(cls, body: Body) -> "Solids":
         """Return the pairs of a body, worked out once."""
-        capsules, boxes = (np.array(pairs, dtype=np.intp).reshape(-1, 2) for pairs in pairs_of(body))
+        capsules, boxes = (np.array(pairs, dtype=np.intp).reshape(-1, 2) for pairs in pairs_of(body)[:2])
         shape = [capsule(body, i) for i in range(len(body.segments))]
         axis, radius = np.array([ends for ends, _ in shape]), np.array([radius for _, radius in shape])
         return cls(capsules[:, 0], capsules[:, 1], boxes[:, 0], boxes[:, 1], axis, radius)
@@ -103,11 +107,10 @@ def palm(body: Body, side: str) -> tuple[int, Array]:
 
 _NEAR = 2
 """Segments away along the tree: closer limbs are neighbours, or neighbours of the same segment."""
-_POINTS = np.linspace(0.0, 1.0, 41)
-"""Places on a limb's axis at which it is held against others at zero angles."""
+_POINTS = 41
+"""On a limb's axis, at which it is held against others at zero angles."""
 _LEAST = 0.01
 """Half length of a capsule in a cube, in its radius: a line of no length has no direction."""
-Pairs = list[tuple[int, int]]
 
 
 def capsule(body: Body, segment: int) -> tuple[Array, float]:
@@ -122,9 +125,9 @@ def capsule(body: Body, segment: int) -> tuple[Array, float]:
     return np.array([centre - reach, centre + reach]), radius
 
 
-def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
-    """Return the pairs of limbs and of a limb and a box (segment indices) to keep apart, and the pairs that cannot be
-    checked, in words.
+def tree_pairs(body: Body) -> Pairs:
+    """Return the pairs of a robot's segments that must not touch: limbs more than `_NEAR` segments apart along the
+    tree, and limbs that belong to no leg against boxes other than the one that carries them.
     """
     carried = body.segment_joint[: len(body.segments)]
     above = [body.place_on_segment(joint)[0] if joint >= 0 else -1 for joint in carried]
@@ -134,11 +137,12 @@ def tree_pairs(body: Body) -> tuple[Pairs, Pairs, tuple[str, ...]]:
     solid = [(i, j) for i, j in combinations(limbs, 2) if _apart(above, i, j) > _NEAR]
     walls = [(i, j) for i in limbs if i not in legs for j in boxes if above[i] != j]
     pose = poses(body, body.neutral[None])
-    axes = {i: _axis_at_zero(body, pose, i) for i in limbs}
-    free = [pair for pair in solid if _limbs_gap(body, axes, *pair) > 0]
-    clear = [pair for pair in walls if _box_gap(body, pose, axes[pair[0]], *pair) > 0]
+    shape = {i: capsule(body, i) for i in limbs}
+    axes = {i: points_on_axis(pose, i, ends, _POINTS) for i, (ends, _) in shape.items()}
+    free = [(i, j) for i, j in solid if points_apart(axes[i], axes[j])[0] - shape[i][1] - shape[j][1] > 0]
+    clear = [(i, j) for i, j in walls if points_off_box(body, pose, axes[i], j)[0] - shape[i][1] > 0]
     left = [pair for pair in solid + walls if pair not in free and pair not in clear]
-    return free, clear, tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in left)
+    return Pairs(free, clear, tuple(f"{body.segments[i]} - {body.segments[j]}" for i, j in left))
 
 
 def _up(above: list[int], segment: int) -> list[int]:
@@ -154,19 +158,22 @@ def _apart(above: list[int], i: int, j: int) -> int:
     return len(set(one) ^ set(two))
 
 
-def _axis_at_zero(body: Body, pose: Poses, segment: int) -> Array:
-    """Return points (K, 3) m on the axis of a limb at zero angles, lab frame."""
-    (a, b), _ = capsule(body, segment)
-    return pose.points([segment] * len(_POINTS), a + _POINTS[:, None] * (b - a))[0]
+def points_on_axis(pose: Poses, segment: int, ends: Array, count: int) -> Array:
+    """Return ``count`` points (T, K, 3) m, lab frame, evenly spaced from one of the ``ends`` (2, 3) m, fixed in a
+    segment, to the other.
+    """
+    a, b = ends
+    return pose.points([segment] * count, a + np.linspace(0.0, 1.0, count)[:, None] * (b - a))
 
 
-def _limbs_gap(body: Body, axes: dict[int, Array], i: int, j: int) -> float:
-    distance = np.linalg.norm(axes[i][:, None] - axes[j][None], axis=2).min()
-    return float(distance - capsule(body, i)[1] - capsule(body, j)[1])
+def points_apart(a: Array, b: Array) -> Array:
+    """Return the least distance (T,) m of points ``a`` (T, K, 3) from points ``b`` (T, L, 3)."""
+    return np.asarray(np.linalg.norm(a[:, :, None] - b[:, None], axis=3).min(axis=(1, 2)))
 
 
-def _box_gap(body: Body, pose: Poses, axis: Array, limb: int, box: int) -> float:
-    local = (axis - pose.position[0, box]) @ pose.rotation[0, box]
-    low, high = body.boxes[box]
+def points_off_box(body: Body, pose: Poses, points: Array, segment: int) -> Array:
+    """Return the least distance (T,) m of ``points`` (T, K, 3), lab frame, from the box of a segment; 0 inside it."""
+    local = np.einsum("tji,tkj->tki", pose.rotation[:, segment], points - pose.position[:, segment, None])
+    low, high = body.boxes[segment]
     beyond = np.maximum(np.maximum(low - local, local - high), 0.0)
-    return float(np.linalg.norm(beyond, axis=1).min() - capsule(body, limb)[1])
+    return np.asarray(np.linalg.norm(beyond, axis=2).min(axis=1))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.feet import foot_forces
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 from biodance.spatial import spatial_cross, wrench_of_force
@@ -134,6 +135,19 @@ class State:
         inner[0, :, :, :ROOT] -= self.moved_twists(list(range(ROOT)), self.wrench)[:, :, :ROOT]
         return np.asarray(np.linalg.solve(self.twists[None, :, :ROOT], inner))
 
+    @cached_property
+    def zmp(self) -> Array:
+        """(T, 2) m zero-moment point on the ground; at rest the projected centre of mass."""
+        wrench = self.wrench
+        return np.asarray(np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / wrench[:, 2:3])
+
+    @cached_property
+    def zmp_slopes(self) -> Array:
+        """(3, T, 2, n) derivative of the zero-moment point with respect to x, v, a."""
+        slopes = self.wrench_slopes
+        turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
+        return np.asarray((turned - self.zmp[:, :, None] * slopes[:, :, None, 2]) / self.wrench[:, 2, None, None])
+
     def moved_twists(self, columns: list[int], wrench: Array) -> Array:
         """Return (T, k, n) derivative of J_k' F with respect to x for the coordinates ``columns`` and a fixed wrench
         (T, 6).
@@ -147,7 +161,7 @@ class State:
         """The same motion with everything on the foot over which the weight is."""
         assert self.stance.over is not None
         other = replace(self, stance=self.stance.on(self.stance.over))
-        shared = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes")
+        shared = ("_frames", "velocity", "acceleration", "_dynamics", "wrench", "wrench_slopes", "zmp", "zmp_slopes")
         other.__dict__.update({name: self.__dict__[name] for name in shared if name in self.__dict__})
         return other
 
@@ -186,41 +200,6 @@ class State:
             slopes[:, :, columns] -= self.twists[:, columns] @ share
             slopes[0][:, columns] -= self.moved_twists(columns, self.feet[0][:, side])
         return slopes[:, :, ROOT:]
-
-
-_TINY = 1e-30
-"""Step of the complex-step derivative: exact to machine precision."""
-
-
-def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
-    """Return the wrenches (T, 2, 6) of the right and left foot and their derivative (T, 2, 6, 6) with respect to the
-    total (T, 6).
-    """
-    if len(stance.planted) == 1:
-        chosen = np.eye(2)[stance.planted[0]]
-        return total[:, None] * chosen[:, None], np.broadcast_to(
-            chosen[:, None, None] * np.eye(6), (len(total), 2, 6, 6)
-        )
-    stepped = total[:, None] + 1j * _TINY * np.eye(6)
-    derivative = np.swapaxes(
-        _share(stepped.reshape(-1, 6), stance.sole_centres).reshape(len(total), 6, 2, 6).imag / _TINY, 1, 2
-    )
-    return _share(total, stance.sole_centres), np.swapaxes(derivative, 2, 3)
-
-
-def _share(total: Array, centres: Array) -> Array:
-    force, moment = total[:, :3], total[:, 3:]
-    point = np.stack([-moment[:, 1] / force[:, 2], moment[:, 0] / force[:, 2]], axis=1)
-    reach = [np.sqrt(np.sum((point - c[:2]) ** 2, axis=1)) for c in centres]
-    right = reach[1] / (reach[0] + reach[1])
-    middle = right[:, None] * centres[0, :2] + (1 - right[:, None]) * centres[1, :2]
-    twist = moment[:, 2] - point[:, 0] * force[:, 1] + point[:, 1] * force[:, 0]
-    feet = []
-    for part, centre in ((right, centres[0]), (1 - right, centres[1])):
-        x, y = (point + centre[:2] - middle).T
-        own = np.stack([y * force[:, 2], -x * force[:, 2], x * force[:, 1] - y * force[:, 0] + twist], axis=1)
-        feet.append(part[:, None] * np.concatenate([force, own], axis=1))
-    return np.stack(feet, axis=1)
 
 
 def close_legs(chain: Chain, stance: Stance, x: Array, v: Array, a: Array) -> State:

@@ -13,7 +13,7 @@ import numpy as np
 from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
-from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, free_coordinates, minimise
+from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, anyhow, free_coordinates, minimise
 from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
@@ -48,8 +48,8 @@ without the reserve on the coarse grid.
 
 
 def straight_way(start: Array, end: Array) -> Array:
-    """Return the via points (2, n) of the smoothest move from ``start`` to ``end`` (n,)."""
-    return np.asarray(start + _THIRDS[:, None] * (end - start))
+    """Return the via points (..., 2, n) of the smoothest moves from ``start`` to ``end`` (..., n)."""
+    return np.asarray(start[..., None, :] + _THIRDS[:, None] * (end - start)[..., None, :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,19 +161,13 @@ def _logarithm(gram: Array) -> tuple[Array, Array]:
     return np.log(value), slope / value[..., None, None]
 
 
-def _nothing(state: State) -> tuple[float, Array]:
-    return 0.0, np.zeros((3, *state.x.shape))
-
-
 def off_centre(state: State) -> tuple[float, Array]:
-    """Return the mean squared distance (dm²) of the zero-moment point to the middle of the support, and its slopes."""
-    wrench, slopes = state.wrench, state.wrench_slopes
-    lift = wrench[:, 2:3]
-    point = np.stack([-wrench[:, 4], wrench[:, 3]], axis=1) / lift
-    turned = np.stack([-slopes[:, :, 4], slopes[:, :, 3]], axis=2)
-    moved = (turned - point[None, :, :, None] * slopes[:, :, None, 2]) / lift[None, :, :, None]
-    gap = point - state.stance.centre
-    return 100 * float(np.mean(np.sum(gap**2, axis=1))), 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, moved)
+    """Return the mean squared distance (dm²) of the zero-moment point from the middle of the support, and its slopes
+    (3, T, n).
+    """
+    gap = state.zmp - state.stance.centre
+    slopes = 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes)
+    return 100 * float(np.mean(np.sum(gap**2, axis=1))), slopes
 
 
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
@@ -224,7 +218,7 @@ def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     one is broken.
     """
     time = task.grid(CHECK)
-    problem = task.problem(via, [], time, reserve=BETWEEN, objective=_nothing)
+    problem = task.problem(via, [], time, reserve=BETWEEN, objective=anyhow)
     found = Evaluation(problem, problem.state(np.empty(0)).judged)
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)

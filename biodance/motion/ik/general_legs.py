@@ -111,11 +111,8 @@ class GeneralLeg:
 
 
 def _path(body: Body, side: str) -> tuple[int, ...]:
-    """Return the joints from the root to the ``side`` foot."""
-    path, joint = list[int](), body.segment_joint[body.feet[side].segment]
-    while joint >= 0:
-        path.insert(0, joint)
-        joint = body.joints[joint].parent
+    """Return the six joints from the root to the ``side`` foot; BiodanceError where there are more or fewer."""
+    path = body.path_to(body.feet[side].segment)
     if len(path) != 6:
         names = ", ".join(body.joints[j].name for j in path) or "none"
         raise BiodanceError(
@@ -123,7 +120,7 @@ def _path(body: Body, side: str) -> tuple[int, ...]:
             f"{body.segments[body.feet[side].segment]} ({names}); "
             "a foot that stands still needs exactly six. Choose the root and the feet so that each leg has six joints."
         )
-    return tuple(path)
+    return path
 
 
 def _meeting(rotation: Array, translation: Array, axis: Array) -> Array:

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.motion.ik.chart import balls
 from biodance.motion.ik.compiled import compiled
+from biodance.motion.kinematics import joint_arrays
 from biodance.records import Array
-from biodance.spatial import skew
 
 _LENGTH = 0.1
 """m, turns an angle into a typical marker displacement: makes gradients, damping and pivots of different coordinates
@@ -75,19 +75,17 @@ class Sums(NamedTuple):
 
 
 def chain_of(body: Body, segment: list[int], local: Array) -> MarkerChain:
-    """Return the chain of ``body`` with markers at ``local`` (K, 3) m in ``segment`` (K)."""
-    cross = [skew(joint.axis) for joint in body.joints]
-    parts = [[j.rotation, j.rotation @ c, j.rotation @ c @ c] for j, c in zip(body.joints, cross, strict=True)]
-    parents = [joint.parent for joint in body.joints]
-    paths, joints = [list(range(k + 1)) for k in range(body.n_root)], balls(body)
-    for i, parent in enumerate(parents):
-        paths.append([*(paths[body.n_root + parent] if parent >= 0 else range(body.n_root)), body.n_root + i])
+    """Return the chain of ``body`` with markers at ``local`` (K, 3) m in the frames of the segments ``segment`` (K)."""
+    parent, turn, translation, axis = joint_arrays(body)
+    root, joints = range(body.n_root), balls(body)
+    paths = [list(root[: k + 1]) for k in root]
+    paths += [[*root, *(body.n_root + joint for joint in path)] for path in body.paths]
     depth = np.array([len(path) - 1 for path in paths], dtype=np.int64)
     return MarkerChain(
-        np.array(parents, dtype=np.int64),
-        np.array(parts, dtype=float).reshape(-1, 3, 3, 3),
-        np.array([joint.translation for joint in body.joints], dtype=float).reshape(-1, 3),
-        np.array([joint.axis for joint in body.joints], dtype=float).reshape(-1, 3),
+        parent.astype(np.int64),
+        turn,
+        translation,
+        axis,
         np.array(body.segment_joint, dtype=np.int64)[segment] + 1,
         np.array(local, dtype=float).reshape(-1, 3),
         np.array(body.limits.lower, dtype=float),

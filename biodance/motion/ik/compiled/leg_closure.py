@@ -61,25 +61,11 @@ class Scratch(NamedTuple):
 
 
 def scratch() -> Scratch:
-    """Return room for one leg."""
-    shapes = (
-        (3, 3),
-        (3,),
-        (6, 3),
-        (6, 3),
-        (3, 3),
-        (3,),
-        (3, 3),
-        (3,),
-        (3, 3),
-        (3, 3),
-        (3,),
-        (6, 6),
-        (6, 6),
-        (6,),
-        (6,),
-    )
-    return Scratch(*(np.zeros(shape) for shape in shapes))
+    """Return room for one leg, filled with zeros."""
+    turn, place, axes = (3, 3), (3,), (6, 3)
+    foot, way, known, products = (turn, place, axes, axes), (turn, place), (turn, place), (turn, turn, place)
+    newton = ((6, 6), (6, 6), (6,), (6,))
+    return Scratch(*(np.zeros(shape) for shape in (*foot, *way, *known, *products, *newton)))
 
 
 @compiled
