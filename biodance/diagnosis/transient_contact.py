@@ -1,8 +1,8 @@
-"""Causes that come and go: a touch of the rail, a helper's hand. Looked for only where nothing steady explains the
+"""Transient external contacts, such as a touch of a rail or a helping hand; sought only if no steady cause explains the
 session.
 
-Each trial has its own course of the force in time, so there are hundreds of columns; three of the six channels stay
-free, which is why such a force does not explain just anything.
+Each trial has its own time course of the force, hence hundreds of columns. Three of the six channels remain
+unconstrained by it, so that such a force cannot explain everything.
 """
 
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
 
-from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
+from biodance.diagnosis.adequacy import LIMIT, adequacy, largest_z
 from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.candidates import local_basis
 from biodance.diagnosis.consequence import matters
-from biodance.diagnosis.evidence import Evidence, believe, evidence, visible
+from biodance.diagnosis.evidence import Evidence, evidence, linear_posterior, visible
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, more_probable, needed, stands
+from biodance.diagnosis.naming import Naming, Round, is_significant, log_bayes_factor_between, required_evidence
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
@@ -60,19 +60,19 @@ class _Passing:
         return visible(self.information, self.length)
 
 
-def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
-    """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as
-    it is.
+def with_transient_contact(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
+    """Return the naming with a transient contact added if the steady causes leave too large a residual and the contact
+    leaves a smaller one; otherwise unchanged.
 
-    It is tried instead of what was named, if it is more probable than all of that, and beside it; what leaves less is
-    kept.
+    The contact is tried in place of the named causes, if it is more probable than all of them, and in addition to them;
+    the naming with the smallest residual is kept.
     """
-    if alarming(adequacy(naming.found)) <= LIMIT:
+    if largest_z(adequacy(naming.found)) <= LIMIT:
         return naming
-    best, steady = naming, more_probable(naming.found, naming.bare)
+    best, steady = naming, log_bayes_factor_between(naming.found, naming.bare)
     for base, accepted, than in ((naming.bare, (), steady), (naming.found, naming.accepted, 0.0)):
         tried = _with(naming, base, accepted, chosen, than=than)
-        if tried is not None and alarming(adequacy(tried.found)) < alarming(adequacy(best.found)):
+        if tried is not None and largest_z(adequacy(tried.found)) < largest_z(adequacy(best.found)):
             best = tried
         if not naming.found.named:
             break
@@ -82,14 +82,14 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
 def _with(
     naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect], *, than: float
 ) -> Naming | None:
-    """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the
-    threshold, and above the log Bayes factor ``than`` of what it stands for.
+    """Return the naming of ``base`` with the most probable transient contact; None if its evidence is below the
+    threshold or below the log Bayes factor ``than`` of the causes it replaces.
     """
-    kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
+    kinds = [one for effect in effects(chosen).values() for one in effect.at_all_targets(base.problem.cases[0])]
     best, suspects = _screened(base, kinds)
     if best is None:
         return None
-    if suspects[0].score < max(base.tolerances.threshold, than, needed(base, best.visible)):
+    if suspects[0].score < max(base.tolerances.threshold, than, required_evidence(base, best.visible)):
         return None
     if not one_sided(best.found.mean.reshape(-1, len(best.effect.parameters))):
         return None
@@ -97,17 +97,19 @@ def _with(
     wide = white.scaled(SIZES[-1])  # widest: the most probable one would shrink short peaks
     course = SIZES[-1] * _believed(base, wide, np.zeros(wide.width))
     touch = _named(base, effect, course, best)
-    if not (stands(base, touch) and matters(touch.effect, touch.theta)):
+    if not (is_significant(base, touch) and matters(touch.effect, touch.theta)):
         return None
-    belief = believe(np.concatenate([base.belief.X, wide.whole(base.belief.y.size)], axis=1), base.belief.y)
+    posterior = linear_posterior(
+        np.concatenate([base.posterior.X, wide.whole(base.posterior.y.size)], axis=1), base.posterior.y
+    )
     named = (*base.named, touch)
-    model = replace(base, belief=belief, named=named)
+    model = replace(base, posterior=posterior, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
 
 def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_Passing | None, tuple[ScoredCandidate, ...]]:
-    """Return the most probable of all causes that come and go, None without one, and the evidence of all, most probable
-    first; the columns of the best one only are kept.
+    """Return the most probable transient contact (None if there is none), and the evidence of all of them, most
+    probable first; columns are kept only for the best.
     """
     best, found = None, []
     for effect in kinds:
@@ -137,7 +139,7 @@ def _passing(base: Model, effect: Effect) -> _Passing | None:
     if columns is None:
         return None
     white = base.white_by_trial(columns)
-    s, G = white.against(base.belief.left), white.information(base.belief)
+    s, G = white.against(base.posterior.residual), white.information(base.posterior)
     value, size = max((_log_bayes_factor(s, G, size), size) for size in SIZES)
     return _Passing(effect, white, s, G, size, value, sum(base.length(p.values, p.rows) for p in white.parts))
 
@@ -162,7 +164,7 @@ def _placed(base: Model, one: _Passing) -> tuple[Effect, ByTrial]:
             break
         here = np.append(np.zeros(wide.width), place / _BESIDE)
         place = _BESIDE * _believed(base, wide.beside(_BESIDE * slopes), here)[-3:]
-        there = effect.finer().beside(place)
+        there = effect.at_full_rate().beside(place)
         columns = None if there is None else local_basis(base.problem, there)
         if there is not None and columns is not None:
             effect, white = there, base.white_by_trial(columns)
@@ -171,9 +173,9 @@ def _placed(base: Model, one: _Passing) -> tuple[Effect, ByTrial]:
 
 def _believed(base: Model, Z: ByTrial, there: Array) -> Array:
     """Return the coefficients (k,) of further columns ``Z`` of unit standard deviation, whose part ``there`` (k,) the
-    target lacks: as `believe` with all columns would, from the score alone.
+    target lacks: as `linear_posterior` with all columns would, from the score alone.
     """
-    s, G = Z.against(base.belief.left), Z.information(base.belief)
+    s, G = Z.against(base.posterior.residual), Z.information(base.posterior)
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
