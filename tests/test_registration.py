@@ -16,6 +16,7 @@ from biodance.cli import run
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.opensim.mot import write_mot
+from biodance.lab.session.write import write_registered
 from biodance.records import Markers, Plate, Subject, Wrench
 
 YAW, SHIFT, LATE = 2.0, (1.3, -2.1), 0.7345
@@ -103,6 +104,12 @@ def test_the_session_written_reads_like_one_that_was_recorded_together(registere
     apart = ours.cop()[:last:50, :2] - theirs.cop()[then : then + last : 50, :2]
     assert np.abs(apart).max() < 0.012
     assert np.abs(ours.force[:last:50] - theirs.force[then : then + last : 50]).max() < 15.0
+
+
+def test_age_and_gender_are_written_as_they_are_and_lengths_in_mm(visit, dance, place):
+    measured = replace(dance, measurements={"Bodymass": 31.0, "Height": 1.4, "age": 9.5, "gender": 1.0})
+    path = write_registered(place / "child", biodance.read_session(visit), measured, dance.plates, said={})
+    assert biodance.read_trial(path).measurements == pytest.approx(dict(measured.measurements))
 
 
 def test_nothing_of_an_earlier_session_is_overwritten(registered, visit, place):

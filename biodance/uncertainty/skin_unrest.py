@@ -49,7 +49,7 @@ def skin_unrest(body: Body, moved: Iterable[tuple[Trial, Motion, NDArray[np.bool
     if not found:
         return np.zeros((len(BANDS), 3))
     every = _Runs(*(np.concatenate([getattr(one, part) for one in found]) for part in _Runs.__dataclass_fields__))
-    left = [_left(every, k) for k in np.flatnonzero(np.asarray(body.markers.weight) > 0)]
+    left = [_left(every, k) for k, weight in enumerate(body.markers.weight) if weight > 0]
     seen = [one for one in left if one is not None]
     return np.median(seen, axis=0) if seen else np.zeros((len(BANDS), 3))
 
@@ -85,7 +85,8 @@ def _runs(body: Body, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> I
     for pick in bands.runs(use[::step], rate):
         frequency = np.arange(pick.size) * bands.rate / (2 * pick.size)
         kept = bands.of(pick.size) >= 0
-        yield _Runs(*(bands.coefficients(one[pick])[kept] for one in (angles, local, specific)), frequency[kept])
+        cut = [bands.coefficients(one[pick])[kept] for one in (angles, local, specific)]
+        yield _Runs(cut[0], cut[1], cut[2], frequency[kept])
 
 
 def _left(every: _Runs, marker: int) -> Array | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d.read import read_c3d
-from biodance.lab.c3d.subject import PLAIN
+from biodance.lab.c3d.subject import as_written
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.plates.corners import plate_axes
 from biodance.records import Plate, Role, Trial
@@ -55,7 +55,7 @@ def write_trial(trial: Trial, path: Path) -> None:
     """
     plates = [plate_recording(plate) for plate in trial.plates]
     rate = trial.plates[0].wrench.rate if trial.plates else 0.0
-    said = {"PROCESSING": _measurements(trial)} if trial.measurements else None
+    said = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
     first = trial.source.first_frame
     write_c3d(path, markers=trial.markers, plates=plates, analog_rate=rate, first_frame=first, parameters=said)
 
@@ -86,8 +86,3 @@ def plate_recording(plate: Plate) -> PlateRecording:
     """Return what a plate of TYPE 2 records: the wrench in its own axes, about the centre of its surface."""
     axes, wrench = plate_axes(plate.corners), wrench_about_point(plate.wrench.value, plate.centre)
     return PlateRecording(2, plate.corners, np.zeros(3), np.hstack([wrench[:, :3] @ axes, wrench[:, 3:] @ axes]))
-
-
-def _measurements(trial: Trial) -> dict[str, float]:
-    """Return the subject's measures as PROCESSING has them: lengths in mm, mass in kg."""
-    return {name: value if name in PLAIN else 1000 * value for name, value in trial.measurements.items()}

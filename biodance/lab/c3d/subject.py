@@ -247,6 +247,11 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     return measures, history, tuple(warnings)
 
 
+def as_written(measures: Mapping[str, float]) -> dict[str, float]:
+    """Return measures (lengths m, as `measurements_of`) as PROCESSING holds them: lengths in mm, the rest unchanged."""
+    return {name: value if name in PLAIN else 1000 * value for name, value in measures.items()}
+
+
 def _written(raw: RawC3d) -> dict[str, float]:
     """Return all single numbers of the groups by upper-case name, as written."""
     found: dict[str, float] = {}

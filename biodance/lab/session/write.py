@@ -14,6 +14,7 @@ import numpy as np
 
 from biodance.errors import SessionRefused
 from biodance.lab.c3d.ezc3d_object import plate_recording
+from biodance.lab.c3d.subject import as_written
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED
@@ -211,13 +212,12 @@ def write_registered(
     _emptied(made_folder(folder))
     path = folder / f"{trial.source.path.stem}.c3d"
     first = trial.source.first_frame + int(np.searchsorted(trial.markers.time, markers.time[0]))
-    measures = {name: value if "mass" in name.lower() else 1000.0 * value for name, value in trial.measurements.items()}
     write_c3d(
         path,
         markers=markers,
         plates=recordings,
         analog_rate=rate,
-        parameters={"PROCESSING": dict(measures)} if measures else None,
+        parameters={"PROCESSING": as_written(trial.measurements)} if trial.measurements else None,
         first_frame=first,
     )
     own = trial.source.path.parent
