@@ -7,7 +7,7 @@ from diagnosed_sessions import body, known, looks
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import screen
-from biodance.diagnosis.transient_contact import _passing
+from biodance.diagnosis.transient_contact import _best_size
 from biodance.effects.external_contact import ExternalContact
 from biodance.uncertainty.session_noise import of_zeros, with_own_noise, with_zeros
 
@@ -39,4 +39,4 @@ def test_the_length_of_columns_is_that_beside_plates_without_zeros() -> None:
     assert model.length(model.white(rows)) == pytest.approx(np.sum(alone.white(rows) ** 2))
     assert model.length(model.white(rows)) > 1.005 * np.sum(model.white(rows) ** 2)
     touch = ExternalContact("left_foot")
-    assert _passing(model, touch).length == pytest.approx(_passing(alone, touch).length)
+    assert _best_size(model, touch).length == pytest.approx(_best_size(alone, touch).length)

@@ -35,9 +35,9 @@ _STEPS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class _Passing:
-    """One cause that comes and goes: whitened unit columns ``white``, their ``score`` (k,) and ``information`` (k, k),
-    and its ``log_bayes_factor`` at the best ``size``; ``length`` of the columns (`Model.length`).
+class _TransientContact:
+    """One transient contact: whitened unit columns ``white``, their ``score`` (k,) and ``information`` (k, k), its
+    ``log_bayes_factor`` at the best ``size``, and the ``length`` of the columns (`Model.length`).
     """
 
     effect: Effect
@@ -56,7 +56,7 @@ class _Passing:
 
     @property
     def visible(self) -> float:
-        """Share of it that is left when all that is no fault may adapt."""
+        """Share of it that remains when all tolerances adapt."""
         return visible(self.information, self.length)
 
 
@@ -95,7 +95,7 @@ def _with(
         return None
     effect, white = _placed(base, best)
     wide = white.scaled(SIZES[-1])  # widest: the most probable one would shrink short peaks
-    course = SIZES[-1] * _believed(base, wide, np.zeros(wide.width))
+    course = SIZES[-1] * _posterior_mean(base, wide, np.zeros(wide.width))
     touch = _named(base, effect, course, best)
     if not (is_significant(base, touch) and matters(touch.effect, touch.theta)):
         return None
@@ -107,13 +107,13 @@ def _with(
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
 
-def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_Passing | None, tuple[ScoredCandidate, ...]]:
+def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_TransientContact | None, tuple[ScoredCandidate, ...]]:
     """Return the most probable transient contact (None if there is none), and the evidence of all of them, most
     probable first; columns are kept only for the best.
     """
     best, found = None, []
     for effect in kinds:
-        one = _passing(base, effect)
+        one = _best_size(base, effect)
         if one is not None:
             value = one.log_bayes_factor
             found.append(ScoredCandidate(effect, value, value, np.zeros(0), one.visible))
@@ -133,15 +133,15 @@ def one_sided(course: Array) -> bool:
     return bool(min(sides) <= OTHER_SIDE * sum(sides))
 
 
-def _passing(base: Model, effect: Effect) -> _Passing | None:
-    """Return a cause with its most probable size; None for one that does not come and go."""
+def _best_size(base: Model, effect: Effect) -> _TransientContact | None:
+    """Return a transient contact with its most probable size; None for effects that are not transient."""
     columns = local_basis(base.problem, effect)
     if columns is None:
         return None
     white = base.white_by_trial(columns)
     s, G = white.against(base.posterior.residual), white.information(base.posterior)
     value, size = max((_log_bayes_factor(s, G, size), size) for size in SIZES)
-    return _Passing(effect, white, s, G, size, value, sum(base.length(p.values, p.rows) for p in white.parts))
+    return _TransientContact(effect, white, s, G, size, value, sum(base.length(p.values, p.rows) for p in white.parts))
 
 
 def _log_bayes_factor(s: Array, G: Array, size: float) -> float:
@@ -151,19 +151,19 @@ def _log_bayes_factor(s: Array, G: Array, size: float) -> float:
     return float(0.5 * along @ along - np.sum(np.log(np.diag(factor))))
 
 
-def _placed(base: Model, one: _Passing) -> tuple[Effect, ByTrial]:
-    """Return the cause at the place of its segment where it explains most, with its whitened unit columns: a hand's
-    length off, the moment of a touch is several newton metres off. Gauss-Newton steps of the place and the course of
-    the force together.
+def _placed(base: Model, one: _TransientContact) -> tuple[Effect, ByTrial]:
+    """Return the contact at the point of its segment that explains most, with its whitened unit columns, by
+    Gauss-Newton steps of the point and the time course together. An error of a hand's length changes the moment by
+    several newton metres.
     """
     effect, white, place = one.effect, one.white, np.zeros(3)
     for _ in range(_STEPS):
         wide = white.scaled(SIZES[-1])
-        slopes = _slopes(base, effect, place, SIZES[-1] * _believed(base, wide, np.zeros(wide.width)))
+        slopes = _slopes(base, effect, place, SIZES[-1] * _posterior_mean(base, wide, np.zeros(wide.width)))
         if slopes is None:
             break
         here = np.append(np.zeros(wide.width), place / _BESIDE)
-        place = _BESIDE * _believed(base, wide.beside(_BESIDE * slopes), here)[-3:]
+        place = _BESIDE * _posterior_mean(base, wide.beside(_BESIDE * slopes), here)[-3:]
         there = effect.at_full_rate().beside(place)
         columns = None if there is None else local_basis(base.problem, there)
         if there is not None and columns is not None:
@@ -171,17 +171,17 @@ def _placed(base: Model, one: _Passing) -> tuple[Effect, ByTrial]:
     return effect, white
 
 
-def _believed(base: Model, Z: ByTrial, there: Array) -> Array:
-    """Return the coefficients (k,) of further columns ``Z`` of unit standard deviation, whose part ``there`` (k,) the
-    target lacks: as `linear_posterior` with all columns would, from the score alone.
+def _posterior_mean(base: Model, Z: ByTrial, there: Array) -> Array:
+    """Return the posterior mean (k,) of the coefficients of further columns ``Z`` with unit normal priors, linearised
+    about ``there`` (k,): equal to `linear_posterior` with all columns, computed from the score alone.
     """
     s, G = Z.against(base.posterior.residual), Z.information(base.posterior)
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
 def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
-    """Return the whitened columns (r, 3) of what a metre of each axis of the ``place`` changes in a touch of
-    ``course`` (k,): the wrench of a force is linear in its place; None for a cause that acts at no point.
+    """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) with respect to its ``place``, per metre
+    and axis (the wrench is linear in it); None for a cause without a point of action.
     """
     spots = [effect.beside(place + step) for step in np.eye(4, 3, -1)]
     here, *there = (_touch(base, spot, course) for spot in spots if spot is not None)
@@ -189,7 +189,7 @@ def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array |
 
 
 def _touch(base: Model, effect: Effect, course: Array) -> Array:
-    """Return (r,): the rows of a touch of ``course`` (k,), each trial its own part of it."""
+    """Return (r,): the rows of a contact with time course ``course`` (k,), split by trial."""
     samples, put = [], base.problem
     for case in put.cases:
         columns = effect.local(case)
@@ -199,7 +199,7 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 
-def _named(base: Model, effect: Effect, course: Array, sized: _Passing) -> NamedCause:
+def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact) -> NamedCause:
     """Return the cause with its ``course`` (k,) cut by trials; as its size, the force while it acts: half of the
     squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
     """
