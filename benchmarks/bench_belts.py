@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bench_walks import Fault, Score, copied, faults_for, judged, named
 
-from biodance.diagnosis.heard import hear
+from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
@@ -31,7 +31,7 @@ def scored(protocol: str, seed: int, place: Path, *, whole: bool) -> Iterator[Sc
     """Return the scores of one person: clean first (with the verdict), then each fault."""
     source = simulate_session(PEOPLE[seed % len(PEOPLE)], protocol, place / f"{protocol}{seed}", seed=seed)
     clean, files = read_session(source), sorted(source.glob("*.c3d"))
-    nothing = judged(source.name, Fault("nothing", "", ()), named(clean, hear(clean)))
+    nothing = judged(source.name, Fault("nothing", "", ()), named(clean, collect_evidence(clean)))
     if whole:
         found = diagnose_session(examine(clean)).diagnosis
         told = "; ".join(f"{one.effect} {one.target}".strip() for one in found.findings)
@@ -41,7 +41,7 @@ def scored(protocol: str, seed: int, place: Path, *, whole: bool) -> Iterator[Sc
         folder = copied(files, place / f"{source.name} {number}", fault.text)
         shutil.copy(source / "session.toml", folder)
         session = read_session(folder)
-        yield judged(source.name, fault, named(session, hear(session)))
+        yield judged(source.name, fault, named(session, collect_evidence(session)))
 
 
 def main() -> None:

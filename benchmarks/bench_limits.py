@@ -72,8 +72,8 @@ def size(effect: Effect, row: Unobservable, times: float) -> Array:
     """Return the parameters of an effect at so many times its limit, the first parameter as it is told."""
     wanted, theta = times * row.limit, np.zeros(effect.typical.size)
     tried = np.geomspace(1e-3, 1e4, 20_000) * effect.typical[0]
-    told = np.array([effect.size_told(one) for one in tried])
-    theta[0] = tried[int(np.argmin(np.abs(told - min(wanted, 0.8 * effect.size_told(float("inf"))))))]
+    told = np.array([effect.reported_size(one) for one in tried])
+    theta[0] = tried[int(np.argmin(np.abs(told - min(wanted, 0.8 * effect.reported_size(float("inf"))))))]
     return theta
 
 

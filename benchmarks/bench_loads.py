@@ -26,8 +26,8 @@ from virtual_visits import subjects, visit
 from biodance.body.body import Body
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import identify_body
-from biodance.identification.rival_bodies import weighing
 from biodance.identification.statistics import Fit
+from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial_result import trial_fit
@@ -83,7 +83,7 @@ def loaded(lab: str, person: int, segments: tuple[str, ...], kilograms: tuple[fl
     for kg, segment in product(kilograms, segments):
         body, fits = make(person, 2, (segment, kg))
         for way, declared in (("with", mass + kg), ("without", mass)):
-            one = identify_body(replace(body, sip=weighing(body.sip, declared)), fits)
+            one = identify_body(replace(body, sip=scaled_to_mass(body.sip, declared)), fits)
             yield _row(lab, person, segment, kg, way, "reference", added_mass(one, reference=reference))
             yield _row(lab, person, segment, kg, way, "alone", added_mass(one))
 

@@ -26,8 +26,8 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.diagnosis.heard import Testimony, hear
-from biodance.diagnosis.testimony import weigh
+from biodance.diagnosis.witness_evidence import WitnessEvidence, collect_evidence
+from biodance.diagnosis.witness_inference import infer_causes
 from biodance.effects import gates
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
@@ -129,11 +129,11 @@ Norms = Mapping[str, tuple[float, float]]
 """Kind of observation -> mean and scatter of others, in standard deviations of the shipped norm."""
 
 
-def norms_of_others(clean: Mapping[str, Testimony]) -> dict[str, Norms]:
+def norms_of_others(clean: Mapping[str, WitnessEvidence]) -> dict[str, Norms]:
     """Return by session what all other sessions (persons) show of each kind of observation."""
     each: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for name, heard in clean.items():
-        for one in heard.observations:
+    for name, evidence in clean.items():
+        for one in evidence.observations:
             if one.counts and one.witness not in (*PHYSICS, *WRONG_CLOCK.get(name, ())):
                 each[one.kind][name].append(one.z)
     found: dict[str, Norms] = {}
@@ -156,9 +156,9 @@ def _predicting(persons: int) -> float:
     return float(((persons + 1) / (persons - 1)) ** 0.5 * student.ppf(0.975, persons - 1) / norm.ppf(0.975))
 
 
-def without_person(heard: Testimony, norms: Norms) -> Testimony:
+def without_person(evidence: WitnessEvidence, norms: Norms) -> WitnessEvidence:
     """Return what was heard with the norms of others."""
-    return replace(heard, observations=tuple(_by_others(one, norms) for one in heard.observations))
+    return replace(evidence, observations=tuple(_by_others(one, norms) for one in evidence.observations))
 
 
 def _by_others(one: Observation, norms: Norms) -> Observation:
@@ -169,18 +169,18 @@ def _by_others(one: Observation, norms: Norms) -> Observation:
     return replace(one, expected=one.expected + mean * one.expected_sd, sd=scatter * one.sd, norms=sizes)
 
 
-def _shifted(heard: Testimony, norms: Norms) -> Testimony:
+def _shifted(evidence: WitnessEvidence, norms: Norms) -> WitnessEvidence:
     """Return what was heard with the norms of others, signs turned back included: these are less expectation."""
-    new = without_person(heard, norms)
-    less = np.array([b.expected - a.expected for a, b in zip(heard.observations, new.observations, strict=True)])
-    return replace(new, turned={name: value - less for name, value in heard.turned.items()})
+    new = without_person(evidence, norms)
+    less = np.array([b.expected - a.expected for a, b in zip(evidence.observations, new.observations, strict=True)])
+    return replace(new, turned={name: value - less for name, value in evidence.turned.items()})
 
 
-def named(session: Session, heard: Testimony) -> tuple[Finding, ...]:
+def named(session: Session, evidence: WitnessEvidence) -> tuple[Finding, ...]:
     """Return what checks and witnesses name in a session."""
     checks = [gate for gate in gates(session) if not gate.ok and gate.effect in ("clipping", "axis_error")]
     failed = tuple(Finding(gate.effect, gate.target, (), (), 1.0) for gate in checks)
-    said = weigh(heard).findings
+    said = infer_causes(evidence).findings
     return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
 
 
@@ -223,9 +223,9 @@ def scored(data: Path, name: str, place: Path, *, norms: Norms | None) -> Iterat
                 judged_one = judged(name, fault, found.findings)
                 yield replace(judged_one, verdict=f"{found.verdict}: "), None
                 continue
-            heard = hear(session)
-            others = judged(name, fault, named(session, _shifted(heard, norms)))
-            yield judged(name, fault, named(session, heard)), others
+            evidence = collect_evidence(session)
+            others = judged(name, fault, named(session, _shifted(evidence, norms)))
+            yield judged(name, fault, named(session, evidence)), others
         except BiodanceError as error:
             yield Score(name, fault, False, False, None, f"refused: {error}"), None
 
@@ -264,7 +264,7 @@ def main() -> None:
         norms: Mapping[str, Norms] = {}
         if not chosen.whole:
             folders = {name: copied(files_of(Path(data), name), Path(place) / "norm" / name, "") for name in SESSIONS}
-            norms = norms_of_others({name: hear(read_session(folder)) for name, folder in folders.items()})
+            norms = norms_of_others({name: collect_evidence(read_session(folder)) for name, folder in folders.items()})
         for name in chosen.only:
             for pair in scored(Path(data), name, Path(place), norms=norms.get(name)):
                 scores.append(pair)

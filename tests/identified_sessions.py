@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from biodance.body.human.human import human
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.loads import compact_load
-from biodance.identification.rival_bodies import weighing
+from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.motion.regressor import compare, predict_wrench
 from biodance.pipeline.identification import identify_trials
 from biodance.pipeline.results import SessionResult
@@ -84,4 +84,4 @@ def declared(result: SessionResult, mass: float) -> Identification:
     """Return the identification of the fitted trials of a session whose analyst declared ``mass`` kg."""
     assert result.body is not None
     fits = tuple(fit for one in result.trials if one.trial.role == "fit" and (fit := trial_fit(one)) is not None)
-    return identify_body(replace(result.body, sip=weighing(result.body.sip, mass)), fits)
+    return identify_body(replace(result.body, sip=scaled_to_mass(result.body.sip, mass)), fits)

@@ -199,7 +199,7 @@ _STANDING = f"simulate --protocol standing {_WHO} --out x"
         ("inspect no-such-file.c3d --json", "no-such-file.c3d"),
         ("report no-such-folder --out x", "no-such-folder"),
         ("settings no-such-folder", "no such folder"),
-        ("report .", "--out is missing: Folder for the results"),
+        ("report .", "--out is missing: Output folder"),
         ("report", "SESSION is missing. See biodance report --help."),
         ("live static", "static: is a folder"),
         ("report skipped --out x", "every recording (static.c3d) has the role skip"),

@@ -7,8 +7,8 @@ import pytest
 from diagnosed_sessions import RATE, body, known, looks
 
 from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
-from biodance.diagnosis.evidence import Belief
-from biodance.diagnosis.naming import built
+from biodance.diagnosis.evidence import LinearPosterior
+from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.effects import Gate
 
@@ -20,7 +20,7 @@ def test_chance_spreads_more_in_a_short_session() -> None:
         look = looks(seed, trials=1)[0]
         use = np.zeros(look.use.size, dtype=bool)
         use[int(2 * RATE) : int(5 * RATE)] = True
-        found, _ = built(problem(body(), (replace(look, use=use),)), known(), ("plate_offset",))
+        found, _ = build_model(problem(body(), (replace(look, use=use),)), known(), ("plate_offset",))
         worst.append(adequacy(found)[0].z)
     assert max(worst) < LIMIT
     assert max(worst) > 1.0, "the rows still spread"
@@ -30,16 +30,16 @@ def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
     """Bodies drawn from the prior strain it as a standard normal number does; one with twice the deviations does not
     pass.
     """
-    found, _ = built(problem(body(), looks(3)), known(), ("plate_offset",))
-    belief, k = found.belief, found.problem.factor.shape[1]
+    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    posterior, k = found.posterior, found.problem.factor.shape[1]
     rng = np.random.default_rng(7)
-    largest = np.take_along_axis(belief.X, np.abs(belief.X).argmax(axis=0)[None], axis=0)[0]
+    largest = np.take_along_axis(posterior.X, np.abs(posterior.X).argmax(axis=0)[None], axis=0)[0]
 
     def strained(size: float) -> float:
-        u = rng.normal(size=belief.X.shape[1]) * np.sign(largest)  # columns have the kernel's sign, bodies have not
+        u = rng.normal(size=posterior.X.shape[1]) * np.sign(largest)  # columns have the kernel's sign, bodies have not
         u[:k] *= size
-        y = belief.X @ u + rng.normal(size=len(belief.y))
-        return strain(replace(found, belief=Belief.known(belief.X, belief.factor, y)))
+        y = posterior.X @ u + rng.normal(size=len(posterior.y))
+        return strain(replace(found, posterior=LinearPosterior.for_target(posterior.X, posterior.factor, y)))
 
     usual = np.array([strained(1.0) for _ in range(200)])
     assert abs(usual.mean()) < 0.25

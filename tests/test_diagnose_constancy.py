@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from diagnosed_sessions import about_plate, body, known, looks
 
-from biodance.diagnosis import heard
-from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_as_loud
+from biodance.diagnosis import witness_evidence
+from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_at_own_noise
+from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.consequence import matters
-from biodance.diagnosis.constancy import departures, felt
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.engine import HANGS, diagnose_trials
 from biodance.diagnosis.engine import _counts as told
-from biodance.diagnosis.evidence import Belief
-from biodance.diagnosis.joined import with_witnesses
+from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import built
+from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
-from biodance.diagnosis.testimony import Verdicts
+from biodance.diagnosis.size_dependence import changes_wrench, size_dependences
+from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effects
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
@@ -44,13 +44,13 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
     )
     assert [(f.effect, f.target) for f in right.diagnosis.findings] == [guilty]
     assert not right.diagnosis.findings[0].hangs_on
-    assert max(abs(one.z) for one in departures(right.naming.found)) < LIMIT
+    assert max(abs(one.z) for one in size_dependences(right.naming.found)) < LIMIT
     assert (wrong.diagnosis.verdict, wrong.diagnosis.findings) == ("unexplained", ())
     like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
     assert like.hangs_on
     assert any(HANGS in note for note in wrong.diagnosis.notes)
     if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
-        by_load = next(one for one in departures(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
+        by_load = next(one for one in size_dependences(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
         assert by_load.share == pytest.approx(1.0, abs=0.35)
 
 
@@ -79,9 +79,9 @@ def test_what_is_told_must_move_something_that_matters() -> None:
     found = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).naming.found
     (named,) = found.named
     leak = NamedCause(effects()["plate_crosstalk"].at("Fy->Fz", found.problem.cases[0]), np.array([0.01]), np.eye(1))
-    assert felt(found, named)
+    assert changes_wrench(found, named)
     assert told(found, named)
-    assert not felt(found, replace(named, theta=np.array([0.2])))
+    assert not changes_wrench(found, replace(named, theta=np.array([0.2])))
     assert matters(leak.effect, leak.theta)
     assert not told(found, leak)
     assert told(found, replace(leak, course={"some trial": np.ones(3)}))
@@ -92,7 +92,7 @@ def a_finding(value: float, hangs_on: str = "") -> Finding:
     return Finding(*ZERO, (size,), (Alias(*ZERO, 30.0),), 0.5, hangs_on=hangs_on)
 
 
-HEARD = heard.Testimony((), {}, {}, {})
+HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
 DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), doubt="its body moves otherwise")
 
 
@@ -106,7 +106,7 @@ DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), 
     ],
 )
 def test_a_witness_names_nothing_of_which_the_simulation_saw_no_trace(simulation: Diagnosis, named: bool) -> None:
-    one = with_witnesses(simulation, Verdicts((a_finding(9.2),), HEARD), HEARD, judged=True)
+    one = combine_findings(simulation, WitnessFindings((a_finding(9.2),), HEARD), HEARD, judged=True)
     assert bool(one.findings) is named
 
 
@@ -117,10 +117,10 @@ def weighed(value: float, sd: float, hangs_on: str = "") -> Finding:
     return Finding(*MASS, (Estimate("error", value, sd, "kg"),), (Alias(*MASS, 12.0),), 0.5, hangs_on=hangs_on)
 
 
-def observed(witness: str) -> heard.Testimony:
+def observed(witness: str) -> witness_evidence.WitnessEvidence:
     one = Observation(witness, "mass", "stand", 66.0, 0.5, 70.0, "kg")
     step = Alteration(*MASS, "error", "kg", 0.5, lambda seen, size: seen)
-    return heard.Testimony((one,), {MASS: step}, {MASS: np.array([1.0])})
+    return witness_evidence.WitnessEvidence((one,), {MASS: step}, {MASS: np.array([1.0])})
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_what_the_plates_weigh_stays_named_though_fast_bands_depart(
     limits = (Unobservable(*MASS, 0.5, "kg"),)
     simulation = Diagnosis("unexplained", (), limits=limits, resembles=(weighed(value, 0.4, hangs_on),))
     said = observed(witness)
-    one = with_witnesses(simulation, Verdicts((weighed(-3.9, 0.8),), said), said, judged=True)
+    one = combine_findings(simulation, WitnessFindings((weighed(-3.9, 0.8),), said), said, judged=True)
     assert [(f.effect, f.parameters[0].value) for f in one.findings] == ([("body_mass", -3.9)] if named else [])
     assert len(one.resembles) == (0 if named else 1)
 
@@ -149,17 +149,17 @@ def test_a_loud_person_makes_no_body_strange_and_a_strange_body_stays_strange() 
     """Everything 2.4 times as loud as known pulls the body about; its deviations are then no news. A body three times
     as unlike the table as people are stays strange beside the usual noise.
     """
-    found, _ = built(problem(body(), looks(3, trials=2)), known(), ("plate_offset",))
-    belief, k, rng = found.belief, found.problem.factor.shape[1], np.random.default_rng(7)
+    found, _ = build_model(problem(body(), looks(3, trials=2)), known(), ("plate_offset",))
+    posterior, k, rng = found.posterior, found.problem.factor.shape[1], np.random.default_rng(7)
 
     def of(size: float, loud: float):
-        u = rng.normal(size=belief.X.shape[1])
+        u = rng.normal(size=posterior.X.shape[1])
         u[:k] *= size
-        y = belief.X @ u + loud * rng.normal(size=len(belief.y))
-        return replace(found, belief=Belief.known(belief.X, belief.factor, y))
+        y = posterior.X @ u + loud * rng.normal(size=len(posterior.y))
+        return replace(found, posterior=LinearPosterior.for_target(posterior.X, posterior.factor, y))
 
     loud, strange = of(2.0, 2.4), of(3.0, 1.0)  # clear ones: the columns' basis is the kernel's own
     assert np.median(energies(loud)) > 2.0
     assert strain(loud) > STRAINED
-    assert strain_as_loud(loud) < strain(loud)
-    assert strain_as_loud(strange) > STRAINED
+    assert strain_at_own_noise(loud) < strain(loud)
+    assert strain_at_own_noise(strange) > STRAINED

@@ -13,10 +13,10 @@ from scipy.signal import butter, filtfilt
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.evidence import evidence
-from biodance.diagnosis.naming import built
-from biodance.diagnosis.passing import with_passing
+from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import screen
+from biodance.diagnosis.transient_contact import with_transient_contact
 from biodance.effects import Case, Effect, Parameter, effect
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.statistics import standing_point
@@ -175,7 +175,7 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
 
     examined = found(touched, chosen=(*FAST, "external_contact"))
     steady = replace(examined.naming, found=examined.naming.bare, accepted=())
-    assert with_passing(steady, ("external_contact",)).found.named
+    assert with_transient_contact(steady, ("external_contact",)).found.named
     assert [(f.effect, f.target) for f in examined.diagnosis.findings] == [("external_contact", "left_forearm_hand")]
     assert examined.diagnosis.verdict in ("named, complete", "named, incomplete")
     size = [p.value for p in examined.diagnosis.findings[0].parameters]
@@ -201,13 +201,13 @@ def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkey
         return filtfilt(*butter(1, 2.5 / (1.5 * RATE)), wrench, axis=0, padlen=100)
 
     monkeypatch.setattr("diagnosed_sessions.motion", quick)
-    put, causes = built(problem(body(), looks(1, hidden=filtered)), known(), ("filter_mismatch", "wobbling_mass"))
+    put, causes = build_model(problem(body(), looks(1, hidden=filtered)), known(), ("filter_mismatch", "wobbling_mass"))
     suspects = {one.effect.name: one for one in reversed(screen(put, causes))}
     one = suspects["filter_mismatch"]
     assert one.score > suspects["wobbling_mass"].score
     assert one.start[0] in effect("filter_mismatch").typical * effect("filter_mismatch").screened_at
     columns = next(c.basis for c in causes if c.names == one.names)
-    near_none = evidence(*put.belief.score(put.white(columns)), 1.0).log_bayes_factor
+    near_none = evidence(*put.posterior.score(put.white(columns)), 1.0).log_bayes_factor
     assert one.log_bayes_factor > 2 * near_none
 
 

@@ -9,7 +9,7 @@ from diagnosed_sessions import about_plate, body, known, looks
 
 from biodance.diagnosis import engine
 from biodance.diagnosis.accept import case_fit
-from biodance.diagnosis.engine import Examined, diagnose_trials, judged
+from biodance.diagnosis.engine import Examined, assess, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.effects import effect
 from biodance.identification.identification import identify_body
@@ -29,7 +29,9 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Examined, gains.Accepted
     every = looks(1, trials=4, hidden=about_plate(faulty))
     by_role = {"fit": every[:2], "validate": every[2:]}
     monkeypatch.setattr(gains, "looks", lambda _, roles: by_role[roles[0]])
-    monkeypatch.setattr(engine, "hanging", lambda _: {})  # which would refuse the bogus drift before its gain is asked
+    monkeypatch.setattr(
+        engine, "significant_dependences", lambda _: {}
+    )  # which would refuse the bogus drift before its gain is asked
     found = diagnose_trials(
         body(), by_role["fit"], tolerances=known(), effects=("plate_gain", "plate_offset", "plate_drift")
     )
@@ -43,7 +45,7 @@ def with_bogus(examined: Examined) -> Examined:
     naming = examined.naming
     drift = NamedCause(effect("plate_drift").at("Fx", naming.found.problem.cases[0]), np.array([20.0]), np.eye(1))
     found = replace(naming.found, named=(drift, *naming.found.named))
-    return judged(
+    return assess(
         replace(examined, naming=replace(naming, found=found, accepted=(naming.accepted[0], *naming.accepted)))
     )
 

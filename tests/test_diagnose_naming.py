@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosed_sessions import about_plate, body, known, looks
 
-from biodance.diagnosis.naming import Round, built, refine, suspicious
+from biodance.diagnosis.naming import Round, build_model, passes_threshold, refine
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import ScoredCandidate, screen
 from biodance.effects import effect
@@ -44,8 +44,8 @@ def test_a_cause_is_named_from_a_log_bayes_factor_of_ten_on_and_its_targets_coun
     evidence: float, targets: int, named: bool
 ) -> None:
     assert known().threshold == 10.0
-    assert suspicious(Round((scored("plate_crosstalk", evidence, targets=targets),)), known()) == named
-    assert not suspicious(Round(()), known())
+    assert passes_threshold(Round((scored("plate_crosstalk", evidence, targets=targets),)), known()) == named
+    assert not passes_threshold(Round(()), known())
 
 
 @pytest.mark.parametrize(("score", "first"), [(9.9, ("plate_gain", "Fx")), (10.1, ("plate_gain", "Fz"))])
@@ -56,7 +56,7 @@ def test_only_what_the_screening_suspects_is_fitted(score: float, first: tuple[s
         local[:, 2] *= 1.05
         return local
 
-    put, causes = built(problem(body(), looks(1, hidden=about_plate(gained))), known(), ("plate_gain",))
+    put, causes = build_model(problem(body(), looks(1, hidden=about_plate(gained))), known(), ("plate_gain",))
     true, other = (next(one for one in screen(put, causes) if one.names[1] == channel) for channel in ("Fz", "Fx"))
     ranking = Round((replace(other, score=11.0, log_bayes_factor=11.0), replace(true, score=score)))
     refined, _ = refine(put, ranking)

@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
-from biodance.diagnosis.evidence import believe, evidence, smallest
+from biodance.diagnosis.evidence import evidence, linear_posterior, smallest_detectable
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
 from biodance.diagnosis.observability import (
@@ -29,8 +29,8 @@ from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances,
 def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:
     rng = np.random.default_rng(0)
     X, Z, y = rng.normal(size=(30, 5)), rng.normal(size=(30, 2)), rng.normal(size=30) * 2
-    belief = believe(X, y)
-    s, G = belief.score(Z)
+    posterior = linear_posterior(X, y)
+    s, G = posterior.score(Z)
     found = evidence(s, G, float(np.sum(Z**2)))
     plain = np.eye(30) + X @ X.T
     ratio = multivariate_normal(np.zeros(30), plain + Z @ Z.T).logpdf(y) - multivariate_normal(
@@ -46,15 +46,15 @@ def test_evidence_is_the_ratio_of_two_gaussian_densities() -> None:
 def test_the_smallest_size_meets_the_threshold_in_the_mean() -> None:
     rng = np.random.default_rng(1)
     X, Z = rng.normal(size=(200, 8)), 0.3 * rng.normal(size=(200, 1))
-    _, G = believe(X, np.zeros(200)).score(Z)
-    size = smallest(G, np.ones(1), 10.0)
+    _, G = linear_posterior(X, np.zeros(200)).score(Z)
+    size = smallest_detectable(G, np.ones(1), 10.0)
     drawn = []
     for _ in range(400):
         y = X @ rng.normal(size=8) + rng.normal(size=200) + size * Z[:, 0]
-        s, _ = believe(X, y).score(Z)
+        s, _ = linear_posterior(X, y).score(Z)
         drawn.append(evidence(s, G, 1.0).log_bayes_factor)
     assert np.mean(drawn) == pytest.approx(10.0, abs=4 * np.std(drawn) / 20)
-    assert smallest(np.zeros((1, 1)), np.ones(1), 10.0) == float("inf")
+    assert smallest_detectable(np.zeros((1, 1)), np.ones(1), 10.0) == float("inf")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def put():
 
 def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
     causes = candidates(put, ("plate_offset",))
-    left = model(put, causes, known()).belief.left[: put.wrench_rows]
+    left = model(put, causes, known()).posterior.residual[: put.wrench_rows]
     assert np.mean(left**2) == pytest.approx(0.9, abs=0.15)
 
 
@@ -188,7 +188,7 @@ def test_the_limit_of_what_saturates_lies_where_it_is_seen(put) -> None:
     for most in (1e6, 4.0, 0.01):
         (cause,) = candidates(put, {"saturating": type("Saturating", (Saturating,), {"most": most})()})
         seen = visibility(model(put, (cause,), known()), (cause,))
-        straight = smallest(seen.G, unit_directions(cause)[0], 10.0)
+        straight = smallest_detectable(seen.G, unit_directions(cause)[0], 10.0)
         true = straight / (1 - straight / most) if straight < most else np.inf
         assert seen.seen(0, 10.0) == pytest.approx(true, rel=0.3)
 
@@ -237,6 +237,6 @@ def test_plates_and_sides_share_their_tolerances() -> None:
 
 def test_a_cause_never_measured_is_as_sure_as_the_others() -> None:
     back = read_tolerances(to_toml(replace(known(), accuracy={"plate_gain": 0.04, "other": 0.1})))
-    assert back.unlike("plate_gain") == 0.04
-    assert back.unlike("tram_shaking") == 0.1
-    assert known().unlike("plate_gain") == 0.0
+    assert back.model_error("plate_gain") == 0.04
+    assert back.model_error("tram_shaking") == 0.1
+    assert known().model_error("plate_gain") == 0.0

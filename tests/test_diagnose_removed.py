@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from diagnosed_sessions import about_plate, body, known, looks
 
-from biodance.diagnosis import heard
+from biodance.diagnosis import witness_evidence
+from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.engine import SEVERAL, UNASKED, diagnose_trials
-from biodance.diagnosis.joined import with_witnesses
-from biodance.diagnosis.testimony import Verdicts
+from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
 
@@ -49,14 +49,14 @@ def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str
 
 
 NAMES = ("plate_position", "plate1:y")
-HEARD = heard.Testimony((), {}, {}, {})
+HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
 LOAD = finding("added_mass", "right_forearm_hand", 2.4, "kg")
 WEIGHT = finding("body_mass", "", 2.5, "kg", ("plate_gain", "Fz"))
 BY_SIMULATION = Diagnosis("named, complete", (LOAD,), limits=(Unobservable("body_mass", "", 1.6, "kg"),))
 
 
 def test_the_weight_of_a_load_that_the_simulation_names_is_no_second_cause() -> None:
-    one = with_witnesses(BY_SIMULATION, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    one = combine_findings(BY_SIMULATION, WitnessFindings((WEIGHT,), HEARD), HEARD, judged=True)
     assert (one.verdict, one.findings, one.resembles) == ("named, complete", (LOAD,), (WEIGHT,))
 
 
@@ -64,7 +64,7 @@ def test_the_weight_of_a_load_that_the_simulation_names_is_no_second_cause() -> 
 def test_a_witness_is_believed_where_the_simulation_is_blind_or_finds_nothing_wrong(limit: float, verdict: str) -> None:
     limits = (Unobservable("body_mass", "", limit, "kg"),)
     simulation = replace(BY_SIMULATION, verdict=verdict, findings=(), limits=limits)
-    one = with_witnesses(simulation, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    one = combine_findings(simulation, WitnessFindings((WEIGHT,), HEARD), HEARD, judged=True)
     assert [f.effect for f in one.findings] == ["body_mass"]
 
 
@@ -76,11 +76,11 @@ def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(witness: str
     """The movement, which sees 8 mm, shows nothing wrong and nothing of 21 mm; feet have their own say."""
     cause = Alteration(*NAMES, "shift", "m", 0.005, lambda seen, size: seen)
     there = Observation(witness, "pressure to the left", "static", 0.021, 0.003, 0.0, "m")
-    said = heard.Testimony((there,), {NAMES: cause}, {NAMES: np.ones(1)})
+    said = witness_evidence.WitnessEvidence((there,), {NAMES: cause}, {NAMES: np.ones(1)})
     limits, candidates = (Unobservable(*NAMES, 0.008, "m"),), (Alias(*NAMES, bayes),)
     simulation = Diagnosis("nothing wrong", (), limits=limits, candidates=candidates)
     place = finding(*NAMES, 0.021, "m")
-    one = with_witnesses(simulation, Verdicts((place,), said), said, judged=True)
+    one = combine_findings(simulation, WitnessFindings((place,), said), said, judged=True)
     assert one.findings == ((place,) if named else ())
     assert one.verdict == ("named, complete" if named else "nothing wrong")
     assert any("plate position of plate1:y" in note for note in one.notes) is not named
@@ -89,13 +89,15 @@ def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(witness: str
 def test_exchanged_labels_explain_nothing_that_plates_weigh() -> None:
     labels = Finding("labels_swapped", "LWRA/LWRB", (), (Alias("labels_swapped", "LWRA/LWRB", 30.0),), 1.0)
     simulation = replace(BY_SIMULATION, verdict="named, incomplete", findings=(labels,))
-    one = with_witnesses(simulation, Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    one = combine_findings(simulation, WitnessFindings((WEIGHT,), HEARD), HEARD, judged=True)
     assert (one.verdict, one.findings) == ("named, incomplete", (WEIGHT, labels))
 
 
 def test_what_the_simulation_tells_from_its_look_alikes_keeps_its_name() -> None:
     gain = finding("plate_gain", "Fz", 0.05, "1")
-    one = with_witnesses(replace(BY_SIMULATION, findings=(gain,)), Verdicts((WEIGHT,), HEARD), HEARD, judged=True)
+    one = combine_findings(
+        replace(BY_SIMULATION, findings=(gain,)), WitnessFindings((WEIGHT,), HEARD), HEARD, judged=True
+    )
     assert one.findings == (gain,)
     assert one.verdict == "named, complete"
 
@@ -106,5 +108,5 @@ def test_what_two_witnesses_say_of_one_finding_names_it_once() -> None:
     again = finding("plate_gain", "plate1:Fz", -0.05, "1", ("plate_gain", "plate2:Fz"))
     heavier = finding("body_mass", "", 2.5, "kg", ("plate_gain", "plate2:Fz"))
     simulation = replace(BY_SIMULATION, findings=(gain,))
-    one = with_witnesses(simulation, Verdicts((heavier, again), HEARD), HEARD, judged=True)
+    one = combine_findings(simulation, WitnessFindings((heavier, again), HEARD), HEARD, judged=True)
     assert one.findings == (gain,)

@@ -13,7 +13,7 @@ from biodance.diagnosis.engine import STRANGE, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Round
 from biodance.diagnosis.screening import ScoredCandidate
-from biodance.diagnosis.strange import as_strange, firm
+from biodance.diagnosis.unusual_body import robust_causes, with_inflated_prior
 from biodance.effects import effects
 
 family = effects()
@@ -57,9 +57,9 @@ def test_a_size_that_is_hardly_known_is_no_name_beside_a_strange_body() -> None:
 
 def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed() -> None:
     wide, usual = (diagnosed(lambda w, s, m: w, unlike=size).naming.bare for size in (4.0, 0.7))
-    assert strain(wide) > STRAINED > abs(strain(as_strange(wide)))
-    np.testing.assert_array_equal(as_strange(usual).belief.X, usual.belief.X)
-    assert as_strange(usual).log_likelihood == pytest.approx(usual.log_likelihood)
+    assert strain(wide) > STRAINED > abs(strain(with_inflated_prior(wide)))
+    np.testing.assert_array_equal(with_inflated_prior(usual).posterior.X, usual.posterior.X)
+    assert with_inflated_prior(usual).log_likelihood == pytest.approx(usual.log_likelihood)
 
 
 @pytest.mark.parametrize(
@@ -76,4 +76,4 @@ def test_a_joint_that_the_model_lacks_is_no_excuse_for_a_strange_body(name: str,
     touch = NamedCause(effect, np.ones(1), np.eye(1), {"t0": np.ones(3)})
     by = Round((ScoredCandidate(effect, score, score, np.zeros(0), 1.0),))
     found = SimpleNamespace(problem=SimpleNamespace(cases=(1, 2)), tolerances=known(), named=(touch,))
-    assert firm(found, (by,)) == ({(name, "Fx")} if stands else set())
+    assert robust_causes(found, (by,)) == ({(name, "Fx")} if stands else set())

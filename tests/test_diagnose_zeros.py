@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from diagnosed_sessions import body, known, looks
 
-from biodance.diagnosis.naming import built
-from biodance.diagnosis.passing import _passing
+from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import screen
+from biodance.diagnosis.transient_contact import _best_size
 from biodance.effects.external_contact import ExternalContact
 from biodance.uncertainty.session_noise import of_zeros, with_own_noise, with_zeros
 
@@ -15,7 +15,7 @@ STEADY = ("plate_offset", "external_contact")
 
 
 def shares(tolerances):
-    model, causes = built(problem(body(), looks(1, trials=2)), tolerances, STEADY)
+    model, causes = build_model(problem(body(), looks(1, trials=2)), tolerances, STEADY)
     return model, {one.names: one.visible for one in screen(model, causes)}
 
 
@@ -34,9 +34,9 @@ def test_the_length_of_columns_is_that_beside_plates_without_zeros() -> None:
     """Of all columns at once, of one trial's, and of a course that comes and goes."""
     spread = of_zeros([12.0, 12.0])
     put = problem(body(), looks(1, trials=2))
-    (alone, _), (model, _) = (built(put, one, STEADY) for one in (known(), with_zeros(known(), spread, 70.0)))
+    (alone, _), (model, _) = (build_model(put, one, STEADY) for one in (known(), with_zeros(known(), spread, 70.0)))
     rows = np.random.default_rng(3).normal(size=(len(put.target), 4))
     assert model.length(model.white(rows)) == pytest.approx(np.sum(alone.white(rows) ** 2))
     assert model.length(model.white(rows)) > 1.005 * np.sum(model.white(rows) ** 2)
     touch = ExternalContact("left_foot")
-    assert _passing(model, touch).length == pytest.approx(_passing(alone, touch).length)
+    assert _best_size(model, touch).length == pytest.approx(_best_size(alone, touch).length)

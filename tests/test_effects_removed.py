@@ -7,7 +7,7 @@ import pytest
 from human_cases import human_case
 from scipy.signal import butter, filtfilt
 
-from biodance.diagnosis.passing import one_sided
+from biodance.diagnosis.transient_contact import one_sided
 from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import REFERENCE, STRENGTH
 from biodance.effects.sloshing_load import _FREQUENCY

@@ -10,12 +10,12 @@ import pytest
 from diagnosed_sessions import RATE, about_plate, body, known, looks, motion
 from example_results import full_session
 
-from biodance.diagnosis.adequacy import adequacy, alarming, verdict
+from biodance.diagnosis.adequacy import adequacy, largest_z, verdict
 from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT, Adequacy, least, matters
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import built, held, needed, settle, stands
+from biodance.diagnosis.naming import build_model, drop_weak_causes, is_significant, required_evidence, settle
 from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Gate, effects
 from biodance.motion.regressor import predict_wrench
@@ -69,7 +69,7 @@ def test_standing_alone_names_nothing_however_large() -> None:
 def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
     """Offset and nothing else is hidden: a delay named beside it has no size of its own and falls, the offset stays."""
     put = problem(body(), looks(2, hidden=offset(12.0)), chosen=FAST)
-    found, causes = built(put, known(), FAST)
+    found, causes = build_model(put, known(), FAST)
     one = {cause.names: cause for cause in causes}
     start = tuple(
         NamedCause(one[name].effect, one[name].effect.typical, np.eye(1))
@@ -83,28 +83,28 @@ def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
 
         return Round((ScoredCandidate(one[name].effect, 50.0, 50.0, np.zeros(1), 0.9),))
 
-    kept, rounds = held(both, (round_of(("time_delay", "")), round_of(("plate_offset", "Fx"))))
+    kept, rounds = drop_weak_causes(both, (round_of(("time_delay", "")), round_of(("plate_offset", "Fx"))))
     assert [cause.effect.name for cause in kept.named] == ["plate_offset"]
     assert len(rounds) == 1
     assert kept.named[0].theta[0] == pytest.approx(12.0, abs=1.0)
 
 
 def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stand() -> None:
-    found, _ = built(problem(body(), looks(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
+    found, _ = build_model(problem(body(), looks(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
     offset_fx = effects()["plate_offset"].at("Fx", found.problem.cases[0])
-    assert not stands(found, NamedCause(offset_fx, np.array([5.9]), np.array([[9.0]])))
-    assert stands(found, NamedCause(offset_fx, np.array([-6.1]), np.array([[9.0]])))
+    assert not is_significant(found, NamedCause(offset_fx, np.array([5.9]), np.array([[9.0]])))
+    assert is_significant(found, NamedCause(offset_fx, np.array([-6.1]), np.array([[9.0]])))
     wobbling = effects()["wobbling_mass"].at("right_shank", found.problem.cases[0])
     own = float(body().sip.mass[body().segment_index("right_shank")])
-    assert stands(found, NamedCause(wobbling, np.array([0.9 * own]), np.array([[1e-4]])))
-    assert not stands(found, NamedCause(wobbling, np.array([1.1 * own]), np.array([[1e-4]])))
-    assert not stands(found, NamedCause(wobbling, np.array([-1.0]), np.array([[1e-4]])))
+    assert is_significant(found, NamedCause(wobbling, np.array([0.9 * own]), np.array([[1e-4]])))
+    assert not is_significant(found, NamedCause(wobbling, np.array([1.1 * own]), np.array([[1e-4]])))
+    assert not is_significant(found, NamedCause(wobbling, np.array([-1.0]), np.array([[1e-4]])))
 
 
 def test_what_hides_needs_overwhelming_evidence() -> None:
-    found, _ = built(problem(body(), looks(1), chosen=("plate_offset",)), known(), ("plate_offset",))
-    assert needed(found, 0.2) == found.tolerances.threshold
-    assert needed(found, 0.19) == 3 * found.tolerances.threshold
+    found, _ = build_model(problem(body(), looks(1), chosen=("plate_offset",)), known(), ("plate_offset",))
+    assert required_evidence(found, 0.2) == found.tolerances.threshold
+    assert required_evidence(found, 0.19) == 3 * found.tolerances.threshold
 
 
 # 2 ---- no expected mean that is no physics
@@ -278,11 +278,11 @@ def test_a_cause_within_any_tolerance_is_told_but_no_finding() -> None:
 def test_an_alarm_must_matter_physically() -> None:
     small, large = (Adequacy("Mx", (0.0, 0.04), 12.0, size=size) for size in (0.9 * LEAST_MOMENT, 1.1 * LEAST_MOMENT))
     force = Adequacy("Fz", (0.0, 0.04), 5.0, size=1.1 * LEAST_FORCE)
-    assert alarming((small,)) == 0.0
-    assert alarming((small, force)) == 5.0
-    assert alarming((small, large)) == 12.0
-    assert verdict(0, alarming((small,)), ()) == "nothing wrong"
-    assert verdict(1, alarming((large,)), (Gate("x", True, ""),)) == "unexplained"
+    assert largest_z((small,)) == 0.0
+    assert largest_z((small, force)) == 5.0
+    assert largest_z((small, large)) == 12.0
+    assert verdict(0, largest_z((small,)), ()) == "nothing wrong"
+    assert verdict(1, largest_z((large,)), (Gate("x", True, ""),)) == "unexplained"
 
 
 def test_the_size_of_what_is_left_is_in_newton() -> None:
@@ -291,7 +291,9 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
     def beaten(wrench, session, moving):
         return wrench + 6.0 * np.sin(2 * np.pi * 1.5 * moving.time)[:, None] * (np.arange(6) == 0)
 
-    found, _ = built(problem(body(), looks(1, hidden=beaten), chosen=("plate_offset",)), known(), ("plate_offset",))
+    found, _ = build_model(
+        problem(body(), looks(1, hidden=beaten), chosen=("plate_offset",)), known(), ("plate_offset",)
+    )
     row = next(one for one in adequacy(found) if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
     assert row.size == pytest.approx(6.0 / np.sqrt(2), rel=0.15)
     assert row.unit == "N"

@@ -11,8 +11,8 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.learning import learn_noise
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.identification.loads import compact_load, load_moments, may_carry
-from biodance.identification.rival_bodies import surprised
 from biodance.identification.statistics import layout_for, standing_point, statistics
+from biodance.identification.unloaded_body import whiten_innovation
 from biodance.records import Sip
 from biodance.spatial import point_mass
 
@@ -61,7 +61,7 @@ def test_surprise_has_unit_variance_when_nothing_was_added() -> None:
     values = []
     for seed in range(6):
         _, after = visits(30 + seed, frames=600)
-        values.append(surprised(after.data, after.belief.prior)[1][:20])
+        values.append(whiten_innovation(after.data, after.belief.prior)[1][:20])
     assert np.sqrt(np.mean(np.square(values))) < 1.3
 
 

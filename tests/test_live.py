@@ -14,7 +14,7 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
 from biodance.diagnosis.watch import LiveWarning, silent_plates
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
-from biodance.identification.streaming import belief_before
+from biodance.identification.recursive import initial_posterior
 from biodance.pipeline.live import LiveSession, LiveState
 from biodance.pipeline.live_watch import StreamWatch
 from biodance.pipeline.stream import body_and_stream, replay
@@ -154,15 +154,15 @@ def test_the_running_belief_is_least_squares_with_the_prior():
     rng = np.random.default_rng(0)
     prior = Sip(("one",), rng.normal(size=10), np.diag(rng.uniform(0.5, 2, 10)))
     rows, seen = rng.normal(size=(40, 6, 10)), rng.normal(size=(40, 6))
-    variance, belief = np.array([1.0, 2.0, 3.0, 0.5, 1.5, 2.5]), belief_before(prior)
+    variance, posterior = np.array([1.0, 2.0, 3.0, 0.5, 1.5, 2.5]), initial_posterior(prior)
     for W, wrench in zip(rows, seen, strict=True):
-        belief = belief.updated(W, wrench, variance)
+        posterior = posterior.updated(W, wrench, variance)
     weight = np.tile(1 / variance, 40)
     flat, at_once = rows.reshape(-1, 10), np.linalg.inv(np.array(prior.covariance))
     information = at_once + flat.T @ (weight[:, None] * flat)
     mean = np.linalg.solve(information, at_once @ prior.phi + flat.T @ (weight * seen.ravel()))
-    np.testing.assert_allclose(belief.mean, mean, atol=1e-10)
-    np.testing.assert_allclose(belief.covariance, np.linalg.inv(information), atol=1e-10)
+    np.testing.assert_allclose(posterior.mean, mean, atol=1e-10)
+    np.testing.assert_allclose(posterior.covariance, np.linalg.inv(information), atol=1e-10)
 
 
 def test_the_command(folder, tmp_path, capsys):

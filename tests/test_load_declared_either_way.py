@@ -6,8 +6,8 @@ import pytest
 from identified_sessions import body, declared, session_result
 
 from biodance.identification.added_mass import added_mass
-from biodance.identification.rival_bodies import weighing
 from biodance.identification.sessions import differences
+from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.pipeline.checks import load_doubts
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.results import SessionResult
@@ -19,7 +19,7 @@ LOAD = 2.4
 
 def heavier(result: SessionResult) -> SessionIdentification:
     """Return a loaded session whose scale weighed the load, against the unloaded one."""
-    moved = replace(body(), sip=weighing(body().sip, 62.0 + LOAD))
+    moved = replace(body(), sip=scaled_to_mass(body().sip, 62.0 + LOAD))
     return identify_trials(moved, result.trials, name="S02", reference=session_result().identification)
 
 

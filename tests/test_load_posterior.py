@@ -7,7 +7,7 @@ from scipy.stats import multivariate_normal
 from biodance.identification.added_mass import LoadCandidate, LoadSearch
 from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
 from biodance.identification.load_words import say_load
-from biodance.identification.rival_bodies import odder, rivals, weighing
+from biodance.identification.unloaded_body import inflate_prior, scaled_to_mass, unloaded_bodies
 from biodance.records import Sip
 
 NAN = np.full(3, np.nan)
@@ -126,7 +126,7 @@ def total_sd(sip: Sip) -> float:
 
 def test_an_odder_body_is_less_known_in_its_parts_and_as_well_in_all() -> None:
     before = table((10.0, 20.0, 30.0), 0.5)
-    odd, wrong = odder(before, 3.0), odder(before, 1.0, 2.0)
+    odd, wrong = inflate_prior(before, 3.0), inflate_prior(before, 1.0, 2.0)
     apart = np.array([1.0, -1.0, 0.0])
     parts = odd.covariance[::10, ::10]
     assert total_sd(odd) == pytest.approx(total_sd(before)) == pytest.approx(0.5 * np.sqrt(3))
@@ -140,7 +140,7 @@ def test_an_odder_body_is_less_known_in_its_parts_and_as_well_in_all() -> None:
 def test_rivals_are_probabilities_and_a_weighed_person_has_no_wrong_scale() -> None:
     tables = ((table((10.0, 20.0), 0.5), float(np.log(0.75))), (table((10.0, 20.0), 0.6), float(np.log(0.25))))
     for weighed in (True, False):
-        some = rivals(tables, weighed=weighed)
+        some = unloaded_bodies(tables, weighed=weighed)
         assert sum(np.exp(one.log_prior) for one in some) == pytest.approx(1.0)
         assert (max(total_sd(one.before) for one in some) > 2.0) is not weighed
         assert any(one.holds for one in some) is not weighed
@@ -164,6 +164,6 @@ def test_a_body_whose_scale_weighed_the_load_is_lighter_by_it() -> None:
 
 def test_a_table_of_another_mass_keeps_its_shape() -> None:
     before = table((10.0, 20.0), 0.5)
-    after = weighing(before, 33.0)
+    after = scaled_to_mass(before, 33.0)
     np.testing.assert_allclose(after.phi, 1.1 * before.phi)
     np.testing.assert_allclose(after.covariance, 1.21 * before.covariance)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from biodance.diagnosis.adequacy import strides_alike
-from biodance.diagnosis.heard import hear
-from biodance.diagnosis.testimony import weigh
+from biodance.diagnosis.witness_evidence import collect_evidence
+from biodance.diagnosis.witness_inference import infer_causes
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
@@ -145,12 +145,12 @@ def test_what_is_expected_of_walking_feet_is_not_asked_of_running_ones(recorded:
 
 
 def test_the_heel_strikes_when_the_force_comes_and_equal_strides_tell_no_fault(recorded: dict) -> None:
-    heard = hear(recorded["treadmill"].session, ("time_delay", "body_mass", "plate_position"))
-    onset = [one.value for one in heard.observations if one.witness == "force_onset"]
+    evidence = collect_evidence(recorded["treadmill"].session, ("time_delay", "body_mass", "plate_position"))
+    onset = [one.value for one in evidence.observations if one.witness == "force_onset"]
     assert len(onset) > 5
     assert np.abs(np.median(onset)) < 0.006
-    assert weigh(heard).findings == ()
-    strides = [one for one in heard.observations if one.stride in one.norms]
+    assert infer_causes(evidence).findings == ()
+    strides = [one for one in evidence.observations if one.stride in one.norms]
     assert len(strides) > 20
     assert all(one.norms[one.stride] == pytest.approx(one.sd) for one in strides)
 

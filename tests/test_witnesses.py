@@ -9,8 +9,8 @@ import pytest
 from walkers import WEIGHT, Stand, plate, walker
 from walking import FOOT, MASS, STANCE, Wrong, standing, walk
 
-from biodance.diagnosis.heard import hear, put_right, sights
-from biodance.diagnosis.testimony import size_by, weigh
+from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence, undo_causes
+from biodance.diagnosis.witness_inference import infer_causes, size_from_witnesses
 from biodance.lab.markers.sets import GUESSED
 from biodance.records import SIDES, Session, Subject, Trial, Wrench
 from biodance.witnesses import (
@@ -126,7 +126,12 @@ def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> N
     one = seen(standing(push=4.0, weight=62.0), "standing_force")["mean Fx"]
     (share,) = [size / (62.0 * 9.81) for size in one.norms.values()]
     assert 0.003 < share < 0.004
-    assert size_by(hear(session(standing(push=4.0), standing(push=4.0))), ("plate_offset", "Fx"))[1] > 1.5
+    assert (
+        size_from_witnesses(collect_evidence(session(standing(push=4.0), standing(push=4.0))), ("plate_offset", "Fx"))[
+            1
+        ]
+        > 1.5
+    )
 
 
 def test_empty_plates_tell_what_was_taken_off() -> None:
@@ -173,9 +178,9 @@ def test_traces_are_what_a_recording_made_wrong_shows(names: tuple[str, str], sm
 
 
 def test_clean_walks_and_standing_name_nothing() -> None:
-    heard = hear(session(standing(), walk(), walk(name="again")))
-    assert weigh(heard).findings == ()
-    rows = {(row.effect, row.target): row for row in sights(heard)}
+    evidence = collect_evidence(session(standing(), walk(), walk(name="again")))
+    assert infer_causes(evidence).findings == ()
+    rows = {(row.effect, row.target): row for row in cause_visibilities(evidence)}
     assert rows["plate_position", "plate1:y"].sd < 0.004
     assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
     assert rows["plate_gain", "plate2:Fx"].witnesses == ()
@@ -185,7 +190,7 @@ def test_clean_walks_and_standing_name_nothing() -> None:
 def test_who_weighs_more_than_declared_may_carry_a_load(heavier: float, a_load: bool) -> None:
     """A load is weight, too; but nobody carries less than nothing."""
     weighed = standing(weight=(1 + heavier) * MASS)
-    (one,) = weigh(hear(session(weighed, replace(weighed, name="later")))).findings
+    (one,) = infer_causes(collect_evidence(session(weighed, replace(weighed, name="later")))).findings
     alike = {(alias.effect, alias.target) for alias in one.set}
     assert [n in alike for n in (("plate_gain", "Fz"), ("body_mass", ""), ("added_mass", ""))] == [True, True, a_load]
 
@@ -200,7 +205,7 @@ def test_who_weighs_more_than_declared_may_carry_a_load(heavier: float, a_load: 
     ],
 )
 def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str], size: float | None) -> None:
-    found = weigh(hear(session(standing(wrong), walk(wrong), walk(wrong, name="again")))).findings
+    found = infer_causes(collect_evidence(session(standing(wrong), walk(wrong), walk(wrong, name="again")))).findings
     assert [(one.effect, one.target) for one in found] == [names]
     if size is not None:
         low, high = found[0].parameters[0].interval
@@ -210,9 +215,9 @@ def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str
 
 def test_putting_a_delay_right_gives_back_what_was_seen_without_it() -> None:
     """What 40 ms add to steps is no straight line: where they are taken off, everything is as in the clean walk."""
-    late = hear(session(standing(), walk(Wrong(late=0.04)))).counting
-    clean = {one.stride: one.value - one.expected for one in hear(session(standing(), walk())).observations}
-    added, _ = put_right(late, {("time_delay", ""): 0.04})
+    late = collect_evidence(session(standing(), walk(Wrong(late=0.04)))).counting
+    clean = {one.stride: one.value - one.expected for one in collect_evidence(session(standing(), walk())).observations}
+    added, _ = undo_causes(late, {("time_delay", ""): 0.04})
     compared = [
         (one.value - one.expected + more - clean[one.stride]) / one.sd
         for one, more in zip(late.observations, added, strict=True)
@@ -235,19 +240,21 @@ def test_a_toe_marker_at_one_edge_says_nothing_of_the_plate_s_place() -> None:
 
 
 def test_an_unknown_mass_and_missing_feet_are_silence_not_an_error() -> None:
-    heard = hear(session(walk(), mass=float("nan")))
-    assert "stride_force" not in {one.witness for one in heard.observations}
+    evidence = collect_evidence(session(walk(), mass=float("nan")))
+    assert "stride_force" not in {one.witness for one in evidence.observations}
     trial = walk()
     bare = replace(trial, markers=trial.markers.select(["SACR"]))
     assert {one.witness for one in observe(recording(bare, mass=MASS))} == {"empty_plate"}
-    assert size_by(hear(session(replace(bare, markers=None))), ("time_delay", "")) is None
+    assert size_from_witnesses(collect_evidence(session(replace(bare, markers=None))), ("time_delay", "")) is None
 
 
 def test_witnesses_that_contradict_each_other_exclude_little() -> None:
     """30 ms early here and 30 ms late there is no clock that is right to some milliseconds."""
     delay = ("time_delay", "")
-    agreed = size_by(hear(session(walk(), walk(name="again"))), delay)
-    torn = size_by(hear(session(walk(Wrong(late=0.03)), walk(Wrong(late=-0.03), name="again"))), delay)
+    agreed = size_from_witnesses(collect_evidence(session(walk(), walk(name="again"))), delay)
+    torn = size_from_witnesses(
+        collect_evidence(session(walk(Wrong(late=0.03)), walk(Wrong(late=-0.03), name="again"))), delay
+    )
     assert torn[1] > 2.0 * agreed[1]
     assert all(abs(torn[0] - late) < 4.0 * torn[1] for late in (0.03, -0.03))
 
@@ -255,19 +262,19 @@ def test_witnesses_that_contradict_each_other_exclude_little() -> None:
 def test_one_odd_step_names_nothing() -> None:
     odd = walk(Wrong(late=0.03))
     others = [walk(name=f"walk{i}") for i in range(3)]
-    shifted = weigh(hear(session(*others, odd))).findings
+    shifted = infer_causes(collect_evidence(session(*others, odd))).findings
     assert not [one for one in shifted if one.effect != "time_delay"]
 
 
 def test_seconds_of_single_contact_count() -> None:
-    assert hear(session(walk())).seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)
+    assert collect_evidence(session(walk())).seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)
 
 
 def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
     """Its clock comes 4 ms later than elsewhere: expected then. 30 ms in all its sessions are a fault all the same."""
     late = session(standing(), walk(Wrong(late=0.004)), walk(Wrong(late=0.004), name="again"))
     before, own, fault = (
-        [one for one in hear(late, None, norms).observations if one.witness == "force_onset"]
+        [one for one in collect_evidence(late, None, norms).observations if one.witness == "force_onset"]
         for norms in ({}, {"force_onset": (0.004, 0.0001)}, {"force_onset": (0.03, 0.0001)})
     )
     assert len(before) >= 2

@@ -7,8 +7,8 @@ import pytest
 from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.diagnosis.heard import hear
-from biodance.diagnosis.testimony import weigh
+from biodance.diagnosis.witness_evidence import collect_evidence
+from biodance.diagnosis.witness_inference import infer_causes
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
@@ -26,7 +26,7 @@ def spoiled(name: str, folder: Path, text: str) -> Path:
 
 
 def heard_in(folder: Path) -> tuple[Finding, ...]:
-    return weigh(hear(read_session(folder))).findings
+    return infer_causes(collect_evidence(read_session(folder))).findings
 
 
 @pytest.mark.parametrize("name", ["HC038A", "HC050A"])

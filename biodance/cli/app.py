@@ -1,6 +1,5 @@
-"""What all commands share: the application, its exit codes and options, how it talks to the person at the terminal, and
-how it says what it is doing: one changing line with the time left on a terminal, a plain line every few seconds
-elsewhere.
+"""Shared by all commands: the application, exit codes, common options, terminal output and progress (one updated line
+with the remaining time on a terminal, otherwise a plain line every few seconds).
 """
 
 import re
@@ -26,8 +25,8 @@ DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
 app = App(
     name="biodance",
     version=__version__,
-    help="Segment inertial parameters of a person, measured from markers and force plates. For research use, not a "
-    "diagnosis.",
+    help="Estimate the segment inertial parameters of a person from motion capture and force plates. For research use "
+    "only, not a medical device.",
     suppress_keyboard_interrupt=False,
 )
 
@@ -45,7 +44,7 @@ def print_json(document: object) -> None:
 
 
 def show(document: Any, printed: "Callable[[Any, Console], None]", *, json: bool, path: Path | None = None) -> None:
-    """Write what was found to stdout: one JSON document, or as ``printed`` for a person and the ``path`` to look at."""
+    """Write results to stdout: one JSON document, or the output of ``printed`` and the ``path`` of the report."""
     from rich.console import Console
 
     print_json(document) if json else printed(document, Console())
@@ -59,7 +58,7 @@ _EVERY = 5.0
 
 
 class TimeLeft:
-    """What a stage still takes, from the items that it has done: told words with "3 of 11" in them; ``clock`` in s."""
+    """Estimate of the time left in a stage from its progress messages ("3 of 11"); ``clock`` in s."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -117,53 +116,52 @@ def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Calla
 
 
 JsonOption = Annotated[
-    bool, Parameter(name="--json", negative="", help="Print one JSON document on stdout and nothing else there.")
+    bool, Parameter(name="--json", negative="", help="Print the results as one JSON document on stdout.")
 ]
 ForceOption = Annotated[
-    bool, Parameter(name="--force", negative="", help="Write into a folder that already holds files.")
+    bool,
+    Parameter(name="--force", negative="", help="Write into a non-empty folder; overwrite existing files."),
 ]
 Tables = Annotated[
-    Path | None, Parameter(name="--tables", help="Folder for the same numbers as tables, CSV and Parquet.")
+    Path | None, Parameter(name="--tables", help="Also write the results as tables (CSV and Parquet) to this folder.")
 ]
-OpenOption = Annotated[bool, Parameter(name="--open", negative="", help="Show the page in the browser when done.")]
-OutOption = Annotated[Path, Parameter(name="--out", help="Folder for the results; it is made if it is missing.")]
+OpenOption = Annotated[bool, Parameter(name="--open", negative="", help="Open the report in a browser when done.")]
+OutOption = Annotated[Path, Parameter(name="--out", help="Output folder; created if it does not exist.")]
 
 ReferenceOption = Annotated[
     Path | None,
     Parameter(
         name="--reference",
-        help="An earlier session of the same person without load: changes and loads are then told against it.",
+        help="Folder of an earlier session of the same person without added load; changes are reported relative to it.",
     ),
 ]
 BodyOption = Annotated[
     Path | None,
     Parameter(
         name="--body",
-        help="body.json of an earlier session of the same person: what is known before, instead of the table.",
+        help="body.json from an earlier session of the same person, used as the prior in place of the segment table.",
     ),
 ]
 LabOption = Annotated[
-    Path | None, Parameter(name="--lab", help="lab.toml: the laboratory's accepted corrections, made first.")
+    Path | None, Parameter(name="--lab", help="lab.toml of the laboratory; its accepted corrections are applied first.")
 ]
 Set = Annotated[
     tuple[str, ...],
     Parameter(
         name="--set",
         negative=(),
-        help="Choose a setting: --set filter.cutoff=6; may be repeated. `biodance settings` prints all.",
+        help="Override a setting, e.g. --set filter.cutoff=6; repeatable. `biodance settings` lists all of them.",
     ),
 ]
 MarkersFile = Annotated[
     str | None,
-    Parameter(
-        name="--markers", help="The marker set that was worn: a TOML file of your own (see CONTRIBUTING.md), or a name."
-    ),
+    Parameter(name="--markers", help="Marker set: the name of a built-in set, or a TOML file (see CONTRIBUTING.md)."),
 ]
 SubjectOption = Annotated[
     str | None,
     Parameter(
         name="--subject",
-        help="The person to look at where C3D files hold several; without it such a file is refused and names them.",
+        help="Subject to read if a C3D file contains several; required for such files.",
     ),
 ]
 
@@ -171,8 +169,8 @@ SubjectOption = Annotated[
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """How a session's folder is read: the person where files hold several, the marker set that was worn, the settings
-    chosen; and what is known from earlier sessions: a reference, a body, the laboratory's file.
+    """Options for reading a session: subject, marker set, settings, and results of earlier sessions (reference, body,
+    laboratory file).
     """
 
     reference: ReferenceOption = None
@@ -226,10 +224,12 @@ def _lived(_: object, age: float) -> None:
 class PersonFacts:
     """Who moves, where no recording says it."""
 
-    sex: Annotated[Literal["F", "M"] | None, Parameter(help="Of the person.")] = None
-    height: Annotated[float | None, Parameter(help="Stature, m.")] = None
+    sex: Annotated[Literal["F", "M"] | None, Parameter(help="Sex of the person.")] = None
+    height: Annotated[float | None, Parameter(help="Body height, m.")] = None
     mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None
-    age: Annotated[float, Parameter(validator=_lived, help="Age, years; strength falls with it.")] = float("nan")
+    age: Annotated[float, Parameter(validator=_lived, help="Age, 0 to 120 years; strength depends on it.")] = float(
+        "nan"
+    )
 
 
 NOBODY = PersonFacts()
@@ -240,13 +240,13 @@ NOBODY = PersonFacts()
 class RobotFile:
     """The robot instead of a person: its file, its feet, and what to do about a link that is no possible body."""
 
-    urdf: Annotated[Path | None, Parameter(help="URDF file of a robot instead of a person.")] = None
-    feet: Annotated[str | None, Parameter(help="Links of the robot's right and left foot: RIGHT,LEFT.")] = None
+    urdf: Annotated[Path | None, Parameter(help="URDF file of a robot, to be used instead of a person.")] = None
+    feet: Annotated[str | None, Parameter(help="Names of the robot's foot links, given as RIGHT,LEFT.")] = None
     mend: Annotated[
         bool,
         Parameter(
             negative="",
-            help="Where a link of the URDF file is no possible body, take a solid box of its mass instead and say so.",
+            help="Replace links with physically impossible inertia by a solid box of the same mass, and report them.",
         ),
     ] = False
 

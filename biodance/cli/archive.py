@@ -33,21 +33,21 @@ def batch_command(
     limit: float = 1800.0,
     json: JsonOption = False,
 ) -> int:
-    """Report every session of an archive: thousands, on this machine or on a Dask cluster; a stopped run is gone on
-    with by the same command.
+    """Report every session of an archive, on this machine or on a Dask cluster. An interrupted run is resumed by the
+    same command.
 
     Parameters
     ----------
     archive
-        Folder with the session folders, at any depth.
+        Folder that contains the session folders, at any depth.
     workers
-        Processes of this machine; by default one for each core.
+        Number of local processes; default: one per core.
     scheduler
-        Address of a running Dask scheduler, such as tcp://host:8786; its workers must see both folders.
+        Address of a running Dask scheduler, e.g. tcp://host:8786; its workers need access to both folders.
     pages
-        Draw a page for every session; the numbers are written always.
+        Write a report page for every session; the numerical results are always written.
     limit
-        Seconds after which one session is given up.
+        Time limit per session, s; a session that takes longer is abandoned.
     """
     from biodance.batch.run import run_batch, summary_of
 
@@ -69,12 +69,12 @@ def batch_command(
 
 @app.command(name="plates")
 def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, force: ForceOption = False) -> int:
-    """Judge the sessions of one laboratory together: a card per plate over time, what changed when, who stands out.
+    """Analyse the force plates of one laboratory over all its sessions: trends, change points and outlying sessions.
 
     Parameters
     ----------
     archive
-        Folder with session folders at any depth, or with a table trials.csv beside text recordings of one plate.
+        Folder that contains session folders at any depth, or trials.csv with text recordings of one plate.
     """
     from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
@@ -95,15 +95,15 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
 def learn_command(
     archive: Path,
     *,
-    out: Annotated[Path, Parameter(name="--out", help="The file to write, lab.toml; never over an existing one.")],
+    out: Annotated[Path, Parameter(name="--out", help="Output file, lab.toml; an existing file is never overwritten.")],
     json: JsonOption = False,
 ) -> int:
-    """Learn from a laboratory's own sessions without fault how large everything is that is no fault.
+    """Estimate a laboratory's own tolerances, the usual sizes of errors that are not faults, from fault-free sessions.
 
     Parameters
     ----------
     archive
-        Folder with session folders at any depth.
+        Folder that contains session folders, at any depth.
     """
     from biodance.pipeline.learn import learn_laboratory
     from biodance.report.laboratory import learned_document, print_learned, refuse_existing, write_lab_file

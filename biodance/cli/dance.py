@@ -31,7 +31,7 @@ from biodance.errors import BiodanceError
 if TYPE_CHECKING:
     from biodance.records import Subject
 
-FileOut = Annotated[Path, Parameter(name="--out", help="The file to write, such as dance.html.")]
+FileOut = Annotated[Path, Parameter(name="--out", help="Output file, e.g. dance.html.")]
 
 
 @app.command(name="dance")
@@ -39,22 +39,27 @@ def dance_command(
     *,
     person: PersonFacts = NOBODY,
     protocol: Annotated[
-        str, Parameter(help="easy, patient, chair, short, one_segment, full, or a TOML file.")
+        str, Parameter(help="Built-in protocol (easy, patient, chair, short, one_segment, full) or a TOML file.")
     ] = "full",
-    limits: Annotated[Path | None, Parameter(help="TOML file with what this person can and may do.")] = None,
+    limits: Annotated[
+        Path | None, Parameter(help="TOML file with the joint, strength and other limits of the person.")
+    ] = None,
     robot: RobotFile = NO_ROBOT,
     seed: Annotated[
-        int, Parameter(converter=whole, validator=not_negative, help="The same seed gives the same dance.")
+        int,
+        Parameter(
+            converter=whole, validator=not_negative, help="Random seed, 0 or more; the same seed gives the same dance."
+        ),
     ] = 0,
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
-    """Design a dance for one person or robot: safe, balanced, and telling much about every segment.
+    """Design a dance (exciting motion) for one person or robot: safe, balanced and informative about every segment.
 
     Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, cues.html
-    (cards to print), margins.md, figures and results.json. Ctrl-C keeps what is finished, and the same command goes on
-    from there. A dance that cannot exist is refused with the constraint that forbids it (exit code 1).
+    (printable cards), margins.md, figures and results.json. Ctrl-C keeps finished parts; the same command resumes from
+    there. If no dance satisfies all limits, the violated limit is reported (exit code 1).
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
@@ -98,16 +103,16 @@ def dance_command(
 
 @app.command(name="feedback")
 def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -> int:
-    """Write the page that leads a person through a dance: one file that opens in a browser without network.
+    """Write a page that guides a person through a dance: one HTML file that opens in a browser without a network.
 
-    It shows the person's own body, the next posture as a light figure, what to move, the seconds left and when to move,
-    by sight and sound; over the mirrored picture of a camera where that is wanted. With a camera it follows the person,
-    grades every posture by what it tells of each segment, and asks for what is missing.
+    It shows the person's own body, the next posture as a light figure, what to move, and a countdown with sound;
+    optionally over the mirrored image of a camera. With a camera it tracks the person, scores every posture by its
+    information about each segment, and asks for the missing ones.
 
     Parameters
     ----------
     dance
-        The dance.npz that `biodance dance` wrote, or its folder.
+        The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.dance.dance import Dance
     from biodance.report.feedback.write import write_feedback
@@ -122,18 +127,18 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
 def play_command(
     dance: Path,
     *,
-    out: Annotated[Path, Parameter(name="--out", help="The film to write: .gif, or .mp4 where ffmpeg is installed.")],
-    hold: Annotated[float, Parameter(help="Longest hold of a posture, s.")] = 0.5,
-    friction: Annotated[float, Parameter(help="Of the soles on the floor.")] = 0.5,
+    out: Annotated[Path, Parameter(name="--out", help="Output video: .gif, or .mp4 if ffmpeg is installed.")],
+    hold: Annotated[float, Parameter(help="Longest time a posture is held, s.")] = 0.5,
+    friction: Annotated[float, Parameter(help="Friction coefficient of the soles on the floor.")] = 0.5,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
-    """Play a designed dance in MuJoCo, the body on its own feet, and film it beside the plan.
+    """Simulate a designed dance in MuJoCo with a free-standing body, and render it as a video next to the plan.
 
     Parameters
     ----------
     dance
-        The file dance.npz that `biodance dance` wrote.
+        The dance.npz written by `biodance dance`.
     """
     from biodance.dance.dance import Dance
     from biodance.dance.rehearsal import rehearse

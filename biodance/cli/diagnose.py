@@ -27,17 +27,19 @@ from biodance.cli.session import examine_with_reference, tabled
 def foresee_command(
     dance: Path,
     *,
-    out: Annotated[Path | None, Parameter(name="--out", help="Page to write, such as foresee.html.")] = None,
+    out: Annotated[
+        Path | None, Parameter(name="--out", help="Also write the forecast as a page, e.g. foresee.html.")
+    ] = None,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
-    """Say before a recording what a designed dance will be able to see, from which size on, and which causes it will
-    confuse; and what to change so that it sees more. With --out as a page, too.
+    """Predict, before recording, what a designed dance can detect: the detection limit of every cause, which causes it
+    cannot tell apart, and what to change so that it detects more.
 
     Parameters
     ----------
     dance
-        The file dance.npz that `biodance dance` wrote.
+        The dance.npz written by `biodance dance`.
     """
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
@@ -69,19 +71,19 @@ def diagnose_command(
         Parameter(
             name="--accept",
             negative="",
-            help="Also write what follows from the findings: body.json, lab.toml, trials; labels are exchanged in a "
-            "copy first.",
+            help="Also apply the findings and write the result: body.json, lab.toml and corrected trials. The "
+            "recordings themselves are not changed.",
         ),
     ] = False,
     robot: RobotFile = NO_ROBOT,
 ) -> int:
-    """Say what the simulation of a session gets wrong: the cause, its size, how sure, what else it could be, and what
-    naming it gains.
+    """Diagnose why measured and simulated ground forces differ: the causes, their sizes with uncertainty, possible
+    alternatives, and how much of the residual each cause explains.
 
     Parameters
     ----------
     session
-        Folder with the static trial and the other trials; of a robot (--urdf), as for identify.
+        Session folder: the static trial and the other trials. For a robot (--urdf): as for `biodance identify`.
     """
     if robot.given:
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))

@@ -28,25 +28,27 @@ def register_command(
     markers: Path,
     forces: Path,
     *,
-    out: Annotated[Path, Parameter(name="--out", help="Folder for the session; it is made if it is missing.")],
+    out: Annotated[Path, Parameter(name="--out", help="Folder of the new session; created if it does not exist.")],
     rough: Annotated[
         bool,
         Parameter(
-            name="--rough", negative="", help="Also write a pose that is known less exactly than 5 mm, 0.5 deg, 5 ms."
+            name="--rough",
+            negative="",
+            help="Write the session even if the registration is less certain than 5 mm, 0.5 deg or 5 ms.",
         ),
     ] = False,
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
-    """Find from the movement where force plates lie in the room of the markers and how late their clock is, and write
-    one session.
+    """Register a force file to a marker file: estimate the position, rotation and time delay of the plates from the
+    movement, and write both as one session.
 
     Parameters
     ----------
     markers
-        A marker file (static trial and session.toml beside it), or the folder of such a session.
+        Marker file, with the static trial and session.toml in the same folder; or the folder of such a session.
     forces
-        A force file whose clock and place in the room are unknown.
+        Force file with unknown clock and unknown plate positions.
     """
     from biodance.pipeline.registration import register
 
@@ -69,7 +71,7 @@ def register_command(
 
 @app.command(name="doctor")
 def doctor_command(*, json: JsonOption = False) -> int:
-    """Say what works on this machine, and how to mend what does not."""
+    """Check the installation, and explain how to fix what does not work."""
     from dataclasses import asdict
 
     from biodance.doctor import examine_machine
@@ -83,15 +85,15 @@ def doctor_command(*, json: JsonOption = False) -> int:
 
 @app.command(name="init")
 def init_command(session: Path, *, subject: str | None = None, json: JsonOption = False) -> int:
-    """Write what was found and guessed of a session (subject, roles, markers, plates) into its session.toml, to be
-    confirmed or corrected; never over an existing one.
+    """Create session.toml with the detected and guessed metadata of a session (subject, trial roles, markers, plates)
+    for review. An existing session.toml is never overwritten.
 
     Parameters
     ----------
     session
         Folder with the recordings of one visit.
     subject
-        The person, where C3D files hold several.
+        Subject to read if a C3D file contains several.
     """
     from biodance.lab.session.write import init_session
     from biodance.report.terminal import print_initialised
@@ -105,12 +107,12 @@ def init_command(session: Path, *, subject: str | None = None, json: JsonOption 
 def inspect_command(
     *paths: Path, subject: SubjectOption = None, markers: MarkersFile = None, json: JsonOption = False
 ) -> int:
-    """Say what is in recordings: markers, gaps, plates, the weight on them, and every decision the readers take.
+    """Show the contents of recordings: markers, gaps, plates, the load on them, and every decision made on reading.
 
     Parameters
     ----------
     paths
-        Files, or folders whose recordings are all read.
+        Files or folders; all recordings of a folder are read.
     """
     from biodance.lab.inspect import inspect_paths
     from biodance.report.terminal import print_inspected
@@ -128,12 +130,12 @@ def inspect_command(
 
 @app.command
 def settings(session: Path | None = None, *, chosen: Set = (), json: JsonOption = False) -> int:
-    """Print everything an analyst may choose: value, unit, meaning and legal range, as it may stand in session.toml.
+    """Print all settings with value, unit, meaning and allowed range, in the format of session.toml.
 
     Parameters
     ----------
     session
-        A session folder, whose session.toml is then followed.
+        Session folder; the settings of its session.toml are applied.
     """
     from biodance.lab.session.file import read_session_file
     from biodance.lab.session.read import session_folder
@@ -154,23 +156,26 @@ def export_command(
     *,
     format: Annotated[
         str,
-        Parameter(help="osim, urdf, mjcf, biomod, glb, csv; of one trial trc, mot, c3d, rerun; folders opensim, bids."),
+        Parameter(
+            help="Models: osim, urdf, mjcf, biomod, glb, csv. One trial: trc, mot, c3d, rerun. Folders: opensim, bids."
+        ),
     ],
-    out: Annotated[Path, Parameter(help="The file to write.")],
-    trial: Annotated[str | None, Parameter(help="Name of the trial, for formats of recordings.")] = None,
+    out: Annotated[Path, Parameter(help="Output file, or folder for opensim and bids.")],
+    trial: Annotated[str | None, Parameter(help="Name of the trial to export, for trial formats.")] = None,
     subject: SubjectOption = None,
     meshes: Annotated[
-        Path | None, Parameter(help="Folder with a closed mesh a segment (right_thigh.stl, m) for glb and osim.")
+        Path | None,
+        Parameter(help="Folder with one closed mesh per segment (right_thigh.stl, in m), for glb and osim."),
     ] = None,
     markers: MarkersFile = None,
-    force: Annotated[bool, Parameter(name="--force", negative="", help="Replace the file if it exists.")] = False,
+    force: Annotated[bool, Parameter(name="--force", negative="", help="Overwrite an existing file.")] = False,
 ) -> int:
-    """Write a session, or the results of `biodance identify`, for another program.
+    """Export a session, or the results of `biodance identify`, to the format of another program.
 
     Parameters
     ----------
     source
-        Session folder, or folder with the results of `biodance identify`; or hoap3, the robot from our own tables.
+        Session folder; results folder of `biodance identify`; or hoap3, the built-in robot model.
     """
     from biodance.pipeline.export import export as write
     from biodance.pipeline.export import replaceable

@@ -66,17 +66,18 @@ def identify_command(
     results: Results,
     reading: Reading = USUAL_READING,
     dance: Annotated[
-        Path | None, Parameter(name="--dance", help="dance.npz that was shown: says how well it was danced.")
+        Path | None,
+        Parameter(name="--dance", help="dance.npz that the person followed; reports how well it was performed."),
     ] = None,
     robot: RobotFile = NO_ROBOT,
 ) -> int:
-    """Identify what every segment weighs, with intervals, validate it on the trials kept, and look for an added mass.
+    """Identify segment masses with credible intervals, validate them on held-out trials, and search for an added mass.
 
     Parameters
     ----------
     session
-        Folder with the static trial and the other trials; of a robot (--urdf), with encoder tables (CSV or Parquet: s,
-        rad) and force plate files.
+        Session folder: the static trial and the other trials. For a robot (--urdf): encoder tables (CSV or Parquet;
+        s, rad) and force plate files.
     """
     if robot.given:
         for_people = (*reading.given(), *_given({"--dance": dance, "--tables": results.tables}))

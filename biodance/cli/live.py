@@ -18,28 +18,29 @@ if TYPE_CHECKING:
 def live_command(
     file: Path,
     *,
-    static: Annotated[
-        Path | None, Parameter(help="The static trial; by default that of the folder in which the file lies.")
-    ] = None,
+    static: Annotated[Path | None, Parameter(help="Static trial; default: the one in the same folder as FILE.")] = None,
     real_time: Annotated[
-        bool, Parameter(name="--real-time", negative="", help="At the recording's own rate, not as fast as it goes.")
+        bool,
+        Parameter(
+            name="--real-time", negative="", help="Replay at the recorded frame rate instead of as fast as possible."
+        ),
     ] = False,
     subject: str | None = None,
     markers: MarkersFile = None,
     chosen: Set = (),
     page: Annotated[
-        int | None, Parameter(help="Port of this machine's loopback at which a page shows the same; 0: a free one.")
+        int | None, Parameter(help="Also serve a live page on this port of 127.0.0.1; 0 picks a free port.")
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Replay a recording as a stream: track, watch for faults and identify while it runs.
+    """Replay a recording frame by frame: track, monitor for faults and identify while it runs.
 
     Parameters
     ----------
     file
-        A recording with markers and force plates.
+        Recording with markers and force plates.
     subject
-        The person, where C3D files hold several.
+        Subject to read if a C3D file contains several.
     """
     from biodance.pipeline.stream import body_and_stream, replay
     from biodance.report.live import LivePage, live_document, print_live, state_line, warning_line

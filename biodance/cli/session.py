@@ -120,15 +120,19 @@ def report_command(
     reading: Reading = USUAL_READING,
     subject_page: Annotated[
         bool,
-        Parameter(name="--subject-page", negative="", help="Also write subject.html, for the person who was measured."),
+        Parameter(
+            name="--subject-page",
+            negative="",
+            help="Also write subject.html, a plain-language page for the person measured.",
+        ),
     ] = False,
 ) -> int:
-    """Take a session through all stages and write report.html and results.json.
+    """Process a session through all stages and write report.html and results.json.
 
     Parameters
     ----------
     session
-        Folder with the static trial and the other trials.
+        Session folder: the static trial and the other trials.
     """
     with progress() as tell:
         place = results.make_tables_folder(session)

@@ -21,22 +21,26 @@ class Drawn:
     seed: Annotated[
         int,
         Parameter(
-            converter=whole, validator=not_negative, help="The same seed gives the same person and the same files."
+            converter=whole,
+            validator=not_negative,
+            help="Random seed, 0 or more; the same seed gives the same person and the same files.",
         ),
     ]
     performer: Annotated[
         Literal["steady", "normal", "restless"],
-        Parameter(help="How well the dance is copied: 2, 5 or 7 degrees off; 5, 10 or 20 % off in tempo; swaying."),
+        Parameter(
+            help="Accuracy of the performance: angles within 2, 5 or 7 deg, tempo within 5, 10 or 20 %, and sway."
+        ),
     ] = "normal"
     effect: Annotated[
-        tuple[str, ...], Parameter(negative=(), help="Hide a cause: plate_gain:target=Fz,gain=0.04; may be repeated.")
+        tuple[str, ...], Parameter(negative=(), help="Inject a fault, e.g. plate_gain:target=Fz,gain=0.04; repeatable.")
     ] = ()
     lab_seed: Annotated[
         int | None,
         Parameter(
             converter=whole,
             validator=not_negative,
-            help="Number of a laboratory of the family: other plates, cameras, soft tissue, tolerances.",
+            help="Random seed of the laboratory (plates, cameras, soft tissue, tolerances), 0 or more.",
         ),
     ] = None
 
@@ -49,7 +53,7 @@ def simulate_command(
         Path | None,
         Parameter(
             name="--dance",
-            help="dance.npz of `biodance dance`, performed instead of a protocol; by default by the person it is for.",
+            help="dance.npz of `biodance dance`, performed instead of a protocol; the person defaults to its own.",
         ),
     ] = None,
     person: PersonFacts = NOBODY,
@@ -57,12 +61,12 @@ def simulate_command(
     out: OutOption,
     force: ForceOption = False,
 ) -> int:
-    """Write a simulated session: C3D files and session.toml as a lab would, and the truth apart in truth/truth.json.
+    """Simulate a session: C3D files and session.toml as from a real laboratory, and the true values in truth/.
 
     Parameters
     ----------
     protocol
-        Name of a protocol: dance, short, squat, standing ...; a wrong name lists all. Give this or --dance.
+        Name of a protocol, e.g. dance, short, squat or standing; an unknown name lists all. Exclusive with --dance.
     """
     from biodance.dance.dance import Dance
     from biodance.pipeline import front_dance
@@ -83,7 +87,7 @@ def simulate_command(
 
 @app.command(name="demo")
 def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -> int:
-    """Simulate a short session of a person whose truth is known, and report it like a real one."""
+    """Simulate a short session with known true values, and report it like a real one."""
     from biodance.lab.session.read import read_session
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.session import examine

@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Verdict
-from biodance.diagnosis.evidence import believe
+from biodance.diagnosis.evidence import linear_posterior
 from biodance.diagnosis.model import Model
 from biodance.records import CHANNELS, Array, Motion
 from biodance.uncertainty.bands import BANDS
@@ -48,7 +48,7 @@ alone spreads more.
 def energies(found: Model) -> Array:
     """Return (B, 6): mean square of the whitened residual that is left, per band and channel."""
     band = found.problem.spectrum.band
-    square = found.belief.left[: 6 * band.size].reshape(-1, 6) ** 2
+    square = found.posterior.residual[: 6 * band.size].reshape(-1, 6) ** 2
     return np.array([square[band == b].mean(axis=0) if (band == b).any() else np.ones(6) for b in range(len(BANDS))])
 
 
@@ -67,9 +67,9 @@ def unlikely(found: Model) -> Array:
     return np.asarray((np.cbrt(mean / known.energy) - 1 + root**2) / root)
 
 
-def loudness(found: Model) -> float:
-    """Return how many times as large what is left is as in the laboratory of the tolerances: the median over bands and
-    channels, which a fault of one channel or band does not move; 1 to `_LOUDEST`.
+def residual_scale(found: Model) -> float:
+    """Return the residual relative to that of the laboratory of the tolerances: median over bands and channels, which a
+    fault of a single channel or band does not affect; 1 to `_LOUDEST`.
     """
     square = float(np.median(energies(found) / found.tolerances.energy))
     return float(np.clip(np.sqrt(square), 1.0, _LOUDEST))
@@ -79,14 +79,14 @@ def sizes(found: Model) -> Array:
     """Return (B, 6): root mean square over the time of all trials of what is left, N and N·m, per band and channel."""
     where = found.problem.spectrum
     mass = float(found.problem.cases[0].body.sip.mass.sum())
-    left = found.belief.left[: 6 * where.band.size].reshape(-1, 6)
+    left = found.posterior.residual[: 6 * where.band.size].reshape(-1, 6)
     frames = max(1, sum(pick.size for picks in where.picks for pick in picks))
     coloured = np.linalg.inv(found.tolerances.whiteners(mass))
     return np.sqrt([np.sum((left[where.band == b] @ coloured[b].T) ** 2, axis=0) / frames for b in range(len(BANDS))])
 
 
-def alarming(left: tuple[Adequacy, ...]) -> float:
-    """Return the largest z of the bands in which what is left also matters in N or N·m; 0 without any."""
+def largest_z(left: tuple[Adequacy, ...]) -> float:
+    """Return the largest z over the bands whose residual is also relevant in N or N·m; 0 if there is none."""
     return max((row.z for row in left if row.matters), default=0.0)
 
 
@@ -96,7 +96,7 @@ def adequacy(found: Model) -> tuple[Adequacy, ...]:
     """
     spectrum, names = found.problem.spectrum, [case.trial.name for case in found.problem.cases]
     z, size = unlikely(found), sizes(found)
-    square = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6) ** 2
+    square = found.posterior.residual[: 6 * spectrum.band.size].reshape(-1, 6) ** 2
     rows = []
     for b in range(len(z)):
         here = spectrum.band == b
@@ -120,7 +120,7 @@ def _when(found: Model, row: Adequacy) -> float:
     """Return the second of the trial's recording around which what is left in ``row`` is largest."""
     spectrum = found.problem.spectrum
     index = [case.trial.name for case in found.problem.cases].index(row.trial)
-    left = found.belief.left[: 6 * spectrum.band.size].reshape(-1, 6)[
+    left = found.posterior.residual[: 6 * spectrum.band.size].reshape(-1, 6)[
         spectrum.trial == index, CHANNELS.index(row.channel)
     ]
     bands, time = spectrum.layout.bands.at(spectrum.rates[index]), found.problem.cases[index].motion.time
@@ -138,25 +138,24 @@ def _when(found: Model, row: Adequacy) -> float:
 
 
 def strain(found: Model) -> float:
-    """Return how much more unlike the prior the body had to become than people are, as a standard normal deviate.
+    """Return how much further the body is from its prior than people are, as a standard normal deviate.
 
-    Its unit-normal coefficients u are found as N(0, 1 - C) with C their posterior covariance, so |u|² is a sum of
-    squares with the eigenvalues of 1 - C as weights; its cube root is nearly normal. A fault that hides in the body
-    leaves no residual, but a strange body.
+    Its unit-normal coefficients u have the posterior mean distribution N(0, 1 - C) with C their posterior covariance,
+    so |u|² is a sum of squares weighted by the eigenvalues of 1 - C; its cube root is nearly normal. A fault absorbed
+    by the body leaves no residual but an unusual body.
     """
     k = found.problem.factor.shape[1]
-    u, unit = found.belief.mean[:k], np.eye(len(found.belief.mean))[:k]
-    weight = np.clip(1 - np.linalg.eigvalsh(found.belief.covariance(unit)), 0.0, 1.0)
+    u, unit = found.posterior.mean[:k], np.eye(len(found.posterior.mean))[:k]
+    weight = np.clip(1 - np.linalg.eigvalsh(found.posterior.covariance(unit)), 0.0, 1.0)
     if weight.sum() < 1e-9:
         return 0.0
     spread = 2 / 9 * float(np.sum(weight**2) / weight.sum() ** 2)
     return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
 
 
-def strain_as_loud(found: Model) -> float:
-    """Return `strain`; where that is beyond `STRAINED`, under noise as loud as what is left is in every band and
-    channel, where it is louder than in sessions without fault: a restless person, whose forces alone are loud, makes no
-    body strange.
+def strain_at_own_noise(found: Model) -> float:
+    """Return `strain`; where it exceeds `STRAINED`, recompute it with the noise raised to the residual of each band and
+    channel that is noisier than in fault-free sessions: a restless person is not an unusual body.
     """
     plain = strain(found)
     if plain <= STRAINED:
@@ -188,11 +187,11 @@ def strides_alike(motion: Motion) -> float:
 
 def _weighed(found: Model, weight: Array) -> Model:
     """Return the model with the plates' rows weighed: by band and channel (B, 6), or one by one (n, 1)."""
-    belief, band = found.belief, found.problem.spectrum.band
-    every = np.ones(belief.y.size)
+    posterior, band = found.posterior, found.problem.spectrum.band
+    every = np.ones(posterior.y.size)
     rows = weight[band] if len(weight) == len(BANDS) else weight
     every[: 6 * band.size] = np.broadcast_to(rows, (band.size, 6)).ravel()
-    return replace(found, belief=believe(every[:, None] * belief.X, every * belief.y))
+    return replace(found, posterior=linear_posterior(every[:, None] * posterior.X, every * posterior.y))
 
 
 def stretch(found: Model) -> float:
@@ -201,11 +200,11 @@ def stretch(found: Model) -> float:
     """
     named = sum(course.size for one in found.named for course in one.course.values())
     start = found.problem.factor.shape[1] + found.problem.kinematics.shape[1]
-    return float(np.abs(found.belief.mean[start : found.belief.mean.size - named]).max(initial=0.0))
+    return float(np.abs(found.posterior.mean[start : found.posterior.mean.size - named]).max(initial=0.0))
 
 
 def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:
-    """Return the verdict from how many causes were named, the ``worst`` z that is left where it matters (`alarming`),
+    """Return the verdict from how many causes were named, the ``worst`` z that is left where it matters (`largest_z`),
     the gates, and whether body or tolerances are ``strained``: a name beside which they must be strange is only
     resembled.
     """

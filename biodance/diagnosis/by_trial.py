@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.diagnosis.evidence import Belief
+from biodance.diagnosis.evidence import LinearPosterior
 from biodance.records import Array
 
 
@@ -61,18 +61,18 @@ class ByTrial:
         return out
 
     def against(self, left: Array) -> Array:
-        """Return (width,): the columns times ``left`` (r,); what a belief leaves gives their score."""
+        """Return (width,): the columns times ``left`` (r,); what a posterior leaves gives their score."""
         out = np.zeros(self.width)
         for part in self.parts:
             out[part.columns] += part.values.T @ left[part.rows]
         return out
 
-    def information(self, belief: Belief) -> Array:
+    def information(self, posterior: LinearPosterior) -> Array:
         """Return G (width, width), as `Belief.score` gives it."""
-        cross, out = np.zeros((belief.X.shape[1], self.width)), np.zeros((self.width, self.width))
+        cross, out = np.zeros((posterior.X.shape[1], self.width)), np.zeros((self.width, self.width))
         for part in self.parts:
-            cross[:, part.columns] += belief.X[part.rows].T @ part.values
+            cross[:, part.columns] += posterior.X[part.rows].T @ part.values
             out[np.ix_(part.columns, part.columns)] += part.values.T @ part.values
-        half = belief.half(cross)
+        half = posterior.half(cross)
         out -= half.T @ half
         return out

@@ -70,7 +70,7 @@ def candidates(problem: Problem, chosen: Chosen[Effect] = None) -> tuple[Candida
     trace are left out.
     """
     empty = empty_plates(problem.cases)
-    every = [one for effect in effects(chosen).values() for one in effect.everywhere(problem.cases[0])]
+    every = [one for effect in effects(chosen).values() for one in effect.at_all_targets(problem.cases[0])]
     every = [one for one in every if not (one.by_load and one.target.partition(":")[0] in empty)]
     found = [
         candidate(problem, effect, columns)

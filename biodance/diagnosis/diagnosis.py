@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from biodance.diagnosis.heard import Testimony
+    from biodance.diagnosis.witness_evidence import WitnessEvidence
     from biodance.effects import Gate
 
 
@@ -214,7 +214,7 @@ class Diagnosis:
     attention: tuple[Attention, ...] = ()
     judged: tuple[Judged, ...] = ()
     doubt: str = ""
-    witnesses: "Testimony | None" = None
+    witnesses: "WitnessEvidence | None" = None
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"

@@ -14,24 +14,24 @@ from biodance.diagnosis.adequacy import (
     STRAINED,
     STRETCHED,
     adequacy,
-    alarming,
-    loudness,
+    largest_z,
+    residual_scale,
     strain,
-    strain_as_loud,
+    strain_at_own_noise,
     stretch,
     verdict,
     with_strides_once,
 )
 from biodance.diagnosis.consequence import matters, unit_at
-from biodance.diagnosis.constancy import felt, hanging
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, causes_of, less_one, name_causes, named_of, suspicious
+from biodance.diagnosis.naming import Naming, Round, cause_key, causes_of, name_causes, passes_threshold, without_cause
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
-from biodance.diagnosis.passing import with_passing
 from biodance.diagnosis.plate_axes import in_plate_axes
 from biodance.diagnosis.problem import Look, Problem, problem
-from biodance.diagnosis.strange import firm
+from biodance.diagnosis.size_dependence import changes_wrench, significant_dependences
+from biodance.diagnosis.transient_contact import with_transient_contact
+from biodance.diagnosis.unusual_body import robust_causes
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, Gate
 from biodance.effects import effects as family
@@ -78,9 +78,9 @@ class Examined:
     named: tuple[NamedCause, ...] = ()
 
     @property
-    def suspicious(self) -> bool:
+    def passes_threshold(self) -> bool:
         """Whether a cause passes the threshold before any is named."""
-        return suspicious(self.naming.screening, self.naming.first.tolerances)
+        return passes_threshold(self.naming.screening, self.naming.first.tolerances)
 
 
 @one_thread()
@@ -110,7 +110,7 @@ def diagnose_trials(
     known = tolerances or shipped()
     asked = family(effects)
     put = problem(body, looks, prior=prior, chosen=asked)
-    quiet = not any(moves(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
+    quiet = not any(is_moving(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
     naming, said = _as_loud(put, known, asked, search=search and not quiet, still=quiet)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     bare = Diagnosis(
@@ -123,7 +123,7 @@ def diagnose_trials(
         doubt="standing alone tells no cause" if quiet else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
-    found = judged(Examined(bare, naming))
+    found = assess(Examined(bare, naming))
     notes = (*found.diagnosis.notes, *([STANDING] if quiet else []), *said)
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
 
@@ -131,43 +131,41 @@ def diagnose_trials(
 def _as_loud(
     put: Problem, known: Tolerances, asked: Mapping[str, Effect], *, search: bool, still: bool
 ) -> tuple[Naming, tuple[str, ...]]:
-    """Return the naming under tolerances as loud as this laboratory is (`loudness` of what is left once the causes of
-    the first try are named), and what is to be said of it. Standing still does not show how loud it is.
+    """Return the naming with tolerances scaled to the noise of this laboratory, and a note on the scaling. The scale is
+    `residual_scale` of the residual left by a first naming; quiet standing (``still``) does not determine it.
     """
     every = causes_of(put, known, asked)
 
     def named(under: Tolerances) -> Naming:
         if not search:
             return name_causes(put, under, asked, rounds=0, every=every)
-        return with_passing(name_causes(put, under, asked, every=every), asked)
+        return with_transient_contact(name_causes(put, under, asked, every=every), asked)
 
     naming = named(known)
-    louder = 1.0 if still else loudness(naming.found)
+    louder = 1.0 if still else residual_scale(naming.found)
     if louder <= LOUDER:
         return naming, ()
     del naming  # no two of them at once: they are the largest that a diagnosis keeps
     return named(replace(known, noise=louder**2 * known.noise, zeros=louder**2 * known.zeros)), (LOUD.format(louder),)
 
 
-def judged(examined: Examined) -> Examined:
-    """Return the same session with what its naming says: verdict, findings, and how far what is left is from sessions
-    without fault.
-    """
+def assess(examined: Examined) -> Examined:
+    """Return the session with the verdict and findings of its naming, and the adequacy of the remaining residual."""
     naming, one = examined.naming, examined.diagnosis
     left, put, known = adequacy(naming.found), naming.found.problem, naming.found.tolerances
     named = tuple(_measured(cause, naming.found) for cause in naming.found.named)
-    hung = {names: one.over for names, one in hanging(naming.found).items()}
+    hung = {names: one.over for names, one in significant_dependences(naming.found).items()}
     every = [
-        (cause, replace(_finding(cause, r, known, put.cases[0]), hangs_on=hung.get(named_of(cause), "")))
+        (cause, replace(_finding(cause, r, known, put.cases[0]), hangs_on=hung.get(cause_key(cause), "")))
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
     large = [pair for pair in every if _counts(naming.found, pair[0])]
     strange = _strange(naming.found, named=bool(large))
-    told = verdict(len(large), alarming(left), one.gates, strained=bool(strange))
+    told = verdict(len(large), largest_z(left), one.gates, strained=bool(strange))
     doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
-    if told == "unexplained" and strange == (STRANGE,) and alarming(left) <= LIMIT and len(doubted) < len(large):
-        sure = firm(naming.found, naming.accepted)
-        stand = [pair for pair in large if named_of(pair[0]) in sure and any(p.known for p in pair[1].parameters)]
+    if told == "unexplained" and strange == (STRANGE,) and largest_z(left) <= LIMIT and len(doubted) < len(large):
+        sure = robust_causes(naming.found, naming.accepted)
+        stand = [pair for pair in large if cause_key(pair[0]) in sure and any(p.known for p in pair[1].parameters)]
         doubted = [pair for pair in large if pair in doubted or pair not in stand]
         told = "named, incomplete" if len(doubted) < len(large) else told
     trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
@@ -198,7 +196,7 @@ def _counts(found: Model, cause: NamedCause) -> bool:
     does (5 % of a shear of 2 N is a tenth of a newton, however well it is seen). One that comes and goes is felt while
     it is there.
     """
-    return matters(cause.effect, cause.theta) and (bool(cause.course) or felt(found, cause))
+    return matters(cause.effect, cause.theta) and (bool(cause.course) or changes_wrench(found, cause))
 
 
 def _hangs(one: Finding) -> str:
@@ -211,9 +209,9 @@ def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
     return one.effect.single and sum(other.effect.name == one.effect.name for other in named) > 1
 
 
-def moves(case: Case) -> bool:
-    """Return whether the person of a trial does more than stand: any segment leaves the space of quiet standing
-    (`StandingRules.still`), and the trial is no static one.
+def is_moving(case: Case) -> bool:
+    """Return whether the person does more than stand: the centre of mass of any segment moves by more than in quiet
+    standing (`StandingRules.still`), and the trial is not the static one.
     """
     place = case.poses.points(list(range(len(case.body.segments))), case.body.sip.com)
     away = np.sqrt(np.mean(np.sum((place - place.mean(axis=0)) ** 2, axis=2), axis=0))
@@ -225,7 +223,7 @@ def without_names(examined: Examined, gates: tuple[Gate, ...] = ()) -> Examined:
     judged without it.
     """
     naming, one = examined.naming, replace(examined.diagnosis, gates=gates)
-    found = judged(Examined(one, replace(naming, found=naming.bare, accepted=())))
+    found = assess(Examined(one, replace(naming, found=naming.bare, accepted=())))
     told = replace(
         found.diagnosis, gates=examined.diagnosis.gates, resembles=(*one.findings, *one.resembles), tolerated=()
     )
@@ -237,8 +235,8 @@ def without_name(examined: Examined, index: int) -> Examined:
     causes are fitted again, and what is left is judged without it.
     """
     gone, one = examined.diagnosis.findings[index], examined.diagnosis
-    names = [named_of(cause) for cause in examined.naming.found.named]
-    found = judged(replace(examined, naming=less_one(examined.naming, names.index((gone.effect, gone.target)))))
+    names = [cause_key(cause) for cause in examined.naming.found.named]
+    found = assess(replace(examined, naming=without_cause(examined.naming, names.index((gone.effect, gone.target)))))
     resembles = (*found.diagnosis.resembles, gone, *one.resembles)
     return replace(found, diagnosis=replace(found.diagnosis, resembles=resembles))
 
@@ -248,7 +246,7 @@ def _strange(found: Model, *, named: bool) -> tuple[str, ...]:
     without any excuse.
     """
     once = with_strides_once(found)
-    body = (strain(once) if named else strain_as_loud(once)) > STRAINED
+    body = (strain(once) if named else strain_at_own_noise(once)) > STRAINED
     rest = stretch(found) > STRETCHED
     return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
 
@@ -276,7 +274,7 @@ def _finding(one: NamedCause, found: Round, known: Tolerances, case: Case) -> Fi
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
-    sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.unlike(one.effect.name) * length)
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.model_error(one.effect.name) * length)
     reported = one.effect.reported(one.theta + one.effect.origin(case), sd)
     parameters = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
     advice = f"{one.effect.advice} {in_plate_axes(one.effect.target, case.trial.plates)}".strip()

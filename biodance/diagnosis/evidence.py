@@ -20,11 +20,11 @@ from biodance.records import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Belief:
-    """What the data say about everything that is no fault.
+class LinearPosterior:
+    """Posterior of everything that is not a fault, in a linear Gaussian model.
 
-    ``X`` (r, K) whitened columns of unit-normal coefficients, ``y`` (r,) whitened target; ``factor`` Cholesky factor of
-    A; ``mean`` (K,) posterior mean of the coefficients.
+    ``X`` (r, K) whitened columns of coefficients with unit normal priors; ``y`` (r,) whitened target; ``factor``
+    Cholesky factor of A; ``mean`` (K,) posterior mean of the coefficients.
     """
 
     X: Array
@@ -33,13 +33,13 @@ class Belief:
     mean: Array
 
     @cached_property
-    def left(self) -> Array:
+    def residual(self) -> Array:
         """(r,) whitened residual at the posterior mean."""
         return self.y - self.X @ self.mean
 
     @classmethod
-    def known(cls, X: Array, factor: tuple[Array, bool], y: Array) -> "Belief":
-        """Return the belief of another target ``y`` (r,) under the same columns."""
+    def for_target(cls, X: Array, factor: tuple[Array, bool], y: Array) -> "LinearPosterior":
+        """Return the posterior for another target ``y`` (r,) with the same columns."""
         return cls(X, y, factor, _solved(factor, X.T @ y))
 
     def covariance(self, rows: Array) -> Array:
@@ -49,15 +49,15 @@ class Belief:
     def score(self, Z: Array) -> tuple[Array, Array]:
         """Return s (k,) and G (k, k) of whitened columns ``Z`` (r, k)."""
         half = self.half(self.X.T @ Z)
-        return Z.T @ self.left, Z.T @ Z - half.T @ half
+        return Z.T @ self.residual, Z.T @ Z - half.T @ half
 
     def half(self, cross: Array) -> Array:
         """Return H (K, k) with H' H = C' A^-1 C of ``cross`` C = X' Z (K, k)."""
         return np.asarray(dtrtrs(self.factor[0], cross, lower=self.factor[1])[0]) if cross.size else cross
 
     def free(self, Z: Array) -> Array:
-        """Return what of whitened columns ``Z`` (r, k) no error can explain: any target's score under these columns is
-        its product with them.
+        """Return the part of whitened columns ``Z`` (r, k) that no tolerance can explain; the score of any target is
+        its product with this part.
         """
         return np.asarray(Z - self.X @ _solved(self.factor, self.X.T @ Z))
 
@@ -67,10 +67,10 @@ def _solved(factor: tuple[Array, bool], b: Array) -> Array:
     return np.asarray(dpotrs(factor[0], b, lower=factor[1])[0]) if len(b) else b
 
 
-def believe(X: Array, y: Array) -> Belief:
-    """Return the belief from whitened columns ``X`` (r, K) and target ``y`` (r,)."""
+def linear_posterior(X: Array, y: Array) -> LinearPosterior:
+    """Return the posterior from whitened columns ``X`` (r, K) and target ``y`` (r,)."""
     factor = cho_factor(X.T @ X + np.eye(X.shape[1]), lower=True)
-    return Belief.known(X, factor, y)
+    return LinearPosterior.for_target(X, factor, y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ def visible(G: Array, length: float) -> float:
     return float(np.sqrt(np.clip(np.trace(G) / length, 0.0, 1.0))) if length > 0 else 0.0
 
 
-def smallest(G: Array, direction: Array, threshold: float) -> float:
+def smallest_detectable(G: Array, direction: Array, threshold: float) -> float:
     """Return the multiple of ``direction`` (k,) at which the expected log Bayes factor reaches ``threshold``;
     infinite if it never does.
     """

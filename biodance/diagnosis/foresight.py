@@ -12,7 +12,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.diagnosis import Unobservable
-from biodance.diagnosis.naming import built
+from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.observability import Visibility, detection_limits, hidden, visibility
 from biodance.diagnosis.problem import Look, problem
 from biodance.discovery import Chosen
@@ -100,7 +100,7 @@ def foresee(
         for i, (one, a, b) in enumerate(zip(motions, starts, ends, strict=True))
     )
     put = problem(body, looks, chosen=effects)
-    found, causes = built(put, known, effects)
+    found, causes = build_model(put, known, effects)
     seen = visibility(found, causes)
     rows = tuple(sorted(detection_limits(seen, body, known.threshold), key=lambda row: row.limit / row.typical))
     return Foresight(rows, hidden(rows), pairs := _confusions(seen, rows), _changes(causes, rows, pairs))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.candidates import SCALE, Candidate, removed, slopes
-from biodance.diagnosis.evidence import Belief, believe
+from biodance.diagnosis.evidence import LinearPosterior, linear_posterior
 from biodance.diagnosis.problem import Problem
 from biodance.effects import Effect
 from biodance.motion.kinematics import chains
@@ -43,16 +43,16 @@ class NamedCause:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """``problem`` with the parameters in use, under ``tolerances``; ``belief`` about all that is no fault, the
+    """``problem`` with the parameters in use, under ``tolerances``; ``posterior`` about all that is no fault, the
     ``named`` causes and what is ``expected`` (r,) of a session without fault taken off; ``tolerated`` by effect and
-    target: where the columns of its tolerance lie in the belief, and (p, k) what one of each is in its parameters.
+    target: where the columns of its tolerance lie in the posterior, and (p, k) what one of each is in its parameters.
 
     ``log_likelihood`` of the target under it, up to a constant of the session.
     """
 
     problem: Problem
     tolerances: Tolerances
-    belief: Belief
+    posterior: LinearPosterior
     expected: Array
     named: tuple[NamedCause, ...] = ()
     tolerated: Mapping[tuple[str, str], tuple[slice, Array]] = field(default_factory=dict)
@@ -64,31 +64,31 @@ class Model:
         where, unit = self.tolerated.get(
             (one.effect.name, one.effect.target), (slice(0), np.zeros((one.theta.size, 0)))
         )
-        return one.theta + unit @ self.belief.mean[where]
+        return one.theta + unit @ self.posterior.mean[where]
 
     @property
     def log_likelihood(self) -> float:
         """-1/2 y' C^-1 y with C the covariance of the rows under everything that is no fault."""
-        return -0.5 * float(self.belief.y @ self.belief.left)
+        return -0.5 * float(self.posterior.y @ self.posterior.residual)
 
     @property
     def phi(self) -> Array:
         """(10N,) posterior mean of the parameters."""
-        return self.problem.prior.phi + self.problem.factor @ self.belief.mean[: self.problem.factor.shape[1]]
+        return self.problem.prior.phi + self.problem.factor @ self.posterior.mean[: self.problem.factor.shape[1]]
 
     @cached_property
-    def taken(self) -> Array:
-        """(r, k) whitened columns of the named causes, per standard deviation of a fault."""
+    def named_columns(self) -> Array:
+        """(r, k) whitened columns of the named causes, per prior standard deviation of a fault."""
         parts = [
             slopes(self.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
             for one in self.named
         ]
-        return self.white(np.concatenate(parts, axis=1)) if parts else np.empty((self.belief.y.size, 0))
+        return self.white(np.concatenate(parts, axis=1)) if parts else np.empty((self.posterior.y.size, 0))
 
     @cached_property
-    def pull(self) -> tuple[Array, Array]:
-        """Score (k,) and information (k, k) of the sizes of the named causes, where they are."""
-        return self.belief.score(self.taken)
+    def named_score(self) -> tuple[Array, Array]:
+        """Score (k,) and information (k, k) of the named causes at their current sizes."""
+        return self.posterior.score(self.named_columns)
 
     def white(self, rows: Array, *, out: Array | None = None) -> Array:
         """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
@@ -112,13 +112,13 @@ class Model:
         )
         return replace(columns, parts=tuple(parts))
 
-    def less(self, named: tuple[NamedCause, ...]) -> "Model":
-        """Return the model with the causes ``named`` taken off the target."""
+    def without_causes(self, named: tuple[NamedCause, ...]) -> "Model":
+        """Return the model with the contributions of the causes ``named`` removed from the target."""
         y = self.problem.target - self.expected
         for one in named:
             y = y - removed(self.problem, one.effect, one.theta)
-        X, factor = self.belief.X, self.belief.factor
-        return replace(self, belief=Belief.known(X, factor, self.white(y[:, None])[:, 0]), named=named)
+        X, factor = self.posterior.X, self.posterior.factor
+        return replace(self, posterior=LinearPosterior.for_target(X, factor, self.white(y[:, None])[:, 0]), named=named)
 
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
@@ -210,19 +210,17 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     both = white(problem, tolerances, both, out=both)
     first = problem.sip.shape[1]
     own = {n: (slice(first + c.start, first + c.stop), u * sizes[c]) for n, (c, u) in known.causes.items()}
-    return Model(problem, tolerances, believe(both[:, :-1], both[:, -1]), expected, tolerated=own)
+    return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected, tolerated=own)
 
 
-def heavier(found: Model) -> bool:
-    """Return whether the data make any segment so much heavier that its kinematic errors grow with it."""
+def is_much_heavier(found: Model) -> bool:
+    """Return whether any segment is so much heavier than its prior that its kinematic errors grow noticeably."""
     before = found.problem.prior.mass
     return bool(np.any(found.phi[::10] - before > _HEAVIER * before))
 
 
-def stale(found: Model) -> bool:
-    """Return whether the parameters that ``found`` believes in predict movements otherwise than those in use, by
-    more than `_STALE`.
-    """
+def needs_rebuilding(found: Model) -> bool:
+    """Return whether the posterior mean predicts wrenches that differ from those in use by more than `_STALE`."""
     both = np.zeros(2)
     for case in found.problem.cases:
         wrench = np.stack([case.needed(found.phi - case.phi), case.predicted], axis=2)

@@ -1,5 +1,5 @@
-"""Name the causes one after the other: screen all, refine the best, take the most probable off, rebuild what depends
-on it, look again.
+"""Stepwise selection of causes: screen all, refine the best, remove the most probable one from the residual, rebuild
+the columns that depend on it, and repeat.
 """
 
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from scipy.special import chdtri, ndtr
 from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.diagnosis import Alias
-from biodance.diagnosis.model import Model, NamedCause, heavier, model, stale
+from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import ScoredCandidate, screen
 from biodance.discovery import Chosen
@@ -83,44 +83,44 @@ def name_causes(
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
-    first, first_causes = built(problem, tolerances, chosen, every)
+    first, first_causes = build_model(problem, tolerances, chosen, every)
     found, causes = first, first_causes
     screening = Round(screen(found, causes))
     accepted: list[Round] = []
     ranking = screening
-    if rounds and suspicious(screening, tolerances) and heavier(found):
+    if rounds and passes_threshold(screening, tolerances) and is_much_heavier(found):
         found = replace(found, problem=found.problem.with_matter(found.phi))
-        found, causes = rebuilt(found, tolerances, chosen)
+        found, causes = rebuild_model(found, tolerances, chosen)
         ranking = Round(screen(found, causes))
     bare = found
     for _ in range(rounds):
-        if not suspicious(ranking, tolerances):
+        if not passes_threshold(ranking, tolerances):
             break
         ranking, settled = refine(found, ranking)
-        if not suspicious(ranking, tolerances):
+        if not passes_threshold(ranking, tolerances):
             break
         accepted.append(ranking)
-        again = stale(settled) and strain(settled) <= STRAINED
-        found, causes = rebuilt(settled, tolerances, chosen) if again else (settled, causes)
+        again = needs_rebuilding(settled) and strain(settled) <= STRAINED
+        found, causes = rebuild_model(settled, tolerances, chosen) if again else (settled, causes)
         ranking = Round(
-            tuple(one for one in screen(found, causes) if one.names not in {named_of(n) for n in found.named})
+            tuple(one for one in screen(found, causes) if one.names not in {cause_key(n) for n in found.named})
         )
-    found, kept = held(found, tuple(accepted))
+    found, kept = drop_weak_causes(found, tuple(accepted))
     return Naming(first, found, kept, screening, first_causes, bare)
 
 
-def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round, ...]]:
-    """Return the model and the rounds with only those names that stand beside one another: all sizes are fitted
-    together, the weakest that does not stand is taken back, and the rest fitted again.
+def drop_weak_causes(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round, ...]]:
+    """Return the model and the rounds with only the causes that remain significant beside one another: all sizes are
+    fitted jointly, the weakest insignificant cause is dropped, and the rest is fitted again.
     """
     while found.named:
         found = settle(found, found.named)
-        evidence_of = [more_probable(found, _without(found, i)) for i in range(len(found.named))]
+        evidence_of = [log_bayes_factor_between(found, _without(found, i)) for i in range(len(found.named))]
         falls = [
             i
             for i, one in enumerate(accepted)
-            if evidence_of[i] - _price(one) < needed(found, one.suspects[0].visible)
-            or not stands(found, found.named[i])
+            if evidence_of[i] - _price(one) < required_evidence(found, one.suspects[0].visible)
+            or not is_significant(found, found.named[i])
         ]
         if not falls:
             break
@@ -130,31 +130,30 @@ def held(found: Model, accepted: tuple[Round, ...]) -> tuple[Model, tuple[Round,
     return found, accepted
 
 
-def less_one(naming: Naming, index: int) -> Naming:
-    """Return the naming without its cause ``index``, the sizes of all others fitted again; beside one that comes and
-    goes they keep their sizes, because its course takes part in the belief.
+def without_cause(naming: Naming, index: int) -> Naming:
+    """Return the naming without cause ``index``, with all other sizes fitted again. Beside a transient contact, whose
+    time course is part of the posterior, they keep their sizes.
     """
     gone, named = naming.found.named[index], naming.found.named
     rest = (*named[:index], *named[index + 1 :])
     accepted = (*naming.accepted[:index], *naming.accepted[index + 1 :])
     if any(one.course for one in rest):
         steady = tuple(one for one in rest if not one.course)
-        return replace(naming, found=replace(naming.found.less(steady), named=rest), accepted=accepted)
+        return replace(naming, found=replace(naming.found.without_causes(steady), named=rest), accepted=accepted)
     base = naming.bare if gone.course or not rest else naming.found
     return replace(naming, found=settle(base, rest), accepted=accepted)
 
 
-def needed(found: Model, visible: float) -> float:
-    """Return the evidence that a cause needs of which the share ``visible`` is seen."""
+def required_evidence(found: Model, visible: float) -> float:
+    """Return the evidence required to name a cause of which the share ``visible`` is identifiable."""
     return found.tolerances.threshold * (1.0 if visible >= SEEN else OVERWHELMING)
 
 
-def stands(found: Model, one: NamedCause) -> bool:
-    """Return whether a cause is possible in this session and its size further from none than chance brings it, all its
-    parameters together: as seldom as one alone is beyond `SURE` standard deviations, which are never less than
-    sessions without fault are alike.
+def is_significant(found: Model, one: NamedCause) -> bool:
+    """Return whether a cause is possible in this session and its size differs from zero, over all its parameters
+    jointly, at the level of `SURE` standard deviations; these are at least as large as the tolerance of the cause.
     """
-    alike = found.tolerances.size(key_of(*named_of(one))) * one.effect.typical / one.effect.typical[0]
+    alike = found.tolerances.size(key_of(*cause_key(one))) * one.effect.typical / one.effect.typical[0]
     sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
     sure = bool(np.sum((one.theta / sd) ** 2) >= chdtri(sd.size, 2 * ndtr(-SURE)))
     return sure and one.effect.possible_in(found.problem.cases[0], one.theta)
@@ -165,8 +164,8 @@ def _without(found: Model, index: int) -> Model:
     return settle(found, (*found.named[:index], *found.named[index + 1 :]))
 
 
-def more_probable(found: Model, other: Model) -> float:
-    """Return the log Bayes factor of the causes named in one model against those named in another."""
+def log_bayes_factor_between(found: Model, other: Model) -> float:
+    """Return the log Bayes factor of the causes named in ``found`` against those named in ``other``."""
     return found.log_likelihood - _penalty(found) - other.log_likelihood + _penalty(other)
 
 
@@ -175,42 +174,41 @@ def _price(one: Round) -> float:
     return one.suspects[0].log_bayes_factor - one.suspects[0].score
 
 
-def suspicious(ranking: Round, tolerances: Tolerances) -> bool:
+def passes_threshold(ranking: Round, tolerances: Tolerances) -> bool:
     """Return whether the most probable cause passes the threshold."""
     return bool(ranking.suspects) and ranking.suspects[0].score >= tolerances.threshold
 
 
-def rebuilt(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model and all causes with columns predicted by the parameters that ``found`` believes in, its named
-    causes settled again.
+def rebuild_model(found: Model, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model and all causes with columns predicted from the posterior mean of ``found``, its named causes
+    fitted again.
 
-    A load and a delay together show in the delay's columns only once the load is predicted, if only by a segment that
-    is too heavy.
+    For example, a load and a delay together show in the columns of the delay only once the load is predicted.
     """
-    fresh, causes = built(found.problem.with_parameters(found.phi), tolerances, chosen)
+    fresh, causes = build_model(found.problem.with_parameters(found.phi), tolerances, chosen)
     return settle(fresh, found.named), causes
 
 
 def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
-    """Return all causes to look for, and those that are not but keep their tolerance."""
+    """Return all causes to search for, and those that are not searched for but keep their tolerance."""
     family = effects(chosen)
     return candidates(
         problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
     )
 
 
-def built(
+def build_model(
     problem: Problem,
     tolerances: Tolerances,
     chosen: Chosen[Effect],
     every: tuple[Candidate, ...] | None = None,
 ) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model without any name and the causes to look for; what is not looked for keeps its tolerance."""
+    """Return the model without named causes, and the causes to search for; all others keep their tolerances."""
     family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)
 
 
-def named_of(one: NamedCause) -> tuple[str, str]:
+def cause_key(one: NamedCause) -> tuple[str, str]:
     """Return effect and target of a named cause."""
     return one.effect.name, one.effect.target
 
@@ -223,7 +221,7 @@ def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
     while True:
         tried = {one.names for one, _ in refined}
         rest = Round(tuple(one for one in rest.suspects if one.names not in tried))
-        if any(np.isfinite(one.score) for one, _ in refined) or not suspicious(rest, found.tolerances):
+        if any(np.isfinite(one.score) for one, _ in refined) or not passes_threshold(rest, found.tolerances):
             break
         refined += [_refined(found, one) for one in _near(found, rest)]
     refined.sort(key=lambda pair: -pair[0].score)
@@ -237,7 +235,7 @@ def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model
     settled = settle(found, (*found.named, NamedCause(one.effect, one.start, np.empty((0, 0)))))
     last = settled.named[-1]
     possible = last.effect.possible_in(found.problem.cases[0], last.theta)
-    bayes = more_probable(settled, found) if possible else -np.inf
+    bayes = log_bayes_factor_between(settled, found) if possible else -np.inf
     return replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled
 
 
@@ -253,16 +251,16 @@ def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:
     """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton
     steps.
     """
-    current = found if named is found.named else found.less(named)
+    current = found if named is found.named else found.without_causes(named)
     for _ in range(_STEPS):
         if not named:
             return current
-        s, G = current.pull
+        s, G = current.named_score
         u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
         inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
         step = inner @ (s - u)
         named = _moved(named, u + step, inner)
-        current = current.less(named)
+        current = current.without_causes(named)
         if np.abs(step).max() < 1e-3:
             break
     return current
@@ -285,6 +283,6 @@ def _penalty(found: Model) -> float:
     """
     if not found.named:
         return 0.0
-    _, G = found.pull
+    _, G = found.named_score
     u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in found.named])
     return 0.5 * float(u @ u) + 0.5 * float(np.linalg.slogdet(np.eye(len(u)) + G)[1])

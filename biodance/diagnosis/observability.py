@@ -16,7 +16,7 @@ from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, changes
 from biodance.diagnosis.consequence import least, unit_at
 from biodance.diagnosis.diagnosis import Unobservable
-from biodance.diagnosis.evidence import smallest
+from biodance.diagnosis.evidence import smallest_detectable
 from biodance.diagnosis.model import Model
 from biodance.diagnosis.naming import TOGETHER
 from biodance.motion.ik.functional_joints import fixed_point
@@ -48,7 +48,7 @@ class Visibility:
         ``threshold``; each of several forces or masses at once in the same size: the worst of them.
         """
         one, cut = self.causes[index], self.cuts[index]
-        size = max(smallest(self.G[cut, cut], way, threshold) for way in unit_directions(one))
+        size = max(smallest_detectable(self.G[cut, cut], way, threshold) for way in unit_directions(one))
         if self.found is None or one.effect.linear or any(one.silent):
             return size
         return _really_seen(self.found, one, size, threshold)
@@ -118,7 +118,7 @@ def _really_seen(found: Model, one: Candidate, size: float, threshold: float) ->
     the ``size`` from which it would if it were; infinite beyond `_SEARCHED` times that.
     """
     Z, first = found.white(one.basis.astype(float)), np.eye(len(one.silent))[0]
-    free = found.belief.free(Z)
+    free = found.posterior.free(Z)
     G = Z.T @ free
     inner = np.linalg.inv(np.eye(len(G)) + G)
     chance = 0.5 * float(np.trace(inner @ G) - np.linalg.slogdet(np.eye(len(G)) + G)[1])
@@ -141,7 +141,7 @@ def unit_directions(one: Candidate) -> list[Array]:
 def visibility(found: Model, causes: tuple[Candidate, ...]) -> Visibility:
     """Return what ``found``, a model without named causes, lets every cause show."""
     Z, cuts = bases_of(causes)
-    _, G = found.belief.score(found.white(Z, out=Z))
+    _, G = found.posterior.score(found.white(Z, out=Z))
     return Visibility(causes, G, cuts, found)
 
 
@@ -188,7 +188,7 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
         limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
         first = one.effect.parameters[one.silent.index(False)]
         limit = max(limit, least(one.effect).get(first.name, 0.0), here.felt(i))
-        sizes = [one.effect.size_told(size) for size in (limit, max(limit, here.told(i)), first.typical)]
+        sizes = [one.effect.reported_size(size) for size in (limit, max(limit, here.told(i)), first.typical)]
         rows.append(Unobservable(*one.names, sizes[0], unit_at(one.effect, first.unit), *sizes[1:]))
     return tuple(rows)
 

@@ -206,7 +206,7 @@ def sizes_shown(cases: tuple[Case, ...], causes: Mapping[str, Effect]) -> dict[t
     """
     found = {}
     for name, kind in causes.items():
-        for one in kind.everywhere(cases[0]) if type(kind).shown is not Effect.shown else ():
+        for one in kind.at_all_targets(cases[0]) if type(kind).shown is not Effect.shown else ():
             size = one.shown(*cases)
             found[name, one.target] = 0.0 if size is None else float(size[0])
     return found

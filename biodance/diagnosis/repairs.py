@@ -74,7 +74,7 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
     own = replace(effect, target=error.spared)
     shift = own.measured(np.zeros(3), *cases)
     alike = max(known.size(f"shown {own.name}"), known.size(key_of(own.name, error.spared)))
-    sd = np.hypot(alike, known.unlike(own.name) * np.linalg.norm(shift))
+    sd = np.hypot(alike, known.model_error(own.name) * np.linalg.norm(shift))
     if matters(own, shift) and np.linalg.norm(shift) >= _EXPLAINS * error.moved:
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
 

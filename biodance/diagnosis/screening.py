@@ -55,8 +55,8 @@ def _scored(found: Model, causes: tuple[Candidate, ...]) -> Iterator[Evidence]:
     """Yield the evidence of some causes near none, beside those that were named."""
     Z, cuts = bases_of(causes)
     Z = found.white(Z, out=Z)
-    s = Z.T @ found.belief.left
-    half = found.belief.half(found.belief.X.T @ Z)
+    s = Z.T @ found.posterior.residual
+    half = found.posterior.half(found.posterior.X.T @ Z)
     lost = absorbed(found, Z, half)
     for cut in cuts:
         own, hides = Z[:, cut], np.concatenate([half[:, cut], lost[:, cut]])
@@ -69,7 +69,7 @@ def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:
     """
     out = []
     for share in effect.screened_at:
-        s, G = found.belief.score(found.white(removed(found.problem, effect, share * effect.typical)[:, None]))
+        s, G = found.posterior.score(found.white(removed(found.problem, effect, share * effect.typical)[:, None]))
         u = share / SCALE
         out.append((float(s[0] - 0.5 * G[0, 0] - 0.5 * u**2 - 0.5 * np.log1p(G[0, 0] / u**2)), share * effect.typical))
     return out
@@ -79,6 +79,6 @@ def absorbed(found: Model, Z: Array, half: Array) -> Array:
     """Return H (n, k): H' H is what of the information of whitened columns ``Z`` (r, k), whose `Belief.half` is
     ``half``, the sizes of the n parameters of the named causes may still absorb.
     """
-    own = found.belief.half(found.belief.X.T @ found.taken)
-    _, G = found.pull
-    return np.linalg.solve(np.linalg.cholesky(np.eye(len(G)) + G), found.taken.T @ Z - own.T @ half)
+    own = found.posterior.half(found.posterior.X.T @ found.named_columns)
+    _, G = found.named_score
+    return np.linalg.solve(np.linalg.cholesky(np.eye(len(G)) + G), found.named_columns.T @ Z - own.T @ half)

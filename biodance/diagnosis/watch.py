@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.identification.streaming import RunningBelief
+from biodance.identification.recursive import RecursivePosterior
 from biodance.records import CHANNELS, Array, Plate
 from biodance.spatial import wrench_about_point
 
@@ -102,7 +102,7 @@ class WrenchWatch:
     now: deque[tuple[Array, Array]] = field(default_factory=deque)
     wrong: bool = False
 
-    def look(self, W: Array, wrench: Array, belief: RunningBelief) -> tuple[Array, Array] | None:
+    def look(self, W: Array, wrench: Array, posterior: RecursivePosterior) -> tuple[Array, Array] | None:
         """Return the jump (6,) N, N·m of the last second against the time before, and its size in standard deviations
         (6,); None where there is none or too little to tell.
 
@@ -118,20 +118,20 @@ class WrenchWatch:
             return None
         W0, then = (np.array(part) for part in zip(*self.before, strict=True))
         W1, late = (np.array(part) for part in zip(*self.now, strict=True))
-        usual, latest = then - W0 @ belief.mean, late - W1 @ belief.mean
+        usual, latest = then - W0 @ posterior.mean, late - W1 @ posterior.mean
         jump = latest.mean(axis=0) - usual.mean(axis=0)
-        _, unknown = belief.expected(W1.mean(axis=0) - W0.mean(axis=0))
+        _, unknown = posterior.expected(W1.mean(axis=0) - W0.mean(axis=0))
         sd = np.sqrt(_slow_variance(usual) + unknown + (_SMALLEST_JUMP * self.weight / SIGMAS_OF_A_JUMP) ** 2)
         size = np.abs(jump) / sd
         self.wrong = bool((size > SIGMAS_OF_A_JUMP).any())
         return (jump, size) if self.wrong else None
 
-    def noise(self, belief: RunningBelief) -> Array:
+    def noise(self, posterior: RecursivePosterior) -> Array:
         """Return (6,) the variance of what the body leaves of late; generous before there is enough."""
         if len(self.before) < _LEAST:
             return np.full(6, (0.03 * self.weight) ** 2)
         W, wrench = (np.array(part) for part in zip(*self.before, strict=True))
-        return np.asarray((wrench - W @ belief.mean).var(axis=0)) + (_SMALLEST_JUMP * self.weight / 2) ** 2
+        return np.asarray((wrench - W @ posterior.mean).var(axis=0)) + (_SMALLEST_JUMP * self.weight / 2) ** 2
 
 
 def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array, size: Array) -> LiveWarning:

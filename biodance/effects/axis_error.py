@@ -9,7 +9,7 @@ the plate forwards and to the left.
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled_files
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_point
 
@@ -45,7 +45,7 @@ class AxisError(DiscreteEffect):
         """Return what the reader overruled, and the channels that mirror what the motion needs."""
         names = list(dict.fromkeys(plate.name for case in recorded.cases for plate in case.trial.plates))
         signs = (gate for name in names for gate in cls._signs(recorded.cases, name))
-        return (*overruled(recorded.session, _WORDS, check="axes of the plates", effect=cls.name), *signs)
+        return (*overruled_files(recorded.session, _WORDS, check="axes of the plates", effect=cls.name), *signs)
 
     @classmethod
     def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[Gate, ...]:

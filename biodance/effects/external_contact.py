@@ -71,7 +71,7 @@ class ExternalContact(Effect):
         x, y, z = map(float, place)
         return replace(self, place=(x, y, z))
 
-    def finer(self) -> "ExternalContact":
+    def at_full_rate(self) -> "ExternalContact":
         """Return the contact with a value of its course every `_FINE` s."""
         return replace(self, step=_FINE)
 

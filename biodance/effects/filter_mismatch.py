@@ -43,7 +43,7 @@ class FilterMismatch(Effect):
         cutoff = inverse**-0.25
         return (("cutoff", cutoff, 0.25 * cutoff / inverse * STRENGTH * float(sd[0]), "Hz"),)
 
-    def size_told(self, size: float) -> float:
+    def reported_size(self, size: float) -> float:
         """Return by how many hertz the cut-off lies under the reference; all of it for an infinite ``size``."""
         return REFERENCE - float(1 / REFERENCE**4 + STRENGTH * size) ** -0.25
 

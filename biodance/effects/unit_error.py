@@ -7,7 +7,7 @@ but by no fixed factor. Separated by the scale's weight and by the size of the p
 
 import numpy as np
 
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled
+from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled_files
 from biodance.records import Trial
 from biodance.settings import STANDARD_GRAVITY
 
@@ -45,7 +45,7 @@ class UnitError(DiscreteEffect):
     @classmethod
     def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
         """Return what the reader overruled, and whether the plates carry the person's weight up to a factor."""
-        return (*overruled(recorded.session, _WORDS, check="units", effect=cls.name), *cls._weight(recorded))
+        return (*overruled_files(recorded.session, _WORDS, check="units", effect=cls.name), *cls._weight(recorded))
 
     @classmethod
     def _weight(cls, recorded: Recorded) -> tuple[Gate, ...]:

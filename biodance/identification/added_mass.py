@@ -4,8 +4,8 @@ the table.
 The hypotheses are "no load" and "m kg on segment s" (`load_posterior`), under one linear Gaussian model: the body as
 known before (the posterior of the reference session, or the table) plus the load. What was known before may be wrong by
 more than its standard deviations say (another laboratory's people, a table that cuts the trunk elsewhere), and without
-a reference the declared mass may be wrong or hold the load: these rival explanations (`rivals`) are weighed by their
-evidence together with the load, so that a load is announced only where an odd body cannot do as well.
+a reference the declared mass may be wrong or include the load: these hypotheses (`unloaded_bodies`) are weighted by
+their evidence together with the load, so that a load is announced only where an odd body cannot do as well.
 """
 
 from bisect import bisect_left
@@ -19,7 +19,13 @@ from biodance.identification.identification import Identification
 from biodance.identification.information import Information
 from biodance.identification.load_posterior import MASSES, LoadPosterior, LoadView, log_mass_prior
 from biodance.identification.loads import unit_load
-from biodance.identification.rival_bodies import Rival, expect_unloaded, rivals, surprised, tables_by_sides
+from biodance.identification.unloaded_body import (
+    UnloadedBody,
+    expect_unloaded,
+    tables_by_sides,
+    unloaded_bodies,
+    whiten_innovation,
+)
 from biodance.records import Array
 from biodance.threads import one_thread
 
@@ -134,7 +140,9 @@ def added_mass(
     tables = tables_by_sides(session) if reference is None else ((expect_unloaded(reference, session), 0.0),)
     segments = tables[0][0].segments
     units = tuple(unit_load(session.body, i) for i in range(len(segments)))
-    bodies = tuple(_Judged.of(session.data, units, one) for one in rivals(tables, weighed=reference is not None))
+    bodies = tuple(
+        _Judged.of(session.data, units, one) for one in unloaded_bodies(tables, weighed=reference is not None)
+    )
     none = np.array([one.log_none for one in bodies])
     load = np.array([one.log_none + one.log_ratio for one in bodies]) + log_mass_prior(MASSES) - np.log(len(units))
     total = logsumexp(np.append(load.ravel(), none))
@@ -157,9 +165,9 @@ class _Judged:
     log_ratio: Array
 
     @classmethod
-    def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], rival: Rival) -> "_Judged":
+    def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], rival: UnloadedBody) -> "_Judged":
         before = rival.before
-        rows, surprise, evidence = surprised(data, before)
+        rows, surprise, evidence = whiten_innovation(data, before)
         less = float(rival.holds) * rows @ before.phi / before.mass.sum()
         columns = (rows[:, 10 * i : 10 * i + 10] for i in range(len(units)))
         views = tuple(LoadView.of(part, surprise, unit, less) for part, unit in zip(columns, units, strict=True))

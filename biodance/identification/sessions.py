@@ -14,7 +14,7 @@ from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment
 from biodance.identification.loads import may_carry
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import Posterior, posterior
-from biodance.identification.rival_bodies import table_like, weighing
+from biodance.identification.unloaded_body import scaled_to_mass, table_like
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 
@@ -73,7 +73,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
             "The two sessions have different segments and cannot be compared. Use the same kind of body in both."
         )
     mass = float(earlier.belief.prior.mass.sum())
-    tables = (weighing(table_like(one, earlier), mass) for one in (earlier, later))
+    tables = (scaled_to_mass(table_like(one, earlier), mass) for one in (earlier, later))
     first, second = (_with_room(*three) for three in zip(tables, (earlier, later), (later, earlier), strict=True))
     mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T

@@ -5,11 +5,11 @@ or outside its limit, strongest first. Page, terminal and JSON show the same rec
 from collections.abc import Sequence
 from dataclasses import replace
 
-from biodance.diagnosis.adequacy import LIMIT, alarming
+from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
-from biodance.diagnosis.heard import Testimony
 from biodance.diagnosis.spectrum import SHORTEST_RUN
+from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or_else
 from biodance.pipeline.judged_trials import TOO_SHORT
@@ -220,11 +220,11 @@ def _heard(one: Diagnosis) -> str:
     return f" Plates and clocks, judged alone, look right in {trials} trial{'s' * (trials > 1)}." if trials else ""
 
 
-def stepped(rows: tuple[Judged, ...], heard: Testimony | None) -> tuple[Judged, ...]:
+def stepped(rows: tuple[Judged, ...], evidence: WitnessEvidence | None) -> tuple[Judged, ...]:
     """Return what a verdict rests on with the steps that only the witnesses could judge: seconds of one foot alone on
     a plate. Such a trial still misses the comparison with a body.
     """
-    alone = heard.seconds if heard else {}
+    alone = evidence.seconds if evidence else {}
     return tuple(
         replace(row, seconds=alone[row.trial], why_not=f"only by its steps: {row.why_not}")
         if row.missed and alone.get(row.trial, 0.0) > 0
@@ -243,17 +243,17 @@ def _only_strange(one: Diagnosis) -> bool:
     """Return whether a strange body alone speaks against "nothing wrong": how unlike the table people are was learned
     from few laboratories, and clean people of another one are beyond it.
     """
-    return STRANGE in one.notes and UNASKED not in one.notes and alarming(one.adequacy) <= LIMIT
+    return STRANGE in one.notes and UNASKED not in one.notes and largest_z(one.adequacy) <= LIMIT
 
 
 def _where(one: Diagnosis) -> str:
     """Return where what is left is largest, with its size."""
     rows = [row for row in one.adequacy if row.matters and row.z > LIMIT] or list(one.adequacy)
-    if STRANGE in one.notes and alarming(one.adequacy) <= LIMIT:
+    if STRANGE in one.notes and largest_z(one.adequacy) <= LIMIT:
         return f"w{STRANGE[1:-1]}"
-    if UNASKED in one.notes and alarming(one.adequacy) <= LIMIT:
+    if UNASKED in one.notes and largest_z(one.adequacy) <= LIMIT:
         return "what the plates measured fits only if something that is small elsewhere is many times as large here"
-    if SEVERAL in one.notes and alarming(one.adequacy) <= LIMIT:
+    if SEVERAL in one.notes and largest_z(one.adequacy) <= LIMIT:
         return "what the plates measured fits only several cross-talks at once, as of a plate that lies elsewhere"
     if not rows:
         return "what is left is unlike sessions without fault"
@@ -266,7 +266,7 @@ def _where(one: Diagnosis) -> str:
 
 def _incomplete(one: Diagnosis, rests_on: str) -> str:
     """Return what is more to say of a diagnosis that is not complete."""
-    if STRANGE in one.notes or alarming(one.adequacy) > LIMIT:
+    if STRANGE in one.notes or largest_z(one.adequacy) > LIMIT:
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
     return (
         f"Apart from that, {rests_on} look like a session without fault."

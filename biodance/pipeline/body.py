@@ -13,7 +13,7 @@ from biodance.body.human.human import human
 from biodance.body.human.limits import with_tracking_limits
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.identification.rival_bodies import weighing
+from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.markers.sets import read_marker_set
 from biodance.motion.ik.functional_joints import functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
@@ -132,7 +132,7 @@ def starting_from(known: Body, body: Body, mass: float, source: str) -> tuple[Bo
             f"The body that was given weighs {before:.1f} kg, {mass:.1f} kg are declared here: it is of another "
             f"person. Give the same person's body.json."
         )
-    prior = in_other_frames(weighing(known.sip, mass), body.joint_errors)
+    prior = in_other_frames(scaled_to_mass(known.sip, mass), body.joint_errors)
     words = (
         f"Its masses and inertias are those of an earlier session ({before:.1f} kg there, {mass:.1f} kg here), which "
     )

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals
+from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
-from biodance.diagnosis.heard import hear
-from biodance.diagnosis.joined import with_witnesses
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
-from biodance.diagnosis.testimony import weigh
+from biodance.diagnosis.witness_evidence import collect_evidence
+from biodance.diagnosis.witness_inference import infer_causes
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
-from biodance.identification.rival_bodies import expect_unloaded
+from biodance.identification.unloaded_body import expect_unloaded
 from biodance.pipeline.attention import told
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
@@ -132,8 +132,8 @@ def diagnose_session(
     """
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
-    heard = hear(result.session, effects, (tolerances or shipped()).norms)
-    whole = with_witnesses(found.diagnosis, weigh(heard), heard, judged=found.examined is not None)
+    evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
+    whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=found.examined is not None)
     if found.examined:
         whole = with_repairs(whole, found.examined.naming.found.problem.cases, tolerances or shipped(), effects)
     if mended:
@@ -197,7 +197,9 @@ def _diagnosed(
         examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes
     )
     if failed:
-        return SessionDiagnosis(by_checks(checks, examined.diagnosis, suspicious=bool(examined.suspicious)), examined)
+        return SessionDiagnosis(
+            by_checks(checks, examined.diagnosis, suspicious=bool(examined.passes_threshold)), examined
+        )
     if not own.believed:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)

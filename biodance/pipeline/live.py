@@ -17,8 +17,8 @@ from biodance.diagnosis.watch import LiveWarning
 from biodance.errors import TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import Knowability
+from biodance.identification.recursive import RecursivePosterior, initial_posterior, summed_pressure
 from biodance.identification.statistics import Fit, believable
-from biodance.identification.streaming import RunningBelief, belief_before, summed_pressure
 from biodance.lab.filters import force_filter, motion_filter
 from biodance.lab.prepare import at_marker_times
 from biodance.motion.contact.contact import Contact, contact_with_plates, feet_on_ground
@@ -36,7 +36,7 @@ _WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
 _RECENT = 0.25
 """s of markers that are judged at once."""
 _SLOW = 10.0
-"""Samples of the running belief count as if only so many-th of them were independent: errors last about a second."""
+"""Samples of the running posterior count as if only so many-th of them were independent: errors last about a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ class LiveSession:
         self._done = 0
         self._taken: list[Fit] = []
         self._pressure = np.zeros(4)
-        self.belief: RunningBelief = belief_before(widened(body.sip))
+        self.posterior: RecursivePosterior = initial_posterior(widened(body.sip))
         self._weight = -float(body.gravity[2] * body.sip.mass.sum())
         self._watch = StreamWatch(trial, self._follower, weight=self._weight)
         self._warm_up()
@@ -158,7 +158,7 @@ class LiveSession:
 
     def state(self) -> LiveState:
         """Return what is known, suspect and to be done now."""
-        verdicts = dict(self.belief.verdicts())
+        verdicts = dict(self.posterior.verdicts())
         return LiveState(self._now, verdicts, self._watch.suspect, self._advice(verdicts))
 
     def finish(self, frame_s: Array, wall_s: Array) -> LiveResult:
@@ -235,7 +235,7 @@ class LiveSession:
         use = self._believed(part, wrench, measured)
         if use.any():
             point, seen = self._standing_point, (W[use], wrench.value[use])
-            self._watch.look_at_wrench(self._now, *seen, self.belief, point=point, step=self._hop)
+            self._watch.look_at_wrench(self._now, *seen, self.posterior, point=point, step=self._hop)
         yield
         self._learn(Fit("stream", part, wrench, use & (not self._watch.suspect), self.trial.settings.outlier), W)
 
@@ -243,8 +243,8 @@ class LiveSession:
         """Let the used frames of a window tell of the body; ``W`` (T, 6, p) is their regressor."""
         if fit.use.any():
             last = int(np.flatnonzero(fit.use)[-1])
-            variance = _SLOW * self._watch.noise(self.belief)
-            self.belief = self.belief.updated(W[last], fit.wrench.value[last], variance)
+            variance = _SLOW * self._watch.noise(self.posterior)
+            self.posterior = self.posterior.updated(W[last], fit.wrench.value[last], variance)
         self._pressure = self._pressure + summed_pressure(fit)
         self._taken.append(fit)
 
@@ -259,8 +259,10 @@ class LiveSession:
     def _advice(self, verdicts: Mapping[str, Knowability]) -> str:
         if self._watch.suspect:
             return "Mend what is suspect first: frames do not count until then."
-        rows = np.diag(self.belief.covariance)[::10] / np.maximum(np.diag(self.belief.prior.covariance)[::10], 1e-12)
-        names = self.belief.prior.segments
+        rows = np.diag(self.posterior.covariance)[::10] / np.maximum(
+            np.diag(self.posterior.prior.covariance)[::10], 1e-12
+        )
+        names = self.posterior.prior.segments
         standing = {names[foot.segment] for foot in self.body.feet.values()}
         open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known" and names[i] not in standing]
         if not open_:

@@ -14,7 +14,7 @@ from biodance.diagnosis.watch import (
     said_of_markers,
     silent_plates,
 )
-from biodance.identification.streaming import RunningBelief
+from biodance.identification.recursive import RecursivePosterior
 from biodance.motion.ik.follow import Follower
 from biodance.records import Array, Plate, Trial
 from biodance.spatial import wrench_about_point
@@ -90,9 +90,9 @@ class StreamWatch:
             self._warn(key, said)
 
     def look_at_wrench(
-        self, now: float, W: Array, wrench: Array, belief: RunningBelief, *, point: Array, step: int
+        self, now: float, W: Array, wrench: Array, posterior: RecursivePosterior, *, point: Array, step: int
     ) -> None:
-        """Look for a jump of the measured ``wrench`` (T, 6) against what the ``belief`` expects from the regressor
+        """Look for a jump of the measured ``wrench`` (T, 6) against what the ``posterior`` expects from the regressor
         ``W`` (T, 6, p), ``step`` frames at once, about the first standing ``point`` (3,) m that was given.
         """
         if any(key != "wrench" for key in self._suspect):
@@ -102,15 +102,15 @@ class StreamWatch:
         moved, found = wrench_about_point(wrench, self._point), None
         for first in range(0, len(W), step):
             cut = slice(first, first + step)
-            found = self._wrench.look(turned[cut], moved[cut], belief)
+            found = self._wrench.look(turned[cut], moved[cut], posterior)
         if found is None:
             self._suspect.pop("wrench", None)
         elif "wrench" not in self._suspect:
             self._warn("wrench", said_of_jump(now, self.trial.plates, self._point, *found))
 
-    def noise(self, belief: RunningBelief) -> Array:
-        """Return the variance (6,) of the wrench about the ``belief``, as seen so far."""
-        return self._wrench.noise(belief)
+    def noise(self, posterior: RecursivePosterior) -> Array:
+        """Return the variance (6,) of the wrench about the ``posterior``, as seen so far."""
+        return self._wrench.noise(posterior)
 
     def _warn(self, key: str, said: LiveWarning) -> None:
         known = {(w.effect, w.target) for w in self.warnings}

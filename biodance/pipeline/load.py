@@ -5,7 +5,7 @@ and the diagnosis names that load, not a second one.
 from dataclasses import replace
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
-from biodance.diagnosis.testimony import SOMEWHERE
+from biodance.diagnosis.witness_inference import UNPLACED_LOAD
 from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.checks import load_doubts
@@ -29,7 +29,7 @@ def with_weighed_load(result: SessionResult, diagnosis: Diagnosis) -> SessionRes
 def with_load(one: Diagnosis, search: LoadSearch | None) -> Diagnosis:
     """Return the diagnosis with the load that was found (`LoadSearch`) in place of its own, before a cause that cannot
     be told from it, as an alternative to one of the same weight, or beside what has another reason; where only its
-    weight was named (`SOMEWHERE`), on the segments that may carry it, as soon as it is more probable than none.
+    weight was named (`UNPLACED_LOAD`), on the segments that may carry it, as soon as it is more probable than none.
     """
     if search is None:
         return one
@@ -66,7 +66,7 @@ def _placed(finding: Finding, search: LoadSearch) -> Finding:
     load first where it was found, or likely where only the weight was named: the search has compared it with a wrong
     declared mass, or with the reference, in every posture.
     """
-    weight_only = any((alias.effect, alias.target) == SOMEWHERE for alias in finding.set)
+    weight_only = any((alias.effect, alias.target) == UNPLACED_LOAD for alias in finding.set)
     if not (search.found or weight_only):
         return finding
     bayes = next(alias.log_bayes_factor for alias in finding.set if alias.effect == LOAD)

@@ -178,11 +178,11 @@ def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) ->
     found = model(put, candidates(put), known)
     rows = put.spectrum.rows((_columns(put.cases[0], about),)).reshape(-1, 4)
     rows = np.concatenate([rows, np.zeros((len(put.target) - len(rows), 4))])
-    vector, information = found.belief.score(found.white(rows))
+    vector, information = found.posterior.score(found.white(rows))
     return PoseEvidence(
         information + np.diag(_UNKNOWN**-2.0),
         -vector,
-        float(found.belief.left @ found.belief.left) / len(found.belief.y),
+        float(found.posterior.residual @ found.posterior.residual) / len(found.posterior.y),
         put.wrench_rows,
     )
 

@@ -111,7 +111,7 @@ class Tolerances:
         """Return what is expected of ``key`` in a session without fault; 0 where nothing was learned."""
         return self.means.get(key, 0.0)
 
-    def unlike(self, effect: str) -> float:
+    def model_error(self, effect: str) -> float:
         """Return the share of its size by which ``effect`` errs beyond noise; of one never measured that of "other"
         ones.
         """

@@ -74,7 +74,7 @@ class Effect:
             raise UnknownName.of(f"target of {self.name}", target, legal)
         return replace(self, target=target)
 
-    def everywhere(self, case: Case) -> tuple["Effect", ...]:
+    def at_all_targets(self, case: Case) -> tuple["Effect", ...]:
         """Return the effect at every legal target in ``case``."""
         return tuple(replace(self, target=target) for target in self.targets(case))
 
@@ -122,8 +122,8 @@ class Effect:
         """
         return None
 
-    def finer(self) -> "Effect":
-        """Return the cause with a course (`local`) as fine as it may be."""
+    def at_full_rate(self) -> "Effect":
+        """Return the cause with the finest allowed time course (`local`)."""
         return self
 
     def marker_columns(self, case: Case) -> Array | None:
@@ -182,8 +182,8 @@ class Effect:
         """
         return np.zeros(len(self.parameters))
 
-    def size_told(self, size: float) -> float:
-        """Return what a limit says for a ``size`` of the first parameter: by default the same."""
+    def reported_size(self, size: float) -> float:
+        """Return a detection limit in reported form, from a ``size`` of the first parameter; by default the same."""
         return size
 
     def plate_of(self, case: Case):  # type: ignore[no-untyped-def]

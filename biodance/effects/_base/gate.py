@@ -65,7 +65,7 @@ Found = tuple[str, str, str]
 """Target, the sentence, and the number in it ("" for none)."""
 
 
-def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
+def reader_decisions(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
     """Return each different decision of a session once: ``patterns`` are regular expressions by what they speak of
     (``corners``); a group in the expression is the number. The target is the plate's name and what, or only what.
     """
@@ -83,13 +83,13 @@ def decided(session: Session, patterns: dict[str, str]) -> tuple[Found, ...]:
     return tuple(found.values())
 
 
-def overruled(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
+def overruled_files(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
     """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect``
     as its cause.
     """
     return tuple(
         Gate(check, False, sentence, effect, target, float(number) if number else float("nan"))
-        for target, sentence, number in decided(session, patterns)
+        for target, sentence, number in reader_decisions(session, patterns)
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.diagnosis import Estimate, Finding, Gain
 from biodance.diagnosis.foresight import TOLD, Foresight
-from biodance.diagnosis.heard import Testimony, sights
+from biodance.diagnosis.witness_evidence import WitnessEvidence, cause_visibilities
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.records.attention import Attention, Judged
@@ -134,19 +134,19 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
     }
 
 
-def _witnesses(heard: Testimony | None) -> list[dict[str, Any]]:
+def _witnesses(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
     """Return every observation; ``cause`` is the one that it sees best, "" where it is blind to all."""
     return [
-        {"witness": o.witness, "cause": " ".join(filter(None, heard.strongest(i))), **keyed(o, _OBSERVED)}
-        for i, o in enumerate(heard.observations if heard else ())
-        if heard
+        {"witness": o.witness, "cause": " ".join(filter(None, evidence.strongest(i))), **keyed(o, _OBSERVED)}
+        for i, o in enumerate(evidence.observations if evidence else ())
+        if evidence
     ]
 
 
-def _sights(heard: Testimony | None) -> list[dict[str, Any]]:
+def _sights(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
     """Return how well each cause was seen; an ``sd`` of null: every witness was blind to it."""
     return [
         keyed(one, "effect target sd unit witnesses")
         | {"alike": [f"{effect} {target}".strip() for effect, target in one.alike], "would_be_seen_by": one.would}
-        for one in (sights(heard) if heard else ())
+        for one in (cause_visibilities(evidence) if evidence else ())
     ]

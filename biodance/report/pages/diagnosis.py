@@ -13,7 +13,7 @@ from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Unobservable
-from biodance.diagnosis.heard import Testimony, sights
+from biodance.diagnosis.witness_evidence import WitnessEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY
 from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -219,11 +219,11 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     )
 
 
-def _witnesses(heard: Testimony | None) -> dict[str, Any] | None:
+def _witnesses(evidence: WitnessEvidence | None) -> dict[str, Any] | None:
     """Return the table causes x witnesses with its blind rows in words, and all observations; None without any."""
-    if heard is None:
+    if evidence is None:
         return None
-    rows = sights(heard)
+    rows = cause_visibilities(evidence)
     blind: dict[str, list[str]] = {}
     for row in rows:
         if not row.witnesses:
@@ -232,5 +232,5 @@ def _witnesses(heard: Testimony | None) -> dict[str, Any] | None:
         "names": list(dict.fromkeys(name for row in rows for name in row.witnesses)),
         "seen": [row for row in rows if row.witnesses],
         "blind": [("; ".join(causes), would) for would, causes in blind.items()],
-        "observations": sorted(heard.observations, key=lambda one: -abs(one.z)),
+        "observations": sorted(evidence.observations, key=lambda one: -abs(one.z)),
     }

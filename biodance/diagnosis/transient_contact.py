@@ -1,8 +1,8 @@
-"""Causes that come and go: a touch of the rail, a helper's hand. Looked for only where nothing steady explains the
+"""Transient external contacts, such as a touch of a rail or a helping hand; sought only if no steady cause explains the
 session.
 
-Each trial has its own course of the force in time, so there are hundreds of columns; three of the six channels stay
-free, which is why such a force does not explain just anything.
+Each trial has its own time course of the force, hence hundreds of columns. Three of the six channels remain
+unconstrained by it, so that such a force cannot explain everything.
 """
 
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
 
-from biodance.diagnosis.adequacy import LIMIT, adequacy, alarming
+from biodance.diagnosis.adequacy import LIMIT, adequacy, largest_z
 from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.candidates import local_basis
 from biodance.diagnosis.consequence import matters
-from biodance.diagnosis.evidence import Evidence, believe, evidence, visible
+from biodance.diagnosis.evidence import Evidence, evidence, linear_posterior, visible
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, more_probable, needed, stands
+from biodance.diagnosis.naming import Naming, Round, is_significant, log_bayes_factor_between, required_evidence
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
@@ -35,9 +35,9 @@ _STEPS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class _Passing:
-    """One cause that comes and goes: whitened unit columns ``white``, their ``score`` (k,) and ``information`` (k, k),
-    and its ``log_bayes_factor`` at the best ``size``; ``length`` of the columns (`Model.length`).
+class _TransientContact:
+    """One transient contact: whitened unit columns ``white``, their ``score`` (k,) and ``information`` (k, k), its
+    ``log_bayes_factor`` at the best ``size``, and the ``length`` of the columns (`Model.length`).
     """
 
     effect: Effect
@@ -56,23 +56,23 @@ class _Passing:
 
     @property
     def visible(self) -> float:
-        """Share of it that is left when all that is no fault may adapt."""
+        """Share of it that remains when all tolerances adapt."""
         return visible(self.information, self.length)
 
 
-def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
-    """Return the naming with a cause that comes and goes, if steady causes leave too much and it leaves less; else as
-    it is.
+def with_transient_contact(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
+    """Return the naming with a transient contact added if the steady causes leave too large a residual and the contact
+    leaves a smaller one; otherwise unchanged.
 
-    It is tried instead of what was named, if it is more probable than all of that, and beside it; what leaves less is
-    kept.
+    The contact is tried in place of the named causes, if it is more probable than all of them, and in addition to them;
+    the naming with the smallest residual is kept.
     """
-    if alarming(adequacy(naming.found)) <= LIMIT:
+    if largest_z(adequacy(naming.found)) <= LIMIT:
         return naming
-    best, steady = naming, more_probable(naming.found, naming.bare)
+    best, steady = naming, log_bayes_factor_between(naming.found, naming.bare)
     for base, accepted, than in ((naming.bare, (), steady), (naming.found, naming.accepted, 0.0)):
         tried = _with(naming, base, accepted, chosen, than=than)
-        if tried is not None and alarming(adequacy(tried.found)) < alarming(adequacy(best.found)):
+        if tried is not None and largest_z(adequacy(tried.found)) < largest_z(adequacy(best.found)):
             best = tried
         if not naming.found.named:
             break
@@ -82,36 +82,38 @@ def with_passing(naming: Naming, chosen: Chosen[Effect] = None) -> Naming:
 def _with(
     naming: Naming, base: Model, accepted: tuple[Round, ...], chosen: Chosen[Effect], *, than: float
 ) -> Naming | None:
-    """Return the naming of ``base`` with the most probable cause that comes and goes; None without one above the
-    threshold, and above the log Bayes factor ``than`` of what it stands for.
+    """Return the naming of ``base`` with the most probable transient contact; None if its evidence is below the
+    threshold or below the log Bayes factor ``than`` of the causes it replaces.
     """
-    kinds = [one for effect in effects(chosen).values() for one in effect.everywhere(base.problem.cases[0])]
+    kinds = [one for effect in effects(chosen).values() for one in effect.at_all_targets(base.problem.cases[0])]
     best, suspects = _screened(base, kinds)
     if best is None:
         return None
-    if suspects[0].score < max(base.tolerances.threshold, than, needed(base, best.visible)):
+    if suspects[0].score < max(base.tolerances.threshold, than, required_evidence(base, best.visible)):
         return None
     if not one_sided(best.found.mean.reshape(-1, len(best.effect.parameters))):
         return None
     effect, white = _placed(base, best)
     wide = white.scaled(SIZES[-1])  # widest: the most probable one would shrink short peaks
-    course = SIZES[-1] * _believed(base, wide, np.zeros(wide.width))
+    course = SIZES[-1] * _posterior_mean(base, wide, np.zeros(wide.width))
     touch = _named(base, effect, course, best)
-    if not (stands(base, touch) and matters(touch.effect, touch.theta)):
+    if not (is_significant(base, touch) and matters(touch.effect, touch.theta)):
         return None
-    belief = believe(np.concatenate([base.belief.X, wide.whole(base.belief.y.size)], axis=1), base.belief.y)
+    posterior = linear_posterior(
+        np.concatenate([base.posterior.X, wide.whole(base.posterior.y.size)], axis=1), base.posterior.y
+    )
     named = (*base.named, touch)
-    model = replace(base, belief=belief, named=named)
+    model = replace(base, posterior=posterior, named=named)
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
 
-def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_Passing | None, tuple[ScoredCandidate, ...]]:
-    """Return the most probable of all causes that come and go, None without one, and the evidence of all, most probable
-    first; the columns of the best one only are kept.
+def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_TransientContact | None, tuple[ScoredCandidate, ...]]:
+    """Return the most probable transient contact (None if there is none), and the evidence of all of them, most
+    probable first; columns are kept only for the best.
     """
     best, found = None, []
     for effect in kinds:
-        one = _passing(base, effect)
+        one = _best_size(base, effect)
         if one is not None:
             value = one.log_bayes_factor
             found.append(ScoredCandidate(effect, value, value, np.zeros(0), one.visible))
@@ -131,15 +133,15 @@ def one_sided(course: Array) -> bool:
     return bool(min(sides) <= OTHER_SIDE * sum(sides))
 
 
-def _passing(base: Model, effect: Effect) -> _Passing | None:
-    """Return a cause with its most probable size; None for one that does not come and go."""
+def _best_size(base: Model, effect: Effect) -> _TransientContact | None:
+    """Return a transient contact with its most probable size; None for effects that are not transient."""
     columns = local_basis(base.problem, effect)
     if columns is None:
         return None
     white = base.white_by_trial(columns)
-    s, G = white.against(base.belief.left), white.information(base.belief)
+    s, G = white.against(base.posterior.residual), white.information(base.posterior)
     value, size = max((_log_bayes_factor(s, G, size), size) for size in SIZES)
-    return _Passing(effect, white, s, G, size, value, sum(base.length(p.values, p.rows) for p in white.parts))
+    return _TransientContact(effect, white, s, G, size, value, sum(base.length(p.values, p.rows) for p in white.parts))
 
 
 def _log_bayes_factor(s: Array, G: Array, size: float) -> float:
@@ -149,37 +151,37 @@ def _log_bayes_factor(s: Array, G: Array, size: float) -> float:
     return float(0.5 * along @ along - np.sum(np.log(np.diag(factor))))
 
 
-def _placed(base: Model, one: _Passing) -> tuple[Effect, ByTrial]:
-    """Return the cause at the place of its segment where it explains most, with its whitened unit columns: a hand's
-    length off, the moment of a touch is several newton metres off. Gauss-Newton steps of the place and the course of
-    the force together.
+def _placed(base: Model, one: _TransientContact) -> tuple[Effect, ByTrial]:
+    """Return the contact at the point of its segment that explains most, with its whitened unit columns, by
+    Gauss-Newton steps of the point and the time course together. An error of a hand's length changes the moment by
+    several newton metres.
     """
     effect, white, place = one.effect, one.white, np.zeros(3)
     for _ in range(_STEPS):
         wide = white.scaled(SIZES[-1])
-        slopes = _slopes(base, effect, place, SIZES[-1] * _believed(base, wide, np.zeros(wide.width)))
+        slopes = _slopes(base, effect, place, SIZES[-1] * _posterior_mean(base, wide, np.zeros(wide.width)))
         if slopes is None:
             break
         here = np.append(np.zeros(wide.width), place / _BESIDE)
-        place = _BESIDE * _believed(base, wide.beside(_BESIDE * slopes), here)[-3:]
-        there = effect.finer().beside(place)
+        place = _BESIDE * _posterior_mean(base, wide.beside(_BESIDE * slopes), here)[-3:]
+        there = effect.at_full_rate().beside(place)
         columns = None if there is None else local_basis(base.problem, there)
         if there is not None and columns is not None:
             effect, white = there, base.white_by_trial(columns)
     return effect, white
 
 
-def _believed(base: Model, Z: ByTrial, there: Array) -> Array:
-    """Return the coefficients (k,) of further columns ``Z`` of unit standard deviation, whose part ``there`` (k,) the
-    target lacks: as `believe` with all columns would, from the score alone.
+def _posterior_mean(base: Model, Z: ByTrial, there: Array) -> Array:
+    """Return the posterior mean (k,) of the coefficients of further columns ``Z`` with unit normal priors, linearised
+    about ``there`` (k,): equal to `linear_posterior` with all columns, computed from the score alone.
     """
-    s, G = Z.against(base.belief.left), Z.information(base.belief)
+    s, G = Z.against(base.posterior.residual), Z.information(base.posterior)
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
 def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
-    """Return the whitened columns (r, 3) of what a metre of each axis of the ``place`` changes in a touch of
-    ``course`` (k,): the wrench of a force is linear in its place; None for a cause that acts at no point.
+    """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) with respect to its ``place``, per metre
+    and axis (the wrench is linear in it); None for a cause without a point of action.
     """
     spots = [effect.beside(place + step) for step in np.eye(4, 3, -1)]
     here, *there = (_touch(base, spot, course) for spot in spots if spot is not None)
@@ -187,7 +189,7 @@ def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array |
 
 
 def _touch(base: Model, effect: Effect, course: Array) -> Array:
-    """Return (r,): the rows of a touch of ``course`` (k,), each trial its own part of it."""
+    """Return (r,): the rows of a contact with time course ``course`` (k,), split by trial."""
     samples, put = [], base.problem
     for case in put.cases:
         columns = effect.local(case)
@@ -197,7 +199,7 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 
-def _named(base: Model, effect: Effect, course: Array, sized: _Passing) -> NamedCause:
+def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact) -> NamedCause:
     """Return the cause with its ``course`` (k,) cut by trials; as its size, the force while it acts: half of the
     squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
     """

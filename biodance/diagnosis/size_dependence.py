@@ -1,9 +1,9 @@
-"""Has a cause that was named the same size everywhere? A true one has: in every trial, second, band and channel, under
-every load and at every place. The size of one that only resembles the truth hangs on something: a zero that stands for
-a cross-talk grows with the load, a cross-talk that stands for a zero shrinks with it.
+"""Is the size of a named cause constant? That of a true cause is the same in every trial, second, band and channel,
+under every load and at every place. The size of a look-alike depends on something: an offset fitted to cross-talk grows
+with the load, a cross-talk fitted to an offset decreases with it.
 
-The trace of the cause is multiplied by each of these, and the score test (`evidence`) asks whether the product is in
-what is left, once everything that is no fault and the sizes of all named causes may adapt.
+The trace of the cause is multiplied by each of these signals, and the score test (`evidence`) tests whether the product
+is present in the residual, with all tolerances and the sizes of all named causes free to adapt.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ import numpy as np
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import named_of
+from biodance.diagnosis.naming import cause_key
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import absorbed
 from biodance.records import CHANNELS, Array
@@ -30,11 +30,11 @@ _STEP = 0.1
 
 
 @dataclass(frozen=True)
-class Departure:
-    """How the size of a named cause hangs on something: the ``cause`` (effect, target), ``over`` what, its ``share`` of
-    the size by which it changes (with twice the load, 0.1 m of place, the whole time; in one channel, band or trial),
-    ``z`` the standard deviations of it from none. No cause is quite like its model (`Tolerances.unlike`), so that no
-    share is surer than that.
+class SizeDependence:
+    """Dependence of a named cause's size on something: ``cause`` (effect, target), ``over`` the variable, ``share`` the
+    relative change of the size (for twice the load, 0.1 m of place, the whole time; in one channel, band or trial),
+    ``z`` its distance from zero in standard deviations. These include the model error of the cause
+    (`Tolerances.model_error`).
     """
 
     cause: tuple[str, str]
@@ -43,43 +43,44 @@ class Departure:
     z: float
 
 
-def departures(found: Model) -> tuple[Departure, ...]:
-    """Return how the size of every named cause hangs on load, place, time, trial, band and channel, the surest first.
+def size_dependences(found: Model) -> tuple[SizeDependence, ...]:
+    """Return the dependence of every named cause's size on load, place, time, trial, band and channel, most significant
+    first.
 
-    A cause that comes and goes has no one size and is not asked.
+    Transient contacts have no single size and are left out.
     """
     rows = [one for named in found.named if not named.course for one in _of_one(found, named)]
     return tuple(sorted(rows, key=lambda one: -abs(one.z)))
 
 
-def hanging(found: Model) -> dict[tuple[str, str], Departure]:
-    """Return for every named cause whose size is not the same everywhere, by more than `LIMIT` standard deviations,
-    what it hangs on most.
+def significant_dependences(found: Model) -> dict[tuple[str, str], SizeDependence]:
+    """Return the strongest dependence of every named cause whose size is not constant (beyond `LIMIT` standard
+    deviations).
     """
-    beyond: dict[tuple[str, str], Departure] = {}
-    for one in departures(found):
+    beyond: dict[tuple[str, str], SizeDependence] = {}
+    for one in size_dependences(found):
         if abs(one.z) > LIMIT:
             beyond.setdefault(one.cause, one)
     return beyond
 
 
-def felt(found: Model, named: NamedCause) -> bool:
-    """Return whether a cause changes the wrench by what matters in any channel, or the markers show it."""
+def changes_wrench(found: Model, named: NamedCause) -> bool:
+    """Return whether a cause changes any channel of the wrench by a relevant amount, or is shown by the markers."""
     return bool(found.problem.felt(removed(found.problem, named.effect, named.theta)[:, None])[0] >= 1.0)
 
 
-def _of_one(found: Model, named: NamedCause) -> Iterator[Departure]:
+def _of_one(found: Model, named: NamedCause) -> Iterator[SizeDependence]:
     over, columns = zip(*_traces(found.problem, named), strict=True)
     Z = found.white(np.stack(columns, axis=1))
-    half = found.belief.half(found.belief.X.T @ Z)
-    s, alone = Z.T @ found.belief.left, np.sum(Z**2, axis=0) - np.sum(half**2, axis=0)
-    unlike = max(_UNLIKE, found.tolerances.unlike(named.effect.name))
+    half = found.posterior.half(found.posterior.X.T @ Z)
+    s, alone = Z.T @ found.posterior.residual, np.sum(Z**2, axis=0) - np.sum(half**2, axis=0)
+    unlike = max(_UNLIKE, found.tolerances.model_error(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
     seen = alone - np.sum(absorbed(found, Z, half) ** 2, axis=0)
     for name, score, own in zip(over, s, seen, strict=True):
         if own > least:
             share, sd = float(score / own), float(np.hypot(own**-0.5, unlike))
-            yield Departure(named_of(named), name, share, share / sd)
+            yield SizeDependence(cause_key(named), name, share, share / sd)
 
 
 def _traces(put: Problem, named: NamedCause) -> Iterator[tuple[str, Array]]:

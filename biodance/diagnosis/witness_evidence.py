@@ -1,4 +1,4 @@
-"""What the witnesses of a session saw: their observations, and what every cause would add to each of them."""
+"""Evidence of the witnesses of a session: their observations, and the contribution of every cause to each of them."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -36,10 +36,11 @@ _ALIKE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class Testimony:
-    """All ``observations`` of a session; ``traces`` of every cause: what one unit adds to each of them (n,);
-    ``turned``: value less expectation (n,) once a channel's sign is turned back, NaN where it is then not seen;
-    ``seconds`` by trial that one foot stands alone on a plate; ``recorded``: what they looked at.
+class WitnessEvidence:
+    """All ``observations`` (n) of a session. ``traces``: for every cause, the change of each observation per unit of
+    the cause (n,). ``turned``: for every channel, value minus expectation (n,) after its sign is reversed, NaN where
+    the observation is then missing. ``seconds``: by trial, time in single support on a plate. ``recorded``: the trials
+    that were examined.
     """
 
     observations: tuple[Observation, ...]
@@ -50,10 +51,10 @@ class Testimony:
     recorded: tuple[SeenTrial, ...] = ()
 
     @cached_property
-    def counting(self) -> "Testimony":
-        """Only what counts as evidence."""
+    def counting(self) -> "WitnessEvidence":
+        """Only the observations that count as evidence."""
         kept = np.array([one.counts for one in self.observations], dtype=bool)
-        return Testimony(
+        return WitnessEvidence(
             tuple(one for one in self.observations if one.counts),
             self.causes,
             {name: trace[kept] for name, trace in self.traces.items()},
@@ -64,25 +65,25 @@ class Testimony:
 
     @cached_property
     def shared(self) -> Array:
-        """(n, k) what one standard deviation of each shared part of the expectations adds."""
+        """(n, k) contribution of one standard deviation of each error that several observations share."""
         names = list(dict.fromkeys(name for one in self.observations for name in one.norms))
         rows = [[one.norms.get(name, 0.0) for name in names] for one in self.observations]
         return np.array(rows).reshape(len(self.observations), len(names))
 
     def strongest(self, index: int) -> tuple[str, str]:
-        """Return the cause that an observation sees best, by its usual fault; empty names where it is blind to all."""
+        """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""
         size = {name: abs(c.step * self.traces[name][index]) for name, c in self.causes.items()}
         best = max(size, key=lambda name: size[name], default=("", ""))
         return best if size.get(best, 0.0) * _FAULT > _BLIND * self.observations[index].expected_sd else ("", "")
 
     def sees(self, cause: tuple[str, str]) -> Array:
-        """Return (n,) bool: which observations alone see the usual fault of a cause at one standard deviation."""
+        """Return (n,) bool: observations that each detect the usual fault of a cause at one standard deviation."""
         expected = np.array([one.expected_sd for one in self.observations])
         return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= expected)
 
     def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
-        """Return the witnesses that see the usual fault of a cause at ``least`` standard deviations, all their
-        observations together; none: all are blind to it.
+        """Return the witnesses that detect the usual fault of a cause at ``least`` standard deviations, over all their
+        observations; () if none does.
         """
         size = self.causes[cause].step * _FAULT
         total: dict[str, float] = {}
@@ -92,10 +93,10 @@ class Testimony:
 
 
 @dataclass(frozen=True)
-class Sight:
-    """How well the witnesses of one session see one cause: ``sd`` of its size in ``unit`` from all of them together
-    (infinite: they are blind to it), by which ``witnesses``; ``alike`` causes that they cannot tell from it; ``would``
-    what else would see it, in words.
+class CauseVisibility:
+    """How well the witnesses of a session determine one cause: ``sd`` of its size in ``unit`` from all of them
+    (infinite if none responds), the responding ``witnesses``, the causes ``alike`` that they cannot distinguish from
+    it, and ``would``: movements or markers, in words, that would make further witnesses respond.
     """
 
     effect: str
@@ -107,45 +108,45 @@ class Sight:
     would: tuple[str, ...]
 
 
-def sights(heard: Testimony) -> tuple[Sight, ...]:
-    """Return how well each cause is seen, the blind rows last."""
-    counting, family = heard.counting, witnesses()
-    spoke = {one.witness for one in heard.observations}
+def cause_visibilities(evidence: WitnessEvidence) -> tuple[CauseVisibility, ...]:
+    """Return how well each cause is determined by the witnesses, undetermined causes last."""
+    counting, family = evidence.counting, witnesses()
+    spoke = {one.witness for one in evidence.observations}
     sd = np.array([one.sd for one in counting.observations])
     inner = np.diag(sd**2) + counting.shared @ counting.shared.T
     white = {name: np.linalg.solve(inner, trace) if trace.size else trace for name, trace in counting.traces.items()}
     power = {name: float(counting.traces[name] @ white[name]) for name in counting.traces}
     found = []
-    for name, cause in heard.causes.items():
+    for name, cause in evidence.causes.items():
         seen = counting.seen_by(name)
         alike = tuple(
             other
-            for other in heard.causes
+            for other in evidence.causes
             if other != name
             and seen
             and abs(counting.traces[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
         )
         silent = [one for one in family.values() if cause.effect in one.sees and one.name not in spoke]
         size = power[name] ** -0.5 if seen else float("inf")
-        found.append(Sight(*name, cause.unit, size, seen, alike, tuple(one.needs for one in silent)))
+        found.append(CauseVisibility(*name, cause.unit, size, seen, alike, tuple(one.needs for one in silent)))
     return tuple(sorted(found, key=lambda one: not one.witnesses))
 
 
-def hear(
+def collect_evidence(
     session: Session,
     chosen: Chosen[Effect | DiscreteEffect] = None,
     norms: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> Testimony:
-    """Return what the witnesses saw in all trials of a session but the skipped ones; ``chosen`` limits the causes;
-    ``norms`` are those of the laboratory (`Tolerances.norms`).
+) -> WitnessEvidence:
+    """Return the observations of all witnesses in all trials of a session except skipped ones. ``chosen`` restricts the
+    causes; ``norms`` are those of the laboratory (`Tolerances.norms`).
     """
     asked = causes(chosen)
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
     seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    found, single = [_alike(observe(one)) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
+    found, single = [_correlate_strides(observe(one)) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     parts = {name: [np.zeros(len(some)) for some in found] for name in known}
-    plainly, found = found, [tuple(_by_norm(o, norms) for o in some) for some in found]
+    plainly, found = found, [tuple(_apply_norm(o, norms) for o in some) for some in found]
     turned: dict[tuple[str, str], list[Array]] = {}
     plain = [np.array([o.value - o.expected for o in some]) for some in found]
     for i, (one, some) in enumerate(zip(seen, found, strict=True)):
@@ -154,8 +155,8 @@ def hear(
                 parts[cause.names][i] = traces(one, some, cause)
         shift = np.array([o.expected - p.expected for o, p in zip(some, plainly[i], strict=True)])
         for name, undo in turned_signs(one, single=single).items() if one.steps and "axis_error" in asked else ():
-            turned.setdefault(name, [value.copy() for value in plain])[i] = _again(undo(one), some) - shift
-    return Testimony(
+            turned.setdefault(name, [value.copy() for value in plain])[i] = _observe_again(undo(one), some) - shift
+    return WitnessEvidence(
         tuple(o for some in found for o in some),
         known,
         {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
@@ -165,30 +166,31 @@ def hear(
     )
 
 
-def put_right(heard: Testimony, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
-    """Return what putting causes right by their ``sizes`` adds to each observation (n,), NaN where it is then not seen,
-    and what one unit of each then adds (n, p): a step that begins 30 ms earlier is another part of the step.
+def undo_causes(evidence: WitnessEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
+    """Return the change of each observation (n,) when causes of the given ``sizes`` are undone in the recording, NaN
+    where the observation is then missing, and the traces (n, p) in the corrected recording. They differ from the traces
+    of the original one: a step that begins 30 ms earlier covers another part of the step.
     """
-    added = np.full(len(heard.observations), np.nan)
+    added = np.full(len(evidence.observations), np.nan)
     slopes = np.zeros((added.size, len(sizes)))
-    single = all(len(one.trial.plates) == 1 for one in heard.recorded)
-    for one in heard.recorded:
-        here = [i for i, o in enumerate(heard.observations) if o.trial == one.trial.name]
-        found = tuple(heard.observations[i] for i in here)
+    single = all(len(one.trial.plates) == 1 for one in evidence.recorded)
+    for one in evidence.recorded:
+        here = [i for i, o in enumerate(evidence.observations) if o.trial == one.trial.name]
+        found = tuple(evidence.observations[i] for i in here)
         known = {cause.names: cause for cause in possible_causes(one, single=single) if cause.names in sizes}
         right = one
         for names, cause in known.items():
             right = cause.alter(right, -sizes[names])
-        added[here] = _again(right, found) - _again(one, found)
+        added[here] = _observe_again(right, found) - _observe_again(one, found)
         for k, names in enumerate(sizes):
             if names in known:
                 slopes[here, k] = traces(right, found, known[names])
     return added, slopes
 
 
-def _alike(found: tuple[Observation, ...]) -> tuple[Observation, ...]:
-    """Return the observations of one trial, strides of one foot on one plate erring together in part: a person who
-    walks on repeats the error of a step, and twenty equal strides are no twenty witnesses.
+def _correlate_strides(found: tuple[Observation, ...]) -> tuple[Observation, ...]:
+    """Return the observations of one trial with a shared error between strides of one foot on one plate: a person
+    repeats the error of a step while walking on, so that twenty equal strides are not twenty independent observations.
     """
     count = Counter(one.stride for one in found)
     return tuple(
@@ -201,10 +203,10 @@ def _alike(found: tuple[Observation, ...]) -> tuple[Observation, ...]:
     )
 
 
-def _by_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> Observation:
-    """Return an observation with what its laboratory is known to do: where markers are put, what filters do. The share
-    of a norm that the "laboratory" part of the expectation allows is expected, the rest stays uncertain; a norm that
-    lies beyond `_HABIT` standard deviations is no habit: it may be a plate that is wrong in all sessions.
+def _apply_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> Observation:
+    """Return an observation corrected by the norm of its laboratory (marker placement, filters). Of the norm, the share
+    that the "laboratory" part of the expectation allows is added to the expectation; the rest stays uncertain. A norm
+    beyond `_HABIT` standard deviations is ignored: it may be a plate that is wrong in all sessions.
     """
     own = [name for name in one.norms if name.startswith("laboratory")]
     value, sd = norms.get(one.kind, (0.0, float("inf")))
@@ -216,7 +218,7 @@ def _by_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> Obse
     return replace(one, expected=one.expected + share * value, norms=left)
 
 
-def _again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:
-    """Return value less expectation (n,) of the same observations in an altered recording; NaN where not seen."""
+def _observe_again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:
+    """Return value minus expectation (n,) of the same observations in an altered recording; NaN where missing."""
     values = {one.key: one.value - one.expected for one in observe(altered)}
     return np.array([values.get(one.key, np.nan) for one in before])

@@ -1,4 +1,4 @@
-"""What is believed of the parameters while the subject still moves: sample after sample, in constant memory."""
+"""Recursive identification: Gaussian posterior of the parameters, updated sample by sample in constant memory."""
 
 from dataclasses import dataclass, replace
 
@@ -10,21 +10,21 @@ from biodance.records import Array, Sip
 
 
 @dataclass(frozen=True, eq=False)
-class RunningBelief:
-    """Gaussian belief: ``prior`` as given, ``mean`` (p,) and ``covariance`` (p, p) after the samples so far."""
+class RecursivePosterior:
+    """Gaussian posterior: ``prior`` as given, ``mean`` (p,) and ``covariance`` (p, p) after the samples so far."""
 
     prior: Sip
     mean: Array
     covariance: Array
 
     def expected(self, W: Array) -> tuple[Array, Array]:
-        """Return the expected wrench (..., 6) N, N·m for regressors ``W`` (..., 6, p), and its variance from what is
-        not known of the parameters.
+        """Return the expected wrench (..., 6) N, N·m for regressors ``W`` (..., 6, p), and its variance due to the
+        uncertainty of the parameters.
         """
         return W @ self.mean, np.einsum("...ij,jk,...ik->...i", W, self.covariance, W, optimize=True)
 
-    def updated(self, W: Array, wrench: Array, variance: Array) -> "RunningBelief":
-        """Return the belief after one sample: ``W`` (6, p), ``wrench`` (6,) N, N·m with noise of ``variance`` (6,).
+    def updated(self, W: Array, wrench: Array, variance: Array) -> "RecursivePosterior":
+        """Return the posterior after one sample: ``W`` (6, p), ``wrench`` (6,) N, N·m with noise of ``variance`` (6,).
 
         Source: Kalman 1960, doi:10.1115/1.3662552, with a state that stays.
         """
@@ -47,9 +47,9 @@ class RunningBelief:
         }
 
 
-def belief_before(prior: Sip) -> RunningBelief:
-    """Return the belief before the first sample."""
-    return RunningBelief(prior, np.array(prior.phi), np.array(prior.covariance))
+def initial_posterior(prior: Sip) -> RecursivePosterior:
+    """Return the posterior before the first sample, equal to ``prior``."""
+    return RecursivePosterior(prior, np.array(prior.phi), np.array(prior.covariance))
 
 
 def summed_pressure(fit: Fit) -> Array:

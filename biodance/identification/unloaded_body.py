@@ -1,4 +1,4 @@
-"""What the body may be without a load: as known before, odder than that, or of another mass than was declared."""
+"""Hypotheses on the body without a load: as the prior says, further from it, or of another mass than declared."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,9 @@ _DECLARED = ((0.0, False, 0.4), (0.0, True, 0.4), (2.5, False, 0.2))
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
-    """One explanation of the body: ``before`` what it is without a load, with its ``log_prior``; ``holds`` whether its
-    mass is that of body and load together, so that the body weighs less by the load.
+class UnloadedBody:
+    """One hypothesis on the body without a load: its prior ``before``, with ``log_prior``; ``holds``: whether the
+    declared mass includes the load, so that the body is lighter by it.
     """
 
     before: Sip
@@ -45,7 +45,7 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     """
     along = goes_along(reference.belief.prior, reference.body)
     same = placed_as(session.belief.prior, session.body, along=along)
-    table = weighing(same, float(reference.belief.prior.mass.sum()))
+    table = scaled_to_mass(same, float(reference.belief.prior.mass.sum()))
     shift = table.phi - reference.belief.prior.phi
     moved = Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
     return in_other_frames(moved, session.body.joint_errors)
@@ -71,29 +71,29 @@ def table_like(one: Identification, other: Identification) -> Sip:
     return table if apart == other.apart else with_sides(table, apart=other.apart)
 
 
-def weighing(prior: Sip, mass: float) -> Sip:
-    """Return the table ``prior`` of a body of the same build that weighs ``mass`` kg."""
+def scaled_to_mass(prior: Sip, mass: float) -> Sip:
+    """Return the table ``prior`` scaled to a body of the same build with a total mass of ``mass`` kg."""
     ratio = mass / float(prior.mass.sum())
     return Sip(prior.segments, ratio * prior.phi, ratio**2 * np.asarray(prior.covariance))
 
 
-def rivals(tables: tuple[tuple[Sip, float], ...], *, weighed: bool) -> tuple[Rival, ...]:
-    """Return what the body may be without a load: odder than one of the ``tables`` (each with its log probability)
-    says, and unless it was ``weighed`` without load of another mass than declared: the declared one holds the load, or
-    is wrong.
+def unloaded_bodies(tables: tuple[tuple[Sip, float], ...], *, weighed: bool) -> tuple[UnloadedBody, ...]:
+    """Return the hypotheses on the body without a load: priors inflated from each of the ``tables`` (given with log
+    probabilities), and, unless it was ``weighed`` without a load, a declared mass that includes the load or is wrong.
     """
     cases = ((0.0, False, 1.0),) if weighed else _DECLARED
     return tuple(
-        Rival(odder(table, times, wrong), log + float(np.log(share / len(_ODD))), holds)
+        UnloadedBody(inflate_prior(table, times, wrong), log + float(np.log(share / len(_ODD))), holds)
         for table, log in tables
         for wrong, holds, share in cases
         for times in _ODD
     )
 
 
-def odder(before: Sip, times: float, wrong: float = 0.0) -> Sip:
-    """Return ``before`` with all standard deviations ``times`` as large, the total mass known as well as before; then
-    ``wrong`` kg more or less of it (standard deviation), all segments in proportion.
+def inflate_prior(before: Sip, times: float, wrong: float = 0.0) -> Sip:
+    """Return ``before`` with all standard deviations multiplied by ``times`` at unchanged uncertainty of the total
+    mass; then with an error of the total mass of standard deviation ``wrong`` kg, distributed over the segments in
+    proportion.
     """
     covariance = np.asarray(before.covariance)
     total = np.tile(np.eye(10)[0], len(before.segments))
@@ -106,9 +106,9 @@ def odder(before: Sip, times: float, wrong: float = 0.0) -> Sip:
     return Sip(before.segments, before.phi, covariance + wrong**2 * np.outer(body, body))
 
 
-def surprised(data: Information, before: Sip) -> tuple[Array, Array, float]:
-    """Return the data's rows (r, p), what they show beyond ``before`` (r,), whitened by noise and by the uncertainty
-    of ``before``, and the log evidence of the data without a load.
+def whiten_innovation(data: Information, before: Sip) -> tuple[Array, Array, float]:
+    """Return the rows of the data (r, p) and the innovation relative to ``before`` (r,), both whitened by noise and by
+    the uncertainty of ``before``, and the log evidence of the data without a load.
 
     With R phi = y + noise and phi ~ N(before): y - R before has the covariance 1 + R P R'.
     """

@@ -1,0 +1,199 @@
+"""Combination of the witnesses' findings with those of the simulation into one diagnosis.
+
+The errors of the two are independent: witnesses use feet, clocks and weights, the simulation uses the wrench of the
+whole body. The size of a cause that both name is their precision-weighted mean. A cause named by the witnesses replaces
+its look-alikes from the simulation, and a size that the witnesses exclude is withdrawn.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.size_dependence import WEIGHTLESS
+from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
+
+_FAR = 3.0
+"""Standard deviations between two sizes of one cause from which they contradict each other."""
+_PLAIN = 3.0
+"""Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
+_EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
+"""Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
+_STANDING = {"standing_place"}
+"""Witnesses of a habit: no law says where over their feet people stand."""
+_WEIGHING = {"standing_force", "stride_force"}
+"""Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
+_NOT_MOVED = "Standing alone looks like a {} of {}; the movement, which would show it, shows none."
+"""What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
+_RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
+"""Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
+
+
+def combine_findings(
+    one: Diagnosis, by_witnesses: WitnessFindings, evidence: WitnessEvidence, *, judged: bool
+) -> Diagnosis:
+    """Return the diagnosis combined with the findings of the witnesses; ``judged``: whether the simulation was
+    available.
+    """
+    one = replace(one, witnesses=evidence if evidence.observations else None)
+    raw = any(finding.effect in _RAW for finding in one.findings)
+    if raw:
+        known = {(finding.effect, finding.target) for finding in one.findings}
+        signs = tuple(f for f in by_witnesses.findings if f.effect in _RAW and (f.effect, f.target) not in known)
+        return replace(one, findings=(*one.findings, *signs))
+    if not by_witnesses.findings:
+        return _without_excluded(one, evidence)
+    checked = _without_excluded(one, evidence) if judged else one
+    kept_findings, doubtful = [], []
+    matched: list[Finding | None] = []
+    for finding in by_witnesses.findings:
+        alike = next((f for alias in finding.set for f in checked.findings if _same_cause(alias, f)), None)
+        if alike is not None and alike in matched:
+            continue  # two things that witnesses tell apart are one to the simulation, which told it already
+        matched.append(alike)
+        if (
+            alike is None
+            and judged
+            and (_simulation_disagrees(finding, checked, evidence) or _only_standing_habit(finding, checked, evidence))
+        ):
+            doubtful.append(finding)
+        else:
+            kept_findings.append(_merged(finding, alike))
+    known = {_names(f) for f in checked.resembles}
+    doubtful = [shadow for shadow in doubtful if _names(shadow) not in known]
+    if not kept_findings and checked.verdict == "nothing wrong":
+        notes = (_NOT_MOVED.format(each.effect.replace("_", " "), each.target) for each in doubtful)
+        return replace(checked, notes=(*checked.notes, *notes))
+    if not kept_findings:
+        return replace(checked, resembles=(*checked.resembles, *doubtful))
+    names = {_names(alias) for finding in kept_findings for alias in finding.set}
+    rest = tuple(f for f in checked.findings if _names(f) not in names)
+    verdict: Verdict = "named, incomplete"
+    if judged and not rest and one.verdict in ("nothing wrong", "named, complete") and not one.doubt:
+        verdict = "named, complete"
+    kept = tuple(f for f in checked.resembles if _names(f) not in names)
+    return replace(checked, verdict=verdict, findings=(*kept_findings, *rest), resembles=(*kept, *doubtful))
+
+
+def _names(one: Finding | Alias) -> tuple[str, str]:
+    """Return effect and target."""
+    return one.effect, one.target
+
+
+def _same_cause(alias: Alias, one: Finding | Alias) -> bool:
+    """Return whether an alias is the same cause; an unplaced load matches a load on any segment."""
+    return _names(alias) == _names(one) or (_names(alias) == UNPLACED_LOAD and one.effect == alias.effect)
+
+
+def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
+    """Return whether the simulation contradicts a finding of the witnesses. It does if it found something else wrong
+    although it would detect a cause of this size, or if it found this cause with a size that depends on what the
+    witnesses observe (`_weighing_agrees`). Exchanged labels do not affect the plates and do not count. If the
+    simulation doubts its own result, it must have some evidence of a cause that is `_PLAIN`.
+    """
+    hanging = [other for other in one.resembles if _names(other) == _names(finding) and other.hangs_on]
+    if hanging:
+        return not _weighing_agrees(finding, hanging[0], evidence)
+    labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
+    if not finding.parameters or one.verdict == "nothing wrong" or labels:
+        return False
+    times = _size_over_limit(finding, one)
+    if one.doubt:
+        return times > _PLAIN and _evidence(finding, one) <= 0.0
+    return times > 1.0
+
+
+def _weighing_agrees(finding: Finding, hanging: Finding, evidence: WitnessEvidence) -> bool:
+    """Return whether a cause that only weighing witnesses detect has the same size in the simulation, where that size
+    depends only on moments and fast bands: these do not affect the mean force.
+    """
+    alone = _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _WEIGHING
+    return alone and hanging.hangs_on in WEIGHTLESS and _same_size(finding, hanging)
+
+
+def _same_size(finding: Finding, other: Finding) -> bool:
+    """Return whether two sizes of one cause do not contradict each other."""
+    if not (finding.parameters and other.parameters):
+        return False
+    kept_findings, its = finding.parameters[0], other.parameters[0]
+    return bool(abs(kept_findings.value - its.value) <= _FAR * np.hypot(kept_findings.sd, its.sd))
+
+
+def _only_standing_habit(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
+    """Return whether a finding rests only on where the person stands over the feet, while a movement that would show a
+    cause of this size shows none: people may stand off centre on a plate that is in its place.
+    """
+    alone = _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _STANDING
+    seen = alone and one.verdict == "nothing wrong" and _size_over_limit(finding, one) > 1.0
+    return seen and _evidence(finding, one) <= 0.0
+
+
+def _size_over_limit(finding: Finding, one: Diagnosis) -> float:
+    """Return the size of a finding relative to the detection limit of the simulation; 0 if it cannot detect it."""
+    limits = {(row.effect, row.target): row.limit for row in one.limits}
+    return abs(finding.parameters[0].value) / limits.get(_names(finding), float("inf")) if finding.parameters else 0.0
+
+
+def _evidence(finding: Finding, one: Diagnosis) -> float:
+    """Return the log Bayes factor of a cause in the simulation before any cause was named; infinite if not computed."""
+    return next((a.log_bayes_factor for a in one.candidates if _names(a) == _names(finding)), float("inf"))
+
+
+def _merged(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
+    """Return a finding with the size combined from witnesses and simulation. If the simulation distinguishes
+    look-alikes that the witnesses do not, or places a load that only weighs the same, its finding is returned.
+    """
+    if by_simulation is not None and _names(by_simulation) != _names(by_witnesses):
+        return by_simulation
+    if by_simulation is None or not by_simulation.parameters or not by_witnesses.parameters:
+        return by_witnesses
+    first, last = by_witnesses.parameters[0], by_simulation.parameters[0]
+    if not (first.sd > 0 and last.sd > 0) or first.unit != last.unit:
+        return by_witnesses
+    weight = np.array([first.sd**-2, last.sd**-2])
+    value = float(weight @ [first.value, last.value] / weight.sum())
+    loads = any(alias.effect == UNPLACED_LOAD[0] for alias in by_simulation.set)
+    alike = (alias for alias in by_witnesses.set[1:] if loads or _names(alias) != UNPLACED_LOAD)
+    bayes = by_witnesses.log_bayes_factor + max(0.0, by_simulation.log_bayes_factor)
+    return replace(
+        by_simulation,
+        parameters=(
+            Estimate(first.name, value, float(weight.sum() ** -0.5), first.unit),
+            *by_simulation.parameters[1:],
+        ),
+        set=(Alias(by_witnesses.effect, by_witnesses.target, bayes), *alike),
+        advice=by_witnesses.advice,
+    )
+
+
+def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
+    """Return the diagnosis without findings whose size the witnesses exclude."""
+    gone = tuple(finding for finding in one.findings if _excluded(finding, evidence))
+    if not gone:
+        return one
+    left = tuple(finding for finding in one.findings if finding not in gone)
+    sentence = "{} {} was taken back: feet and weight on the plates exclude its size."
+    notes = tuple(sentence.format(finding.effect.replace("_", " "), finding.target) for finding in gone)
+    verdict: Verdict = "named, incomplete" if left else "unexplained"
+    doubt = one.doubt or ("" if left or one.verdict != "named, complete" else _EXCLUDED.format(gone[0].effect))
+    return replace(
+        one,
+        verdict=verdict,
+        findings=left,
+        resembles=(*gone, *one.resembles),
+        notes=(*one.notes, *notes),
+        doubt=doubt.replace("_", " "),
+    )
+
+
+def _excluded(finding: Finding, evidence: WitnessEvidence) -> bool:
+    """Return whether the witnesses measure the size of this cause precisely enough to exclude that of the finding."""
+    measured = size_from_witnesses(evidence, (finding.effect, finding.target))
+    if measured is None or not finding.parameters:
+        return False
+    size, sd = finding.parameters[0].value, finding.parameters[0].sd
+    return bool(
+        abs(size) > _FAR * measured[1]
+        and abs(size - measured[0]) > _FAR * np.hypot(measured[1], sd if sd == sd else 0.0)
+    )
