@@ -104,13 +104,16 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
     doubts += fill_absent(places, stand, confirmed) + _medial_alone(places)
     absent = absent_landmarks(places)
     map_ = _map(places, confirmed)
+    reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
     if believed < _BELIEVED * total:
-        doubts.insert(0, f"Only {believed} of {total} landmarks that the labels name stand where a person has them.")
-    elif absent:
-        doubts.insert(0, f"No marker could be taken for: {', '.join(absent)}.")
-    else:
-        return GuessedSet(map_, tuple(doubts), guessed_name(map_))
-    return GuessedSet(map_, tuple(doubts))
+        wrong = ", ".join(label for label in usual if not confirmed[label])
+        reasons.append(
+            f"Only {believed} of {total} landmarks that the labels name stand where a person has them; elsewhere: "
+            f"{wrong}."
+        )
+    if reasons:
+        return GuessedSet(map_, (" ".join(reasons), *doubts))
+    return GuessedSet(map_, tuple(doubts), guessed_name(map_))
 
 
 def guessed_name(map_: Mapping[str, str]) -> str:
