@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.lab.markers.absent import absent_landmarks, fill_absent
+from biodance.lab.markers.keypoints import FROM_VIDEO, joints_from_video
 from biodance.lab.markers.names import Meaning, meanings_of, sides_exchanged
 from biodance.lab.markers.person import mirror_images, person_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
@@ -56,6 +57,13 @@ def guess_set(markers: Markers) -> GuessedSet:
     Geometry needs z up; for a recording without anybody upright nothing is believed.
     """
     at = _posture(markers)
+    found = _guessed(at)
+    joints = () if found.name else joints_from_video(at)
+    return replace(found, doubts=(FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
+
+
+def _guessed(at: Mapping[str, Array]) -> GuessedSet:
+    """Return the guess by names, else by the words that mirror images teach."""
     named = _by_names(at)
     if named.name:
         return named
