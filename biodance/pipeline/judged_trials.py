@@ -56,8 +56,11 @@ def cases_of(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
 
 
 def failed_checks(result: SessionResult) -> tuple[Gate, ...]:
-    """Return the checks of the recordings (units, signs, labels, clocks) that failed."""
-    checks = gates(result.session, cases_of(result.body, all_looks(result.trials)))
+    """Return the checks of the recordings (units, signs, labels, clocks) that failed; trials without plates are looked
+    at by their markers alone.
+    """
+    measured = tuple(look for look in all_looks(result.trials) if look.trial.plates)
+    checks = gates(result.session, cases_of(result.body, measured))
     return tuple(gate for gate in checks if not gate.ok)
 
 
