@@ -13,8 +13,11 @@ from identified_sessions import body, session_result
 from biodance.body.export.csv import STANDARD
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
+from biodance.effects import Gate
 from biodance.lab.opensim.mot import read_mot
 from biodance.pipeline.export import MOTION_FORMATS, legal_formats
+
+SWAPPED = Gate("labels of the markers", False, "A and B carry each other's names in fit_0.", "labels_swapped", "A/B")
 
 
 @pytest.fixture
@@ -29,6 +32,7 @@ def lab(monkeypatch, tmp_path):
         )
     for room in ("biodance.pipeline.session", "biodance.pipeline.export", "biodance.pipeline.front"):
         monkeypatch.setattr(f"{room}.examine", lambda session, **_: results[session.folder.name])
+    monkeypatch.setattr("biodance.pipeline.judged_trials.failed_checks", lambda _: (SWAPPED,))  # it holds no raw plates
     return tmp_path
 
 
@@ -46,13 +50,16 @@ def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
     assert sorted(path.name for path in (lab / "out").glob("[!.]*")) == files
     assert told == json.loads((lab / "out" / "results.json").read_text())
     assert told["status"] == "solved"
+    assert told["attention"][0]["text"] == f"Found: labels swapped A/B. {SWAPPED.text}"
     assert run(["identify", str(lab / "S01"), "--out", str(lab / "out")]) == NOT_DONE
     assert "--force" in capsys.readouterr().err
     assert (
         run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--force", "--reference", str(lab / "bare")])
         == NEEDS_A_PERSON
     )
-    assert "trunk_head" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert out.startswith("Found: labels swapped A/B.")
+    assert "trunk_head" in out
 
 
 def test_nothing_to_identify_is_one_sentence(lab, capsys):

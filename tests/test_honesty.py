@@ -19,7 +19,7 @@ from biodance.diagnosis.naming import build_model, drop_weak_causes, is_signific
 from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Gate, effects
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.attention import headline, is_well, session_attention, told
+from biodance.pipeline.attention import headline, identified_attention, is_well, session_attention, told
 from biodance.pipeline.finding_words import EXPLAINS, in_words
 from biodance.pipeline.trial_result import Check
 from biodance.records import Motion, Wrench
@@ -297,3 +297,13 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
     row = next(one for one in adequacy(found) if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
     assert row.size == pytest.approx(6.0 / np.sqrt(2), rel=0.15)
     assert row.unit == "N"
+
+
+def test_identify_says_first_what_the_checks_of_the_recordings_found() -> None:
+    gate = Gate("labels of the markers", False, "A and B carry each other's names in walk.", "labels_swapped", "A/B")
+    full = full_session()
+    first, *others = identified_attention(full, [gate])
+    assert (first.level, first.about) == ("fail", ABOUT)
+    assert first.text == "Found: labels swapped A/B. A and B carry each other's names in walk."
+    assert ABOUT not in [one.about for one in others]
+    assert identified_attention(full, []) == session_attention(full)

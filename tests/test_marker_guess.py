@@ -16,6 +16,7 @@ from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.inspect import inspect_paths
 from biodance.lab.markers.dress import dress
 from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.keypoints import joints_from_video
 from biodance.lab.markers.names import meanings, meanings_of
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.spelling import plain_labels
@@ -98,6 +99,38 @@ def test_posture_names_what_no_label_says() -> None:
     assert len(guess.doubts) == len(OWN)
     half = stand({place: label for place, label in numbered.items() if not place.endswith("knee_lateral")})
     assert guess_set(half).name == ""
+
+
+def test_a_refused_set_is_told_what_it_lacks() -> None:
+    no_knee = {place: label for place, label in OWN.items() if "knee" not in place}
+    few = guess_set(stand(no_knee | {"right_asis": OWN["right_heel"], "right_heel": OWN["right_asis"]}))
+    assert few.name == ""
+    assert few.doubts[0].startswith("No marker could be taken for: ")
+    assert "right knee lateral" in few.doubts[0]
+    assert f"elsewhere: {OWN['right_heel']}" in few.doubts[0] or OWN["right_asis"] in few.doubts[0]
+
+
+@pytest.mark.parametrize(
+    ("labels", "joints"),
+    [
+        ("RHip LHip RKnee LKnee RAnkle LAnkle Nose Neck RBigToe RHeel", True),
+        ("P07:left_hip P07:right_hip P07:left_knee P07:right_knee P07:left_ankle P07:right_ankle", True),
+        ("HipLeft HipRight KneeLeft KneeRight AnkleLeft AnkleRight", True),
+        ("RHip LHip RKnee LKnee RAnkle LAnkle RASI LASI", False),
+        ("R.Hip L.Hip R.Knee.Medial L.Knee.Medial R.Knee L.Knee R.Ankle L.Ankle", False),
+        ("RHip LHip RKnee LKnee RAnkle", False),
+    ],
+)
+def test_joints_from_video_are_told_from_markers(labels: str, joints: bool) -> None:
+    assert len(joints_from_video(labels.split())) == 6 * joints
+
+
+def test_a_skeleton_from_video_is_refused_as_joints() -> None:
+    bare = {"knee_lateral": "Knee", "ankle_lateral": "Ankle", "asis": "Hip", "acromion": "Shoulder"}
+    names = {f"{side}_{place}": side[0].upper() + name for place, name in bare.items() for side in ("right", "left")}
+    guess = guess_set(stand(names))
+    assert guess.name == ""
+    assert "not markers on the skin: RHip, LHip, RKnee" in guess.doubts[0]
 
 
 def test_a_tongue_nobody_knows_is_learned_from_the_mirror_images() -> None:

@@ -12,6 +12,7 @@ from biodance.diagnosis.diagnosis import ABOUT
 from biodance.lab.session.read import read_session
 from biodance.pipeline.attention import is_well
 from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.judged_trials import failed_checks
 from biodance.pipeline.movement import describe_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
@@ -127,3 +128,8 @@ def test_a_real_recording_without_fault_gets_no_name(name: str) -> None:
     assert named or "what could be judged" in said.text or said.text.startswith("Cannot tell")
     assert not is_well(found)
     assert any(row.missed for row in found.judged) or found.doubt
+
+
+def test_identify_finds_the_exchanged_wrist_that_the_diagnosis_finds() -> None:
+    checks = failed_checks(recording("biomechzoo/HC030A"))
+    assert [(one.effect, one.target) for one in checks] == [("labels_swapped", "LWRA/LWRB")]

@@ -84,6 +84,7 @@ def identify_command(
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
     from biodance.pipeline import front
+    from biodance.pipeline.judged_trials import failed_checks
     from biodance.pipeline.movement import describe_movement
     from biodance.report.write import write_identification
 
@@ -93,10 +94,12 @@ def identify_command(
         result, _, folder = examine_with_reference(session, reading, results, tell)
         found = front.identify(result, dance=shown)
         result = replace(result, identification=found)
+        tell("checking units, signs, labels and clocks")
+        checks = failed_checks(result)
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tell("writing the page")
         tabled(result, place, movement=moved)
-        document = write_identification(result, found, folder, movement=moved)
+        document = write_identification(result, found, folder, checks=checks, movement=moved)
     results.show_page(folder)
     return _told_identified(result, folder, document, results.json)
 
@@ -111,4 +114,5 @@ def _told_identified(result: "SessionResult | RobotResult", folder: Path, found:
     from biodance.report.terminal import print_identification
 
     show(found, print_identification, json=json, path=folder / "report.html")
-    return NEEDS_A_PERSON if result.needs_a_person else DONE
+    wrong = any(row["level"] == "fail" for row in found["attention"])
+    return NEEDS_A_PERSON if wrong or result.needs_a_person else DONE

@@ -8,8 +8,10 @@ from dataclasses import replace
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
+from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.effects import Gate
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or_else
 from biodance.pipeline.judged_trials import TOO_SHORT
@@ -161,6 +163,18 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     outside = [check for check in result.all_checks if not check.inside]
     found += [_checked(check, findings) for check in outside if not (weighed and check.what.startswith(_WEIGHT))]
     return strongest_first([*found, *_load(result, findings)])
+
+
+def identified_attention(result: SessionResult, checks: Sequence[Gate]) -> tuple[Attention, ...]:
+    """Return what a person must see of a session that was identified and not diagnosed: the ``checks`` of its
+    recordings that failed (units, signs, labels, clocks) stand first, as the diagnosis says them.
+    """
+    findings = tuple(failed_check(gate) for gate in checks)
+    if not findings:
+        return session_attention(result)
+    one = Diagnosis("named, incomplete", findings, gates=tuple(checks))
+    text = f"Found: {' and '.join(map(in_words, findings))}. {_checks(one)}".strip()
+    return strongest_first([Attention("fail", text, about=ABOUT), *session_attention(result, findings)])
 
 
 def _checked(check: Check, findings: Sequence[Finding]) -> Attention:

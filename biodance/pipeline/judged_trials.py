@@ -5,7 +5,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.problem import Look
 from biodance.diagnosis.spectrum import SHORTEST_RUN
-from biodance.effects import Case
+from biodance.effects import Case, Gate, gates
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
@@ -53,6 +53,15 @@ def all_looks(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
 def cases_of(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
     """Return the trials as effects see them, at the rate of the markers, with the table's parameters."""
     return () if body is None else tuple(look.case(body, body.sip.phi) for look in found)
+
+
+def failed_checks(result: SessionResult) -> tuple[Gate, ...]:
+    """Return the checks of the recordings (units, signs, labels, clocks) that failed; trials without plates are looked
+    at by their markers alone.
+    """
+    measured = tuple(look for look in all_looks(result.trials) if look.trial.plates)
+    checks = gates(result.session, cases_of(result.body, measured))
+    return tuple(gate for gate in checks if not gate.ok)
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:

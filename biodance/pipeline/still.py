@@ -143,8 +143,8 @@ def worst_still(body: Body, results: tuple[TrialResult, ...]) -> Still | None:
     size_n, one, frame, force = worst
     x, y, z = (f"{round(value):+d}".replace("-", "−") for value in force)
     about = (
-        f"The worst frame: the plates measured {size_n:.0f} N other than the body needs (x {x}, y {y}, z {z} N; "
-        f"arrow: 1 m for 100 N)."
+        f"The worst frame: what the plates measured differs by {size_n:.0f} N from what the body needs (x {x}, y {y}, "
+        f"z {z} N; arrow: 1 m for 100 N)."
     )
     return replace(still_at(body, one, frame), residual=force, about=about)
 

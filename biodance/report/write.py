@@ -4,9 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
+from biodance.effects import Gate
 from biodance.lab.corrections import PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected
-from biodance.pipeline.attention import session_attention
+from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
@@ -18,6 +19,7 @@ from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import BODY, SCALED, keep_motions
 from biodance.pipeline.session_frames import frames_of
+from biodance.records.attention import Attention
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
@@ -77,24 +79,30 @@ def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: Sessio
 
 
 def write_identification(
-    result: SessionResult, found: SessionIdentification, folder: Path, *, movement: SessionMovement | None = None
+    result: SessionResult,
+    found: SessionIdentification,
+    folder: Path,
+    *,
+    checks: tuple[Gate, ...] = (),
+    movement: SessionMovement | None = None,
 ) -> dict[str, Any]:
     """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body;
-    return the numbers.
+    return the numbers. ``checks`` of the recordings that failed are said first.
 
     After a failed fit there is no ``body.json``.
     """
     made = provenance(result, created=now())
+    first = identified_attention(result, checks)
     numbers = {
         "session": result.session.folder.name,
-        "attention": attention_document(session_attention(result)),
+        "attention": attention_document(first),
         "judged": judged_document(identified_trials(result)),
         **identification_document(found),
         "movement": movement_document(movement) if movement else None,
         "provenance": provenance_document(made),
     }
     told: dict[str, Any] = plain_values(numbers)
-    page = _page(result, made, movement=movement)
+    page = _page(result, made, movement=movement, attention=first)
     files = {_NUMBERS: to_text(told), METHODS: methods_text(told), PAGE: page}
     write_files(folder, files | _kept(result, folder))
     return told
@@ -161,9 +169,10 @@ def _page(
     made: Provenance,
     diagnosis: SessionDiagnosis | None = None,
     movement: SessionMovement | None = None,
+    attention: tuple[Attention, ...] | None = None,
 ) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
     moved = movement_section(movement) if movement else ""
-    attention = diagnosis.diagnosis.attention if diagnosis else None
+    attention = diagnosis.diagnosis.attention if diagnosis else attention
     frames = frames_of(result)
     return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.lab.markers.absent import absent_landmarks, fill_absent
+from biodance.lab.markers.keypoints import FROM_VIDEO, joints_from_video
 from biodance.lab.markers.names import Meaning, meanings_of, sides_exchanged
 from biodance.lab.markers.person import mirror_images, person_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
@@ -56,6 +57,13 @@ def guess_set(markers: Markers) -> GuessedSet:
     Geometry needs z up; for a recording without anybody upright nothing is believed.
     """
     at = _posture(markers)
+    found = _guessed(at)
+    joints = () if found.name else joints_from_video(at)
+    return replace(found, doubts=(FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
+
+
+def _guessed(at: Mapping[str, Array]) -> GuessedSet:
+    """Return the guess by names, else by the words that mirror images teach."""
     named = _by_names(at)
     if named.name:
         return named
@@ -104,13 +112,16 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
     doubts += fill_absent(places, stand, confirmed) + _medial_alone(places)
     absent = absent_landmarks(places)
     map_ = _map(places, confirmed)
+    reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
     if believed < _BELIEVED * total:
-        doubts.insert(0, f"Only {believed} of {total} landmarks that the labels name stand where a person has them.")
-    elif absent:
-        doubts.insert(0, f"No marker could be taken for: {', '.join(absent)}.")
-    else:
-        return GuessedSet(map_, tuple(doubts), guessed_name(map_))
-    return GuessedSet(map_, tuple(doubts))
+        wrong = ", ".join(label for label in usual if not confirmed[label])
+        reasons.append(
+            f"Only {believed} of {total} landmarks that the labels name stand where a person has them; elsewhere: "
+            f"{wrong}."
+        )
+    if reasons:
+        return GuessedSet(map_, (" ".join(reasons), *doubts))
+    return GuessedSet(map_, tuple(doubts), guessed_name(map_))
 
 
 def guessed_name(map_: Mapping[str, str]) -> str:

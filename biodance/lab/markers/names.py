@@ -94,6 +94,15 @@ def sides_of(labels: Iterable[str]) -> dict[str, str]:
     return {label: next(iter(found)) for label, found in sides.items() if len(found) == 1}
 
 
+def sided_words(labels: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Return label -> its side and all else that it says, in one word ("right", "knee"), for the labels that say a side
+    as the whole set of labels is written.
+    """
+    words = _vocabulary()
+    every = readings_of(labels, words.pairs, words.noise)
+    return {label: (one.side, "".join(one.rest)) for label, ways in every.items() for one in ways if one.side}
+
+
 def _of(words: _Vocabulary, ways: Iterable[Spelled]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
     for way in ways:

@@ -103,7 +103,7 @@ def forest_figure(found: Identification) -> str:
                 marks.append(points(x, y, np.array([value]), np.array([up]), Stroke(colour), inside=inside, size=6.5))
         frame = Frame(height=_ROW * len(rows), left=112.0, above=4.0)
         drawn.append(panel(x, y, marks, "mass of every segment, table and identified", frame=frame))
-    words = ("grey ring: table", "red point: identified, known", "pale: partly known", "black ring: cannot be known")
+    words = ("grey ring: table", "orange point: identified, known", "pale: partly known", "black ring: cannot be known")
     legend = "".join(f"<span>{word}</span>" for word in words)
     return f'<div class="legend">{legend}</div><div class="cells">{"".join(drawn)}</div>'
 

@@ -84,13 +84,12 @@ def condition_figure(one: ConditionEffect) -> "Figure":
             factor * one.shared.own, range(len(names)), xerr=1.96 * factor * one.shared.own_sd, fmt="o", color=BLUE
         )
         low, high = (factor * x for x in one.shared.interval)
-        axes.axvspan(low, high, color=GREY, alpha=0.25, linewidth=0, label="all persons, 95 %")
+        axes.axvspan(low, high, color=GREY, alpha=0.25, linewidth=0)
         axes.axvline(0, color=BLACK, linewidth=0.8)
         axes.set_yticks(range(len(names)), [f"person {name}" for name in names])
         axes.set_xlabel(
             f"{one.factor} {one.level} less {one.factor} {one.base}: {QUANTITY_TITLES[one.quantity]} ({unit})"
         )
-        axes.legend(loc="best")
     return drawn
 
 
