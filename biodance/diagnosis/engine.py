@@ -162,7 +162,7 @@ def assess(examined: Examined) -> Examined:
     large = [pair for pair in every if _counts(naming.found, pair[0])]
     strange = _strange(naming.found, named=bool(large))
     told = verdict(len(large), largest_z(left), one.gates, strained=bool(strange))
-    doubted = [pair for pair in large if _one_of_several(pair[0], named) or pair[1].hangs_on]
+    doubted = _with_weaker([p for p in large if _one_of_several(p[0], named) or p[1].hangs_on], large)
     if told == "unexplained" and strange == (STRANGE,) and largest_z(left) <= LIMIT and len(doubted) < len(large):
         sure = robust_causes(naming.found, naming.accepted)
         stand = [pair for pair in large if cause_key(pair[0]) in sure and any(p.known for p in pair[1].parameters)]
@@ -202,6 +202,16 @@ def _counts(found: Model, cause: NamedCause) -> bool:
 def _hangs(one: Finding) -> str:
     """Say that a cause is only resembled, because its size hangs on something."""
     return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {HANGS} {one.hangs_on}."
+
+
+def _with_weaker(
+    doubted: list[tuple[NamedCause, Finding]], large: list[tuple[NamedCause, Finding]]
+) -> list[tuple[NamedCause, Finding]]:
+    """Return the ``doubted`` causes with every cause of less evidence than the strongest of them: it explains what a
+    wrong model of another cause left, and is no surer than that model.
+    """
+    strongest = max((finding.log_bayes_factor for _, finding in doubted), default=-np.inf)
+    return [pair for pair in large if pair in doubted or pair[1].log_bayes_factor < strongest]
 
 
 def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
