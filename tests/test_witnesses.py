@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from walkers import WEIGHT, Stand, plate, walker
-from walking import FOOT, MASS, STANCE, Wrong, standing, walk
+from walking import FOOT, MASS, STANCE, Wrong, place, standing, walk
 
+from biodance.diagnosis import heard
 from biodance.diagnosis.heard import hear, put_right, sights
 from biodance.diagnosis.testimony import size_by, weigh
 from biodance.lab.markers.sets import GUESSED
@@ -80,6 +81,28 @@ def test_clocks_run_late_by_what_was_made(witness: str) -> None:
         np.testing.assert_allclose(before, 0.0, atol=0.006)
     else:
         np.testing.assert_allclose(before, -0.025, atol=0.01)
+
+
+def test_a_foot_that_is_lifted_and_put_down_in_place_tells_no_instant() -> None:
+    """As in a stand on one leg: what its markers do most is anywhere."""
+    trial = walk()
+    xyz, time = np.array(trial.markers.xyz), trial.markers.time
+    for name, x in (("RHEE", place("right")[0]), ("RTOE", place("right")[0] + FOOT)):
+        xyz[:, trial.markers.names.index(name), 0] = x + 0.01 * np.sin(2 * np.pi * 3.3 * time)
+    lifted = replace(trial, markers=replace(trial.markers, xyz=xyz))
+    assert [step.side for step in recording(lifted).steps] == ["right", "left"]
+    for witness in ("force_onset", "force_end"):
+        assert len(values(trial, witness)) == 2
+        assert [what.split()[0] for what in seen(lifted, witness)] == ["left"]
+
+
+@pytest.mark.parametrize(("delays", "named"), [((0.06, 0.064, 0.058), True), ((-0.04, 0.06, 0.11), False)])
+def test_steps_that_contradict_each_other_name_no_delay(delays: tuple[float, ...], named: bool) -> None:
+    clock = ("time_delay", "")
+    cause = next(one for one in possible_causes(recording(walk())) if one.names == clock)
+    steps = [Observation("force_end", f"step {i}", "walk", late, 0.01, 0.0, "s") for i, late in enumerate(delays)]
+    found = weigh(heard.Testimony(tuple(steps), {clock: cause}, {clock: np.ones(len(steps))})).findings
+    assert [one.effect for one in found] == (["time_delay"] if named else [])
 
 
 def test_strides_weigh_the_person_and_each_plate() -> None:

@@ -22,9 +22,11 @@ _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks 
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _STANDING = {"standing_place"}
 """Witnesses of a habit: no law says where over their feet people stand."""
+_INSTANTS = {"force_onset", "force_end"}
+"""Witnesses of single instants: a clock that runs late moves the forces of the whole movement, too."""
 _WEIGHING = {"standing_force", "stride_force"}
 """Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
-_NOT_MOVED = "Standing alone looks like a {} of {}; the movement, which would show it, shows none."
+_NOT_MOVED = "Standing and single steps alone look like a {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
@@ -59,7 +61,7 @@ def with_witnesses(one: Diagnosis, said: Verdicts, heard: Testimony, *, judged: 
     known = {_names(f) for f in checked.resembles}
     shadows = [shadow for shadow in shadows if _names(shadow) not in known]
     if not mine and checked.verdict == "nothing wrong":
-        notes = (_NOT_MOVED.format(each.effect.replace("_", " "), each.target) for each in shadows)
+        notes = (_NOT_MOVED.format(" of ".join(filter(None, _names(each))).replace("_", " ")) for each in shadows)
         return replace(checked, notes=(*checked.notes, *notes))
     if not mine:
         return replace(checked, resembles=(*checked.resembles, *shadows))
@@ -117,10 +119,12 @@ def _same_size(finding: Finding, other: Finding) -> bool:
 
 
 def _habit(finding: Finding, one: Diagnosis, heard: Testimony) -> bool:
-    """Return whether only the way in which the person stands says so, and a movement without fault shows nothing of
-    it, which would show that size: who stands beside the middle has no plate beside its place.
+    """Return whether only the way in which the person stands says so, or only single instants, and a movement without
+    fault shows nothing of it, which would show that size: who stands beside the middle has no plate beside its place,
+    and forces that fit the movement throughout do not come late.
     """
-    alone = _names(finding) in heard.causes and set(heard.seen_by(_names(finding))) <= _STANDING
+    by = set(heard.seen_by(_names(finding))) if _names(finding) in heard.causes else {""}
+    alone = by <= _STANDING or by <= _INSTANTS
     seen = alone and one.verdict == "nothing wrong" and _times_its_limit(finding, one) > 1.0
     return seen and _evidence(finding, one) <= 0.0
 
