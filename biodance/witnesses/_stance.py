@@ -63,13 +63,22 @@ def swings(foot: FootPath, path: Array, middle: float, near: float, *, before: b
     return bool(np.nan_to_num(np.linalg.norm(place - place[0], axis=1)).max() >= _SWUNG)
 
 
+def _steps(seen: SeenTrial, step: FootStep, part: slice) -> bool:
+    """Return whether the foot swings onto its plate or off it: one that stays in its place stands, and where the
+    pressure lies in it is a matter of balance.
+    """
+    time, foot = seen.plate(step.plate).wrench.time[part], seen.foot(step.side)
+    came = swings(foot, foot.heel, step.middle, float(time[0]), before=True)
+    return came or swings(foot, foot.toe, step.middle, float(time[-1]))
+
+
 @lru_cache(maxsize=128)
 def step_course(seen: SeenTrial, step: FootStep, *, running: bool = False) -> StepCourse | None:
-    """Return one step sample by sample; None where its plate's force does not show it or the foot runs (with
-    ``running``: walks). Of the last steps it is kept: several witnesses ask for it.
+    """Return one step sample by sample; None where its plate's force does not show it, the foot does not
+    step, or it runs (with ``running``: walks). Of the last steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
-    if part is None or walks(seen, step) is running:
+    if part is None or walks(seen, step) is running or not _steps(seen, step, part):
         return None
     wrench = seen.under(step)
     time, force, cop = wrench.time[part], wrench.force[part], seen.pressure(step, part)
