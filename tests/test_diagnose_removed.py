@@ -86,7 +86,22 @@ def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(witness: str
     assert any("plate position of plate1:y" in note for note in one.notes) is not named
 
 
-def test_exchanged_labels_explain_nothing_that_plates_weigh() -> None:
+@pytest.mark.parametrize(("bayes", "named"), [(-1.6, False), (1.6, True)])
+def test_forces_that_fit_the_whole_movement_come_not_late_at_one_step(bayes: float, named: bool) -> None:
+    """The movement, which sees 5 ms, shows nothing wrong and nothing of 62 ms."""
+    clock = ("time_delay", "")
+    cause = Alteration(*clock, "delay", "s", 0.004, lambda seen, size: seen)
+    there = Observation("force_end", "left foot on plate2 at 0.5 s", "stand", 0.038, 0.01, -0.024, "s")
+    said = witness_evidence.WitnessEvidence((there,), {clock: cause}, {clock: np.ones(1)})
+    limits, candidates = (Unobservable(*clock, 0.005, "s"),), (Alias(*clock, bayes),)
+    simulation = Diagnosis("nothing wrong", (), limits=limits, candidates=candidates)
+    late = finding(*clock, 0.062, "s")
+    one = combine_findings(simulation, WitnessFindings((late,), said), said, judged=True)
+    assert one.findings == ((late,) if named else ())
+    assert any("look like a time delay;" in note for note in one.notes) is not named
+
+
+def test_exchanged_labels_explain_nothing_that_plates_infer_causes() -> None:
     labels = Finding("labels_swapped", "LWRA/LWRB", (), (Alias("labels_swapped", "LWRA/LWRB", 30.0),), 1.0)
     simulation = replace(BY_SIMULATION, verdict="named, incomplete", findings=(labels,))
     one = combine_findings(simulation, WitnessFindings((WEIGHT,), HEARD), HEARD, judged=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from walkers import WEIGHT, Stand, plate, walker
-from walking import FOOT, MASS, STANCE, Wrong, standing, walk
+from walking import FOOT, MASS, STANCE, Wrong, place, standing, walk
 
 from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence, undo_causes
 from biodance.diagnosis.witness_inference import infer_causes, size_from_witnesses
@@ -82,6 +82,19 @@ def test_clocks_run_late_by_what_was_made(witness: str) -> None:
         np.testing.assert_allclose(before, -0.025, atol=0.01)
 
 
+@pytest.mark.parametrize("witness", ["force_onset", "force_end", "foot_across"])
+def test_a_foot_that_is_lifted_and_put_down_in_place_is_no_step(witness: str) -> None:
+    """As in a stand on one leg: what its markers do most is anywhere, and the pressure lies where balance needs it."""
+    trial = walk()
+    xyz, time = np.array(trial.markers.xyz), trial.markers.time
+    for name, x in (("RHEE", place("right")[0]), ("RTOE", place("right")[0] + FOOT)):
+        xyz[:, trial.markers.names.index(name), 0] = x + 0.01 * np.sin(2 * np.pi * 3.3 * time)
+    lifted = replace(trial, markers=replace(trial.markers, xyz=xyz))
+    assert [step.side for step in recording(lifted).steps] == ["right", "left"]
+    assert {what.split()[0] for what in seen(trial, witness)} == {"right", "left"}
+    assert {what.split()[0] for what in seen(lifted, witness)} == {"left"}
+
+
 def test_strides_weigh_the_person_and_each_plate() -> None:
     whole = [
         one.value for what, one in seen(walk(), "stride_force").items() if "step from" in what and one.unit == "kg"
@@ -126,12 +139,8 @@ def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> N
     one = seen(standing(push=4.0, weight=62.0), "standing_force")["mean Fx"]
     (share,) = [size / (62.0 * 9.81) for size in one.norms.values()]
     assert 0.003 < share < 0.004
-    assert (
-        size_from_witnesses(collect_evidence(session(standing(push=4.0), standing(push=4.0))), ("plate_offset", "Fx"))[
-            1
-        ]
-        > 1.5
-    )
+    twice = collect_evidence(session(standing(push=4.0), standing(push=4.0)))
+    assert size_from_witnesses(twice, ("plate_offset", "Fx"))[1] > 1.5
 
 
 def test_empty_plates_tell_what_was_taken_off() -> None:

@@ -22,9 +22,11 @@ _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks 
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _STANDING = {"standing_place"}
 """Witnesses of a habit: no law says where over their feet people stand."""
+_INSTANTS = {"force_onset", "force_end"}
+"""Witnesses of single instants: a clock that runs late moves the forces of the whole movement, too."""
 _WEIGHING = {"standing_force", "stride_force"}
 """Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
-_NOT_MOVED = "Standing alone looks like a {} of {}; the movement, which would show it, shows none."
+_NOT_MOVED = "Standing and single steps alone look like a {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
@@ -55,7 +57,7 @@ def combine_findings(
         if (
             alike is None
             and judged
-            and (_simulation_disagrees(finding, checked, evidence) or _only_standing_habit(finding, checked, evidence))
+            and (_simulation_disagrees(finding, checked, evidence) or _movement_shows_none(finding, checked, evidence))
         ):
             doubtful.append(finding)
         else:
@@ -63,7 +65,7 @@ def combine_findings(
     known = {_names(f) for f in checked.resembles}
     doubtful = [shadow for shadow in doubtful if _names(shadow) not in known]
     if not kept_findings and checked.verdict == "nothing wrong":
-        notes = (_NOT_MOVED.format(each.effect.replace("_", " "), each.target) for each in doubtful)
+        notes = (_NOT_MOVED.format(" of ".join(filter(None, _names(each))).replace("_", " ")) for each in doubtful)
         return replace(checked, notes=(*checked.notes, *notes))
     if not kept_findings:
         return replace(checked, resembles=(*checked.resembles, *doubtful))
@@ -120,11 +122,13 @@ def _same_size(finding: Finding, other: Finding) -> bool:
     return bool(abs(kept_findings.value - its.value) <= _FAR * np.hypot(kept_findings.sd, its.sd))
 
 
-def _only_standing_habit(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
-    """Return whether a finding rests only on where the person stands over the feet, while a movement that would show a
-    cause of this size shows none: people may stand off centre on a plate that is in its place.
+def _movement_shows_none(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
+    """Return whether a finding rests only on where the person stands over the feet, or only on single instants, while
+    a movement that would show a cause of this size shows none: people may stand off centre on a plate that is in its
+    place, and forces that fit the movement throughout are not late.
     """
-    alone = _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _STANDING
+    by = set(evidence.seen_by(_names(finding))) if _names(finding) in evidence.causes else {""}
+    alone = by <= _STANDING or by <= _INSTANTS
     seen = alone and one.verdict == "nothing wrong" and _size_over_limit(finding, one) > 1.0
     return seen and _evidence(finding, one) <= 0.0
 

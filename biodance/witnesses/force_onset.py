@@ -9,7 +9,7 @@ import numpy as np
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import by_step
+from biodance.witnesses._stance import by_step, steps
 
 _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
@@ -36,15 +36,16 @@ class ForceOnset(Witness):
     @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
-        if part is None or part.start == 0:
+        if part is None or part.start == 0 or not steps(seen, step):
             return []
         wrench = seen.plate(step.plate).wrench
         before, after = wrench.force[part.start - 1, 2], wrench.force[part.start, 2]
         share = (ONSET - before) / (after - before) if after > before else 1.0
         onset = wrench.time[part.start - 1] + share * (wrench.time[part.start] - wrench.time[part.start - 1])
-        struck = heel_strike(seen.foot(step.side), step.middle, onset)
+        foot = seen.foot(step.side)
+        struck = heel_strike(foot, step.middle, onset)
         expected, step_sd, laboratory = ONSET_AFTER_STRIKE
-        own = float(np.hypot(step_sd, 0.25 / seen.foot(step.side).rate))
+        own = float(np.hypot(step_sd, 0.25 / foot.rate))
         norms = {"laboratory onset": laboratory}
         value = onset - struck
         return [Observation(self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms)]
