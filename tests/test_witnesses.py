@@ -9,7 +9,6 @@ import pytest
 from walkers import WEIGHT, Stand, plate, walker
 from walking import FOOT, MASS, STANCE, Wrong, place, standing, walk
 
-from biodance.diagnosis import heard
 from biodance.diagnosis.heard import hear, put_right, sights
 from biodance.diagnosis.testimony import size_by, weigh
 from biodance.lab.markers.sets import GUESSED
@@ -94,19 +93,6 @@ def test_a_foot_that_is_lifted_and_put_down_in_place_is_no_step(witness: str) ->
     assert [step.side for step in recording(lifted).steps] == ["right", "left"]
     assert {what.split()[0] for what in seen(trial, witness)} == {"right", "left"}
     assert {what.split()[0] for what in seen(lifted, witness)} == {"left"}
-
-
-@pytest.mark.parametrize(("delays", "named"), [((0.07, 0.076, 0.074), True), ((0.034, 0.076, 0.111), False)])
-def test_steps_that_contradict_each_other_name_no_delay(delays: tuple[float, ...], named: bool) -> None:
-    clock = ("time_delay", "")
-    cause = next(one for one in possible_causes(recording(walk())) if one.names == clock)
-    norms = {"person toe off": 0.009}
-    steps = [
-        Observation("force_end", f"step {i}", "walk", late, 0.01, 0.0, "s", norms=norms)
-        for i, late in enumerate(delays)
-    ]
-    found = weigh(heard.Testimony(tuple(steps), {clock: cause}, {clock: np.ones(len(steps))})).findings
-    assert [one.effect for one in found] == (["time_delay"] if named else [])
 
 
 def test_strides_weigh_the_person_and_each_plate() -> None:

@@ -136,8 +136,7 @@ def weigh(testimony: Testimony) -> Verdicts:
         chosen = tuple(one.names for one, _ in named if one.names in heard.causes)
         ranking = _ranked(heard, value, chosen, signs=number == 0)
         first = first or tuple(one.alias for one in ranking)
-        likely = (one for one in ranking if one.score >= THRESHOLD)
-        best = next((one for one in likely if _matters(heard, value, (*chosen, one.names), one)), None)
+        best = next((one for one in ranking if one.score >= THRESHOLD and _matters(heard, one)), None)
         if best is None:
             break
         near = [o for o in ranking if o is best or best.score - o.score <= TOGETHER]
@@ -179,7 +178,7 @@ def _ranked(heard: Testimony, value: Array, named: tuple[tuple[str, str], ...], 
 def _explained(
     heard: Testimony, value: Array, names: tuple[tuple[str, str], ...], known: Array | None = None
 ) -> Explanation:
-    Z = _added(heard, names)
+    Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
     return _fitted(heard, value, Z, np.array([SCALE * _typical(*name) for name in names]), known)
 
 
@@ -194,7 +193,7 @@ def _sized(heard: Testimony, value: Array, names: tuple[tuple[str, str], ...]) -
     right, the witnesses are asked again, for what a cause adds is no straight line.
     """
     size = np.array([_BROAD * _typical(*name) for name in names])
-    Z = _added(heard, names)
+    Z = np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
     found = _fitted(heard, value, Z, size)
     for _ in range(_AGAIN if heard.recorded and names else 0):
         added, slopes = put_right(heard, dict(zip(names, map(float, found.theta), strict=True)))
@@ -209,17 +208,15 @@ def _typical(effect: str, target: str) -> float:
     return float(kind.typical[0]) if isinstance(kind, Effect) else 1.0
 
 
-def _matters(heard: Testimony, value: Array, names: tuple[tuple[str, str], ...], one: Hypothesis) -> bool:
-    """Return whether the last of the causes ``names`` of an explanation is larger than what laboratories have without
-    fault, and sure.
-    """
+def _matters(heard: Testimony, one: Hypothesis) -> bool:
+    """Return whether the last cause of an explanation is larger than what laboratories have without fault, and sure."""
     if one.names not in heard.causes:
         return True
     cause, size = heard.causes[one.names], abs(float(one.found.theta[-1]))
     usual = _USUAL.get((cause.effect, cause.unit), 0.0)
     if cause.effect == "plate_offset" and cause.target.endswith("Fz"):
         usual = _VERTICAL
-    sd = _sd(heard, one.names, value - _added(heard, names) @ one.found.theta, one.found.covariance[-1, -1])
+    sd = float(np.hypot(one.found.covariance[-1, -1] ** 0.5, _ALIKE.get(cause.effect, 0.0)))
     return size > usual + sd and size > _SURE * sd
 
 
@@ -227,13 +224,12 @@ def _findings(heard: Testimony, value: Array, named: list[tuple[Hypothesis, tupl
     """Return the named causes with their sizes, all fitted together."""
     sized = tuple(one.names for one, _ in named if one.names in heard.causes)
     last, found = _sized(heard, value, sized), []
-    left = value - _added(heard, sized) @ last.theta
     for one, near in named:
         kind, visible = causes()[one.names[0]], 1.0
         estimates: tuple[Estimate, ...] = ()
         if one.names in sized:
             i, cause = sized.index(one.names), heard.causes[one.names]
-            sd = _sd(heard, one.names, left, last.covariance[i, i])
+            sd = float(np.hypot(last.covariance[i, i] ** 0.5, _ALIKE.get(cause.effect, 0.0)))
             estimates = (Estimate(cause.parameter, float(last.theta[i]), sd, cause.unit),)
             visible = _visible(heard, one.names)
         found.append(Finding(*one.names, estimates, near, visible, advice=f"{_said(heard, one.names)} {kind.advice}"))
@@ -249,20 +245,8 @@ def size_by(heard: Testimony, names: tuple[str, str]) -> tuple[float, float] | N
         return None
     value = np.array([one.value - one.expected for one in counting.observations])
     one = _sized(counting, value, (names,))
-    left = value - counting.traces[names] * one.theta[0]
-    return float(one.theta[0]), _sd(counting, names, left, one.covariance[0, 0])
-
-
-def _added(heard: Testimony, names: tuple[tuple[str, str], ...]) -> Array:
-    """Return (n, p) what one unit of each cause adds to the observations."""
-    return np.stack([heard.traces[name] for name in names], axis=1) if names else np.empty((len(heard.observations), 0))
-
-
-def _sd(heard: Testimony, names: tuple[str, str], left: Array, variance: float) -> float:
-    """Return the standard deviation of the size of a cause from its ``variance``, wider by as much as the observations
-    contradict each other in what is ``left`` (n,) of them, and never surer than careful laboratories are alike.
-    """
-    return float(np.hypot(_disagreement(heard, names, left) * variance**0.5, _ALIKE.get(names[0], 0.0)))
+    sd = _disagreement(counting, names, value - counting.traces[names] * one.theta[0]) * one.covariance[0, 0] ** 0.5
+    return float(one.theta[0]), float(np.hypot(sd, _ALIKE.get(names[0], 0.0)))
 
 
 def _disagreement(heard: Testimony, names: tuple[str, str], left: Array) -> float:

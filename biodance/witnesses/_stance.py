@@ -53,7 +53,7 @@ def walks(seen: SeenTrial, step: FootStep) -> bool:
     return part is not None and bool(time[part.stop - 1] - time[part.start] >= _WALKS)
 
 
-def swings(foot: FootPath, path: Array, middle: float, near: float, *, before: bool = False) -> bool:
+def _swings(foot: FootPath, path: Array, middle: float, near: float, *, before: bool = False) -> bool:
     """Return whether a marker's ``path`` (T, 3) m swings off within 0.3 s after ``near`` s (``before``: comes so),
     against the ground or belt on which the foot stands at ``middle`` s.
     """
@@ -63,13 +63,16 @@ def swings(foot: FootPath, path: Array, middle: float, near: float, *, before: b
     return bool(np.nan_to_num(np.linalg.norm(place - place[0], axis=1)).max() >= _SWUNG)
 
 
-def _steps(seen: SeenTrial, step: FootStep, part: slice) -> bool:
-    """Return whether the foot swings onto its plate or off it: one that stays in its place stands, and where the
-    pressure lies in it is a matter of balance.
+def steps(seen: SeenTrial, step: FootStep) -> bool:
+    """Return whether the foot swings onto its plate or off it: one that stays in its place stands: where the
+    pressure lies in it is a matter of balance, and its markers show no instant.
     """
-    time, foot = seen.plate(step.plate).wrench.time[part], seen.foot(step.side)
-    came = swings(foot, foot.heel, step.middle, float(time[0]), before=True)
-    return came or swings(foot, foot.toe, step.middle, float(time[-1]))
+    part, foot = seen.stance(step), seen.foot(step.side)
+    if part is None:
+        return False
+    time = seen.plate(step.plate).wrench.time[part]
+    came = _swings(foot, foot.heel, step.middle, float(time[0]), before=True)
+    return came or _swings(foot, foot.toe, step.middle, float(time[-1]))
 
 
 @lru_cache(maxsize=128)
@@ -78,7 +81,7 @@ def step_course(seen: SeenTrial, step: FootStep, *, running: bool = False) -> St
     step, or it runs (with ``running``: walks). Of the last steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
-    if part is None or walks(seen, step) is running or not _steps(seen, step, part):
+    if part is None or walks(seen, step) is running or not steps(seen, step):
         return None
     wrench = seen.under(step)
     time, force, cop = wrench.time[part], wrench.force[part], seen.pressure(step, part)

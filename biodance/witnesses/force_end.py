@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import by_step, swings
+from biodance.witnesses._stance import by_step, steps
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves."""
@@ -33,11 +33,9 @@ class ForceEnd(Witness):
     @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, time = seen.stance(step), seen.plate(step.plate).wrench.time
-        if part is None or part.stop >= time.size:
+        if part is None or part.stop >= time.size or not steps(seen, step):
             return []
         end, foot = float(time[part.stop - 1]), seen.foot(step.side)
-        if not swings(foot, foot.toe, step.middle, end):
-            return []
         value, norms = end - toe_pulled(foot, step.middle, end), {"person toe off": _PERSON}
         return [Observation(self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms)]
 

@@ -9,7 +9,7 @@ import numpy as np
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import by_step, swings
+from biodance.witnesses._stance import by_step, steps
 
 _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
@@ -24,7 +24,7 @@ class ForceOnset(Witness):
 
     name = "force_onset"
     sees = ("time_delay",)
-    needs = "Steps that swing onto an empty plate, heel first; markers at 100 Hz or more."
+    needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
     def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
@@ -36,15 +36,13 @@ class ForceOnset(Witness):
     @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
-        if part is None or part.start == 0:
+        if part is None or part.start == 0 or not steps(seen, step):
             return []
         wrench = seen.plate(step.plate).wrench
         before, after = wrench.force[part.start - 1, 2], wrench.force[part.start, 2]
         share = (ONSET - before) / (after - before) if after > before else 1.0
         onset = wrench.time[part.start - 1] + share * (wrench.time[part.start] - wrench.time[part.start - 1])
         foot = seen.foot(step.side)
-        if not swings(foot, foot.heel, step.middle, onset, before=True):
-            return []
         struck = heel_strike(foot, step.middle, onset)
         expected, step_sd, laboratory = ONSET_AFTER_STRIKE
         own = float(np.hypot(step_sd, 0.25 / foot.rate))
