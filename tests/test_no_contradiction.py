@@ -98,6 +98,13 @@ def test_nothing_says_all_is_well_beside_a_failed_check_or_an_unjudged_trial(ver
                 assert check.what in said, where
 
 
+def test_diagnose_begins_with_its_headline() -> None:
+    found = SessionDiagnosis(told(WHOLE, replace(FULL, checks=()), (STATIC,)))
+    screen = StringIO()
+    print_diagnosis(json.loads(to_text(diagnosis_document(found))), Console(file=screen, width=1000))
+    assert screen.getvalue().startswith(found.diagnosis.attention[0].text)
+
+
 def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> None:
     quiet = (replace(LEFT[0], z=1.0),)
     strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=(STRANGE,), resembles=(FOUND,))

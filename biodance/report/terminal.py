@@ -206,9 +206,9 @@ def _print_accepted(found: dict[str, Any], console: Console) -> None:
 
 
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
-    """Print the verdict, what was named with size and interval, and what could not be seen, of `biodance diagnose`."""
-    console.print(f"verdict: [bold]{found['verdict']}[/]{_judged_part(found)}")
+    """Print of `biodance diagnose`: the headline, the verdict, what was named with size and interval, what was left."""
     print_attention(found["attention"], console)
+    console.print(f"verdict: [bold]{found['verdict']}[/]{_judged_part(found)}")
     _print_failures(found["failures"], console)
     beside = " beside the others" if len(found["findings"]) > 1 else ""
     for finding in found["findings"]:
