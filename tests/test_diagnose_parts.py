@@ -9,6 +9,8 @@ from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
+from biodance.diagnosis.diagnosis import Alias, Finding
+from biodance.diagnosis.engine import _with_weaker
 from biodance.diagnosis.evidence import evidence, linear_posterior, smallest_detectable
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
@@ -110,6 +112,16 @@ def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
     rows = detection_limits(visibility(found, causes), put.cases[0].body, 10.0)
     assert {(row.effect, row.target) for row in rows} == {one.names for one in suspects}
     assert all(row.told_from >= row.limit > 0 for row in rows)
+
+
+@pytest.mark.parametrize(("gain", "doubted"), [(14.3, ["shoulder_girdle", "plate_gain"]), (130.0, ["shoulder_girdle"])])
+def test_a_cause_of_less_evidence_than_a_doubted_one_is_doubted_too(gain: float, doubted: list[str]) -> None:
+    pairs = [
+        (None, Finding(name, "", (), (Alias(name, "", bayes),), 0.5))
+        for name, bayes in (("shoulder_girdle", 117.1), ("plate_gain", gain))
+    ]
+    assert [finding.effect for _, finding in _with_weaker(pairs[:1], pairs)] == doubted
+    assert _with_weaker([], pairs) == []
 
 
 def test_no_limit_lies_below_what_changes_the_wrench(put) -> None:
