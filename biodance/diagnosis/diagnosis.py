@@ -192,7 +192,7 @@ class Diagnosis:
         What the verdict rests on.
     doubt : str
         Why no cause can be told from what was judged (only standing, markers too far from the body); "" where one can.
-    witnesses : Testimony or None
+    witnesses : WitnessEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
 
     Examples
