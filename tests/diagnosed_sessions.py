@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.fft import idct
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from biodance.body.human.human import human
 from biodance.diagnosis.problem import Look
@@ -64,8 +64,13 @@ def noise(rng: np.random.Generator, frames: int) -> np.ndarray:
     return np.asarray(idct(value, axis=0, norm="ortho"))
 
 
+def nothing(wrench, session, moving):
+    """Hide nothing."""
+    return wrench
+
+
 def looks(
-    seed: int, *, trials: int = 4, hidden=lambda wrench, time, motion: wrench, unlike: float = 0.7
+    seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7
 ) -> tuple[Look, ...]:
     """Return trials of a person whose parameters differ from the table by ``unlike`` of its own standard deviations;
     ``hidden`` changes the wrench.
@@ -88,6 +93,27 @@ def looks(
         trial = Trial(f"t{k}", "fit", None, (plate,), Source(Path(f"t{k}.c3d"), "", "test"))
         found.append(Look(trial, moving, np.ones(moving.time.size, dtype=bool), *share))
     return tuple(found)
+
+
+def delay(wrench, session, moving):
+    """Hide that the forces come 20 ms late."""
+    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
+
+
+def pull(wrench, session, moving):
+    """Hide a cable that pulls sideways with 8 N, one metre over the lab's origin, 1.3 times a second."""
+    force = np.outer(8.0 * np.sin(2 * np.pi * 1.3 * moving.time), [0.0, 1.0, 0.0])
+    return wrench + np.concatenate([force, np.cross([0.0, 0.0, 1.0], force)], axis=1)
+
+
+def offset(newton: float):
+    """Return a hiding of an offset of Fx."""
+    return about_plate(lambda local, session: local + newton * np.eye(6)[0])
+
+
+def gain(share: float):
+    """Return a hiding of a gain of Fz that is too large by ``share``."""
+    return about_plate(lambda local, session: local * (1 + share * np.eye(6)[2]))
 
 
 def about_plate(change):

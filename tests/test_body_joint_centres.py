@@ -1,6 +1,5 @@
 """Joint centres from markers and widths: formulas at round numbers, and Vicon's own centres in its static files."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +8,6 @@ import pytest
 from biodance.body.human.measures import chord, davis_hip, elbow, harrington_hip, pelvis_frame, shoulder, unit, wrist
 from biodance.lab.c3d.raw import read_raw
 
-DATA = os.environ.get("BIODANCE_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="BIODANCE_DATA is not set: the folder of real recordings")
 STATICS = {
     "pycgm": "Static_trial",
     "biomechzoo/HC030A": "HC030A01",
@@ -42,11 +39,10 @@ def test_hip_formulas_at_round_numbers() -> None:
     )
 
 
-@needs_data
 @pytest.mark.parametrize("folder", sorted(STATICS))
-def test_davis_is_vicons_own_hip_centre(folder: str) -> None:
+def test_davis_is_vicons_own_hip_centre(folder: str, data: Path) -> None:
     """With the measures that Vicon used, our formula gives Vicon's hip centre (LFEP, RFEP) in its own static file."""
-    raw = read_raw(Path(str(DATA)) / folder / f"{STATICS[folder]}.c3d")
+    raw = read_raw(data / folder / f"{STATICS[folder]}.c3d")
     typed = {
         name: float(np.ravel(value)[0]) / 1e3
         for name, value in raw.parameters["PROCESSING"].items()
@@ -66,13 +62,12 @@ def test_davis_is_vicons_own_hip_centre(folder: str) -> None:
         assert distance < 1e-5
 
 
-@needs_data
 @pytest.mark.parametrize("folder", sorted(STATICS))
-def test_knee_ankle_shoulder_elbow_and_wrist_are_vicons_own(folder: str) -> None:
+def test_knee_ankle_shoulder_elbow_and_wrist_are_vicons_own(folder: str, data: Path) -> None:
     """Each construction, from Vicon's own proximal centre and typed widths, gives Vicon's centre in its own static
     file.
     """
-    raw = read_raw(Path(str(DATA)) / folder / f"{STATICS[folder]}.c3d")
+    raw = read_raw(data / folder / f"{STATICS[folder]}.c3d")
     typed = {
         name: float(np.ravel(value)[0]) / 1e3
         for name, value in raw.parameters["PROCESSING"].items()

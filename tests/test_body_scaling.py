@@ -1,6 +1,5 @@
 """Scaling on a static trial: bodies that stand under their markers, clear refusals."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,8 +24,6 @@ from biodance.records import Markers, Source, Subject, Trial
 from biodance.spatial import elementary_rotation
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
-DATA = os.environ.get("BIODANCE_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="BIODANCE_DATA is not set: the folder of real recordings")
 STATICS = ("biomechzoo/HC030A", "biomechzoo/HC032A", "biomechzoo/HC038A", "pycgm")
 
 
@@ -211,10 +208,9 @@ def test_hidden_frames_of_the_static_do_no_harm() -> None:
     np.testing.assert_allclose(a.markers.position, b.markers.position, atol=1e-9)
 
 
-@needs_data
 @pytest.mark.parametrize("folder", [*STATICS, "adl_gait"])
-def test_real_people_are_scaled_and_stand_under_their_markers(folder: str) -> None:
-    session = read_session(Path(str(DATA)) / folder)
+def test_real_people_are_scaled_and_stand_under_their_markers(folder: str, data: Path) -> None:
+    session = read_session(data / folder)
     (static,) = session.of_role("static")
     body, q = scaled(session.subject, prepare(static))
     found = poses(body, q[None]).points(body.markers.segment, body.markers.position)[0]

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, about_plate, body, known, looks, motion
-from scipy.interpolate import make_interp_spline
+from diagnosed_sessions import RATE, about_plate, body, delay, gain, known, looks, motion, nothing, offset, pull
 from scipy.signal import butter, filtfilt
 
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
@@ -39,20 +38,6 @@ def found(hidden, *, seed: int = 1, chosen=FAST):
     return diagnose_trials(body(), looks(seed, hidden=hidden), tolerances=known(), effects=chosen)
 
 
-def gained(local, session):
-    local[:, 2] *= 1.05
-    return local
-
-
-def offset(local, session):
-    local[:, 0] += 12.0
-    return local
-
-
-def late(wrench, session, moving):
-    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
-
-
 @dataclass(frozen=True)
 class Cable(Effect):
     """A cable pulls sideways in the beat of ``beat`` Hz, one metre over the lab's origin; an effect as a user writes
@@ -71,11 +56,7 @@ class Cable(Effect):
 
 @pytest.mark.parametrize("effects", [[Cable(beat=1.3), *FAST], [Cable(beat=1.3)]])
 def test_a_users_own_effect_is_found_beside_the_family(effects) -> None:
-    def pulled(wrench, session, moving):
-        pull = np.outer(8.0 * np.sin(2 * np.pi * 1.3 * moving.time), [0.0, 1.0, 0.0])
-        return wrench + np.concatenate([pull, np.cross([0.0, 0.0, 1.0], pull)], axis=1)
-
-    diagnosis = found(pulled, chosen=effects).diagnosis
+    diagnosis = found(pull, chosen=effects).diagnosis
     (finding,) = diagnosis.findings
     assert (finding.effect, finding.target) == ("cable", "")
     assert finding.parameters[0].value == pytest.approx(8.0, rel=0.1)
@@ -84,7 +65,7 @@ def test_a_users_own_effect_is_found_beside_the_family(effects) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_without_fault_nothing_is_named(seed: int) -> None:
-    diagnosis = found(lambda wrench, session, moving: wrench, seed=seed).diagnosis
+    diagnosis = found(nothing, seed=seed).diagnosis
     assert diagnosis.verdict == "nothing wrong"
     assert not diagnosis.findings
     assert diagnosis.worst < 4.5
@@ -93,9 +74,9 @@ def test_without_fault_nothing_is_named(seed: int) -> None:
 @pytest.mark.parametrize(
     ("hidden", "effect", "target", "parameter", "size"),
     [
-        (about_plate(gained), "plate_gain", "Fz", "gain", 0.05),
-        (about_plate(offset), "plate_offset", "Fx", "offset", 12.0),
-        (late, "time_delay", "", "delay", 0.02),
+        (gain(0.05), "plate_gain", "Fz", "gain", 0.05),
+        (offset(12.0), "plate_offset", "Fx", "offset", 12.0),
+        (delay, "time_delay", "", "delay", 0.02),
     ],
 )
 def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, size) -> None:
@@ -115,7 +96,7 @@ def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, si
 def test_the_size_told_holds_what_the_cause_s_own_tolerance_took() -> None:
     """Clocks that differ by 3 ms in every laboratory take 0.7 of 20 ms from the name: told is what is there."""
     mine = replace(known(), sizes={**known().sizes, "time_delay": 0.003})
-    found = diagnose_trials(body(), looks(2, hidden=late), tolerances=mine, effects=FAST)
+    found = diagnose_trials(body(), looks(2, hidden=delay), tolerances=mine, effects=FAST)
     (cause,), (finding,) = found.naming.found.named, found.diagnosis.findings
     assert cause.theta[0] < 0.0196
     assert finding.parameters[0].value == pytest.approx(0.02, rel=0.01)
@@ -124,7 +105,7 @@ def test_the_size_told_holds_what_the_cause_s_own_tolerance_took() -> None:
 
 def test_two_faults_are_both_named() -> None:
     def both(wrench, session, moving):
-        return late(about_plate(offset)(wrench, session, moving), session, moving)
+        return delay(offset(12.0)(wrench, session, moving), session, moving)
 
     diagnosis = found(both).diagnosis
     assert {f.effect for f in diagnosis.findings} == {"plate_offset", "time_delay"}
@@ -143,7 +124,7 @@ def test_what_no_cause_describes_is_unexplained_and_located() -> None:
 
 
 def test_an_absent_culprit_is_never_complete() -> None:
-    diagnosis = found(late, chosen=tuple(name for name in FAST if name != "time_delay")).diagnosis
+    diagnosis = found(delay, chosen=tuple(name for name in FAST if name != "time_delay")).diagnosis
     assert diagnosis.verdict in ("unexplained", "named, incomplete")
 
 
@@ -212,7 +193,7 @@ def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkey
 
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
-    looked_at = looks(1, trials=6, hidden=about_plate(gained))
+    looked_at = looks(1, trials=6, hidden=gain(0.05))
     examined = diagnose_trials(body(), looked_at[:4], tolerances=known(), effects=FAST)
     kept = looked_at[4:]
     cases = [
@@ -260,7 +241,7 @@ def test_a_cause_that_is_not_in_the_family_is_refused() -> None:
 
 
 def test_limits_come_without_the_forces() -> None:
-    clean, wrong = found(lambda wrench, session, moving: wrench), found(about_plate(offset))
+    clean, wrong = found(nothing), found(offset(12.0))
     first, second = ({(r.effect, r.target): r.limit for r in one.diagnosis.limits} for one in (clean, wrong))
     assert first.keys() == second.keys()
     for key, limit in first.items():

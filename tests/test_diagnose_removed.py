@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, gain, known, looks
 
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.combine_witnesses import combine_findings
@@ -21,11 +21,6 @@ def shifted(local, session):
     return local
 
 
-def gained(local, session):
-    local[:, 2] *= 1.05
-    return local
-
-
 def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
     some = looks(1, trials=2, hidden=about_plate(shifted))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_crosstalk",)).diagnosis
@@ -37,7 +32,7 @@ def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
 
 def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
     """A gain of 5 % is 25 times what these plates have."""
-    some = looks(1, trials=2, hidden=about_plate(gained))
+    some = looks(1, trials=2, hidden=gain(0.05))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert UNASKED in one.notes

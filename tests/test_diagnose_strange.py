@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks
-from scipy.interpolate import make_interp_spline
+from diagnosed_sessions import body, delay, known, looks, nothing
 
 from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.engine import STRANGE, diagnose_trials
@@ -20,17 +19,13 @@ family = effects()
 CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
 
 
-def late(wrench, session, moving):
-    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
-
-
 def diagnosed(hidden, *, unlike: float, trials: int = 4, tolerances=None):
     some = looks(1, hidden=hidden, unlike=unlike, trials=trials)
     return diagnose_trials(body(), some, tolerances=tolerances or known(), effects=CAUSES)
 
 
 def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_is_not() -> None:
-    strange = diagnosed(late, unlike=4.0)
+    strange = diagnosed(delay, unlike=4.0)
     assert strain(strange.naming.found) > STRAINED
     assert strange.diagnosis.verdict == "named, incomplete"
     assert STRANGE in strange.diagnosis.notes
@@ -38,17 +33,17 @@ def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_i
     (size,) = finding.parameters
     assert finding.effect == "time_delay"
     assert size.interval[0] < 0.02 < size.interval[1]
-    alone = diagnosed(late, unlike=6.0, trials=1)
+    alone = diagnosed(delay, unlike=6.0, trials=1)
     assert strain(alone.naming.found) > STRAINED
     assert not alone.diagnosis.findings, "one trial does not show that the delay is the same in another one"
-    clean = diagnosed(lambda wrench, session, moving: wrench, unlike=4.0).diagnosis
+    clean = diagnosed(nothing, unlike=4.0).diagnosis
     assert clean.verdict == "unexplained"
     assert not clean.findings
 
 
 def test_a_size_that_is_hardly_known_is_no_name_beside_a_strange_body() -> None:
     """Delays that are unlike their model by 60 % of their size are seen as surely, and told as 20 ± 12 ms."""
-    one = diagnosed(late, unlike=4.0, tolerances=replace(known(), accuracy={"time_delay": 0.6})).diagnosis
+    one = diagnosed(delay, unlike=4.0, tolerances=replace(known(), accuracy={"time_delay": 0.6})).diagnosis
     assert not one.findings
     (like,) = one.resembles
     assert like.effect == "time_delay"
@@ -56,7 +51,7 @@ def test_a_size_that_is_hardly_known_is_no_name_beside_a_strange_body() -> None:
 
 
 def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed() -> None:
-    wide, usual = (diagnosed(lambda w, s, m: w, unlike=size).naming.bare for size in (4.0, 0.7))
+    wide, usual = (diagnosed(nothing, unlike=size).naming.bare for size in (4.0, 0.7))
     assert strain(wide) > STRAINED > abs(strain(with_inflated_prior(wide)))
     np.testing.assert_array_equal(with_inflated_prior(usual).posterior.X, usual.posterior.X)
     assert with_inflated_prior(usual).log_likelihood == pytest.approx(usual.log_likelihood)

@@ -2,7 +2,6 @@
 mended copies.
 """
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +20,6 @@ from biodance.lab.session.read import read_session
 from biodance.records import Markers, Session, Source, Subject, Trial
 
 HEAD = (("LFHD", "RFHD"), ("LBHD", "RBHD"))
-REAL = os.environ.get("BIODANCE_DATA")
 WRISTS = {side: (f"{side}WRA", f"{side}WRB") for side in "LR"}
 
 
@@ -99,7 +97,6 @@ def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Pa
         write_relabelled(source, copy, {})
 
 
-@pytest.mark.skipif(not REAL, reason="BIODANCE_DATA is not set: real recordings are not here")
 @pytest.mark.parametrize(
     ("child", "truth"),
     [
@@ -112,15 +109,14 @@ def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Pa
         ("HC044A", {}),
     ],
 )
-def test_real_exchanges_are_found_and_no_others(child: str, truth: dict) -> None:
-    found = exchanges(Recorded(read_session(Path(str(REAL)) / "biomechzoo" / child)))
+def test_real_exchanges_are_found_and_no_others(child: str, truth: dict, data: Path) -> None:
+    found = exchanges(Recorded(read_session(data / "biomechzoo" / child)))
     assert found == truth
 
 
 FRONT = (("LBHD", "LFHD"), ("RBHD", "RFHD"))
 
 
-@pytest.mark.skipif(not REAL, reason="BIODANCE_DATA is not set: real recordings are not here")
 @pytest.mark.parametrize(
     ("wrong", "pairs"),
     [
@@ -130,9 +126,11 @@ FRONT = (("LBHD", "LFHD"), ("RBHD", "RFHD"))
         ((0, 1, 2), FRONT),
     ],
 )
-def test_real_copies_with_exchanged_bytes_give_the_right_set(wrong: tuple, pairs: tuple, tmp_path: Path) -> None:
+def test_real_copies_with_exchanged_bytes_give_the_right_set(
+    wrong: tuple, pairs: tuple, data: Path, tmp_path: Path
+) -> None:
     names = {one: other for pair in pairs for one, other in (pair, pair[::-1])}
-    for number, path in enumerate(sorted((Path(str(REAL)) / "biomechzoo" / "HC032A").glob("*.c3d"))):
+    for number, path in enumerate(sorted((data / "biomechzoo/HC032A").glob("*.c3d"))):
         write_relabelled(path, tmp_path / path.name, names if number in wrong else {})
     session = read_session(tmp_path)
     right = {session.trials[number].name: set(pairs) for number in wrong}

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, about_plate, body, known, looks, motion
+from diagnosed_sessions import RATE, body, known, looks, motion, offset
 from example_results import full_session
 
 from biodance.diagnosis.adequacy import adequacy, largest_z, verdict
@@ -33,14 +33,6 @@ BAD = replace(GOOD, value="31.0 mm", inside=False)
 HEAVY = Check("mass on the plates against declared", "static", "6.0 %", "at most 2 %", False, "Weigh again.")
 WALK = Judged("walk", 0.0, "no 1 s of contact. More.", missed=True)
 STATIC = Judged("static", 3.0)
-
-
-def offset(size: float):
-    def changed(local, session):
-        local[:, 0] += size
-        return local
-
-    return about_plate(changed)
 
 
 # 1 ---- what names need

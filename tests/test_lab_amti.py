@@ -2,9 +2,6 @@
 an explanation.
 """
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -242,16 +239,8 @@ def test_text_that_is_no_table_is_refused(tmp_path, content, word):
         read_amti_ascii(written(tmp_path, content, "trial.asc"))
 
 
-@pytest.fixture
-def recordings():
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
-    return Path(folder) / "amti"
-
-
-def test_the_real_bsf(recordings):
-    trial = read_bsf(recordings / "AMTIdata.bsf")
+def test_the_real_bsf(data):
+    trial = read_bsf(data / "amti" / "AMTIdata.bsf")
     plate = trial.plates[0]
     assert (plate.wrench.rate, plate.wrench.time.size) == (pytest.approx(500), 1000)
     assert plate.wrench.force[:, 2].max() == pytest.approx(738, abs=0.5)
@@ -260,9 +249,9 @@ def test_the_real_bsf(recordings):
     assert (np.abs(cop[np.isfinite(cop[:, 0]), :2]) < [0.2, 0.3]).all()
 
 
-def test_the_real_text(recordings, tmp_path):
+def test_the_real_text(data, tmp_path):
     path = tmp_path / "trial.asc"
-    path.write_bytes((recordings / "Trial1-FxFyFzMxMyMz.asc").read_bytes())
+    path.write_bytes((data / "amti" / "Trial1-FxFyFzMxMyMz.asc").read_bytes())
     with pytest.raises(FileRefused) as refused:
         read_amti_ascii(path)
     path.with_suffix(".toml").write_text(str(refused.value).split("\n", 1)[1])

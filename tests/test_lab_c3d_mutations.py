@@ -2,9 +2,6 @@
 number.
 """
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from c3d_files import DEC, MIPS, File, real, whole
@@ -50,12 +47,9 @@ def written(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def recorded():
+def recorded(data):
     """Real recordings, where they are at hand."""
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
-    return [original(Path(folder) / name) for name in REAL]
+    return [original(data / name) for name in REAL]
 
 
 @RELAXED

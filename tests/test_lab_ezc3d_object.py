@@ -1,6 +1,5 @@
 """Trials become objects of ezc3d and come back; a foreign object is read as the file that it would be."""
 
-import os
 from pathlib import Path
 
 import ezc3d
@@ -84,11 +83,9 @@ def test_a_wrench_that_is_not_finite_has_no_object():
         to_ezc3d(Trial("walk", "fit", one.markers, (broken,), one.source))
 
 
-def test_real_recordings_read_the_same_through_an_object():
-    if "BIODANCE_DATA" not in os.environ:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
+def test_real_recordings_read_the_same_through_an_object(data):
     for name in ("biomechzoo/HC030A/HC030A05.c3d", "c3d_parser/dynamic/CB_Dynamic0003.c3d", "pycgm/Movement_trial.c3d"):
-        path = Path(os.environ["BIODANCE_DATA"]) / name
+        path = data / name
         ours, theirs = read_c3d(path), from_ezc3d(ezc3d.c3d(str(path)))
         assert ours.markers.names == theirs.markers.names
         np.testing.assert_array_equal(theirs.markers.xyz, ours.markers.xyz)

@@ -3,7 +3,6 @@ recordings.
 """
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -85,16 +84,7 @@ def test_folders_are_searched_through_and_nothing_is_read_twice(tmp_path):
         inspect_paths([])
 
 
-# --- the real recordings: the expected values are those measured by other means, see the README beside the data
-# ----------------
-
-
-@pytest.fixture(scope="module")
-def data():
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA is not set: no real recordings here")
-    return Path(folder)
+# the real recordings: the expected values are those measured by other means, see the README beside the data
 
 
 @pytest.mark.parametrize(

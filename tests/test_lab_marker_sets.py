@@ -1,6 +1,5 @@
 """Marker sets: recognition by label, renaming, landmarks, and refusal of every broken set file."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -200,12 +199,10 @@ def test_missing_files_and_unknown_names_are_said(tmp_path: Path) -> None:
         ("c3d_parser/static/CB_Static0001.c3d", None, 0),
     ],
 )
-def test_real_files_are_recognised(file: str, name: str | None, count: int) -> None:
-    if "BIODANCE_DATA" not in os.environ:
-        pytest.skip("BIODANCE_DATA is not set: no real recordings")
+def test_real_files_are_recognised(file: str, name: str | None, count: int, data: Path) -> None:
     import ezc3d
 
-    point = ezc3d.c3d(str(Path(os.environ["BIODANCE_DATA"]) / file))["parameters"]["POINT"]
+    point = ezc3d.c3d(str(data / file))["parameters"]["POINT"]
     labels = [*point["LABELS"]["value"], *point.get("LABELS2", {"value": []})["value"]]
     found = recognise(labels)
     assert (found.name if found else None) == name

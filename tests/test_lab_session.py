@@ -171,11 +171,8 @@ def test_forces_of_another_time_are_said(folder):
         ("c3d_parser", "CB_Static0001", (36.3, 1.425, "F")),
     ],
 )
-def test_real_session_finds_static_and_subject(place, static, subject):
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA is not set: no real recordings here")
-    session = read_session(Path(folder) / place)
+def test_real_session_finds_static_and_subject(place, static, subject, data):
+    session = read_session(data / place)
     assert [trial.name for trial in session.of_role("static")] == [static]
     assert session.of_role("fit")
     assert dict(session.refused) == {}

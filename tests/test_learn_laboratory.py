@@ -1,9 +1,7 @@
 """A laboratory learns its own tolerances: what its sessions show counts beside what was shipped; lab.toml keeps it."""
 
-import os
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,11 +102,8 @@ def test_norms_are_medians_of_sessions_pooled():
     assert usual_noise([InstrumentNoise(0.0, (0.0,) * 6), InstrumentNoise(2e-4, (0.5,) * 6)]).camera == 2e-4
 
 
-def test_a_real_session_teaches_its_own_quiet():
-    data = os.environ.get("BIODANCE_DATA")
-    if not data:
-        pytest.skip("BIODANCE_DATA does not name the folder with real recordings.")
-    session = read_session(Path(data) / "biomechzoo" / "HC032A")
+def test_a_real_session_teaches_its_own_quiet(data):
+    session = read_session(data / "biomechzoo" / "HC032A")
     static = replace(session, trials=session.of_role("static"))
     taught = learned_session(examine(static))
     assert 0 < taught.instruments.camera < 1e-5  # filtered before export

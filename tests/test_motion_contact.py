@@ -1,6 +1,5 @@
 """Ground contact of constructed trials whose truth is known, and of real ones."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -265,13 +264,11 @@ def test_the_soles_of_a_tracked_body_serve_as_well() -> None:
         ("biomechzoo/HC032A/HC032A01.c3d", 60.3, 300),
     ],
 )
-def test_real_trials(file: str, mass: float, least: int) -> None:
-    if "BIODANCE_DATA" not in os.environ:
-        pytest.skip("BIODANCE_DATA is not set: no real recordings")
+def test_real_trials(file: str, mass: float, least: int, data: Path) -> None:
     from biodance.lab.prepare import prepare
     from biodance.lab.read import read_trial
 
-    trial = prepare(read_trial(Path(os.environ["BIODANCE_DATA"]) / file))
+    trial = prepare(read_trial(data / file))
     assert trial.markers is not None
     contact = ground_contact(trial, soles_from_markers(trial.markers, read_marker_set(trial.marker_set)), mass=mass)
     assert least <= contact.measured.sum()

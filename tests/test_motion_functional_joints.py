@@ -3,7 +3,6 @@ derivatives exact.
 """
 
 import json
-import os
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -40,7 +39,6 @@ from biodance.records import Array, Markers, Source, Subject, Trial
 from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
-DATA = os.environ.get("BIODANCE_DATA")
 ARMS = {"shoulder_adduction": -25, "elbow_flexion": 25, "knee_flexion": 5}
 
 
@@ -170,10 +168,9 @@ def test_a_virtual_person_s_trunk_and_left_elbow_come_nearer_to_the_truth(tmp_pa
         assert new < share * old, (joint, old, new)
 
 
-@pytest.mark.skipif(not DATA, reason="BIODANCE_DATA is not set: the folder of real recordings")
 @pytest.mark.parametrize("folder", ["adl_gait", "biomechzoo/HC032A"])
-def test_a_real_walk_of_two_seconds_leaves_the_joints_alone(folder: str) -> None:
-    session = read_session(Path(str(DATA)) / folder)
+def test_a_real_walk_of_two_seconds_leaves_the_joints_alone(folder: str, data: Path) -> None:
+    session = read_session(data / folder)
     (static,), (walk, *_) = session.of_role("static"), session.of_role("fit")
     before = measure_static(session.subject, prepare(static))
     found = functional_joints(before, [prepare(walk).markers])

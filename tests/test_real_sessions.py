@@ -2,7 +2,7 @@
 there is none.
 """
 
-import os
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -20,29 +20,35 @@ from biodance.pipeline.session import examine
 RATE = 100.0
 
 
+Recording = Callable[[str], SessionResult]
+
+
 @cache
 def examined(folder: Path) -> SessionResult:
     return examine(read_session(folder))
 
 
-def recording(name: str) -> SessionResult:
-    """Return the result of a real session, or skip where the recordings are not on this machine."""
-    folder = os.environ.get("BIODANCE_DATA")
-    if not folder:
-        pytest.skip("BIODANCE_DATA does not name the folder of real recordings")
-    return examined(Path(folder) / name)
+@pytest.fixture
+def recording(data: Path) -> Recording:
+    """Return what gives the result of a real session by its name."""
+    return lambda name: examined(data / name)
 
 
-def examined_well(name: str) -> SessionResult:
-    """Return the result of a real session in which no step failed."""
-    result = recording(name)
-    assert [step.text for trial in result.trials for step in trial.steps if step.status == "failed"] == []
-    return result
+@pytest.fixture
+def completed(recording: Recording) -> Recording:
+    """Return what gives the result of a real session in which no step failed."""
+
+    def by_name(name: str) -> SessionResult:
+        result = recording(name)
+        assert [step.text for trial in result.trials for step in trial.steps if step.status == "failed"] == []
+        return result
+
+    return by_name
 
 
 @pytest.mark.parametrize(("name", "declared"), [("HC030A", 45.80), ("HC032A", 60.30), ("HC038A", 56.80)])
-def test_the_weight_of_real_statics_is_the_declared_one(name, declared):
-    result = examined_well(f"biomechzoo/{name}")
+def test_the_weight_of_real_statics_is_the_declared_one(name, declared, completed):
+    result = completed(f"biomechzoo/{name}")
     assert result.subject.mass == pytest.approx(declared, abs=0.01)
     assert abs(result.mass_difference) < 0.3
     static, walk, *_ = result.trials
@@ -65,8 +71,8 @@ def near_what_vicon_says(moved):
         assert found[joint].correlation > correlation, joint
 
 
-def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared():
-    result = examined_well("pycgm")
+def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared(completed):
+    result = completed("pycgm")
     static, stairs = result.trials
     assert "nobody stands on the plates" in static.reason
     assert static.fit is not None
@@ -75,23 +81,23 @@ def test_a_static_off_the_plates_is_refused_and_the_stairs_are_compared():
     assert stairs.comparison.correlation[2] > 0.9
 
 
-def test_a_static_of_one_frame_scales_the_body():
-    result = examined_well("adl_gait")
+def test_a_static_of_one_frame_scales_the_body(completed):
+    result = completed("adl_gait")
     assert "static trial 2014001_ST" in result.body_source
     walk = result.trials[1]
     assert walk.fit.total_rms < 0.025
     assert walk.comparison.correlation.min() > 0.8
 
 
-def test_plates_alone_are_weighed():
-    result = examined_well("biomdp")
+def test_plates_alone_are_weighed(completed):
+    result = completed("biomdp")
     weights = {trial.trial.name: trial.standing.mass for trial in result.trials}
     assert weights["kistler_COP"] == pytest.approx(666 / 9.80665, abs=0.5)
     assert all("no markers" in trial.reason for trial in result.trials)
 
 
-def test_labels_of_no_known_set_are_guessed_and_legs_and_trunk_followed():
-    result = examined_well("c3d_parser")
+def test_labels_of_no_known_set_are_guessed_and_legs_and_trunk_followed(completed):
+    result = completed("c3d_parser")
     assert {trial.trial.worn for trial in result.trials} == {"guessed"}
     assert all(trial.fit.total_rms < 0.02 for trial in result.trials)
     assert "the map was guessed from names and posture: " in " ".join(result.session.notes)
@@ -99,7 +105,7 @@ def test_labels_of_no_known_set_are_guessed_and_legs_and_trunk_followed():
     assert result.session.subject.mass == pytest.approx(36.3, abs=0.1)
 
 
-def test_a_real_walk_is_followed_closer_and_the_page_says_what_the_forces_make_of_it() -> None:
+def test_a_real_walk_is_followed_closer_and_the_page_says_what_the_forces_make_of_it(recording: Recording) -> None:
     result = recording("adl_gait")
     (walk,) = (one for one in result.trials if one.trial.role == "fit")
     assert "forearms" in result.shown_joints.taken
@@ -120,7 +126,7 @@ CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
 
 
 @pytest.mark.parametrize("name", [*(f"biomechzoo/{child}" for child in CHILDREN), "adl_gait", "pycgm"])
-def test_a_real_recording_without_fault_gets_no_name(name: str) -> None:
+def test_a_real_recording_without_fault_gets_no_name(name: str, recording: Recording) -> None:
     found = diagnose_session(recording(name)).diagnosis
     said = next(one for one in found.attention if one.about == ABOUT)
     named = {(one.effect, one.target) for one in found.findings}
@@ -130,6 +136,6 @@ def test_a_real_recording_without_fault_gets_no_name(name: str) -> None:
     assert any(row.missed for row in found.judged) or found.doubt
 
 
-def test_identify_finds_the_exchanged_wrist_that_the_diagnosis_finds() -> None:
+def test_identify_finds_the_exchanged_wrist_that_the_diagnosis_finds(recording: Recording) -> None:
     checks = failed_checks(recording("biomechzoo/HC030A"))
     assert [(one.effect, one.target) for one in checks] == [("labels_swapped", "LWRA/LWRB")]

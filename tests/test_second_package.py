@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks
+from diagnosed_sessions import body, known, looks, pull
 from second_package import ENTRY_POINTS, LIMIT_POINT, RENAMED, install
 from test_pipeline_session import SUBJECT, arm_swing, recorded
 
@@ -85,14 +85,10 @@ def test_reader_marker_set_and_export_from_the_command_line(tmp_path: Path) -> N
 
 
 def test_effect_is_fitted_like_any_other(installed: Path) -> None:
-    def pulled(wrench, session, moving):
-        pull = np.outer(8.0 * np.sin(2 * np.pi * 1.3 * moving.time), [0.0, 1.0, 0.0])
-        return wrench + np.concatenate([pull, np.cross([0.0, 0.0, 1.0], pull)], axis=1)
-
     assert list(effects())[-1] == "cable"
     found = diagnose_trials(
         body(),
-        looks(1, hidden=pulled),
+        looks(1, hidden=pull),
         tolerances=known(),
         effects=("cable", "plate_gain", "plate_offset", "time_delay"),
     )

@@ -1,6 +1,5 @@
 """Faults written into the bytes of real walks are named by the witnesses, and clean walks stay silent."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -14,13 +13,10 @@ from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
 
-DATA = Path(os.environ.get("BIODANCE_DATA", "")) / "biomechzoo"
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="BIODANCE_DATA does not name the real recordings")
 
-
-def spoiled(name: str, folder: Path, text: str) -> Path:
+def spoiled(session: Path, folder: Path, text: str) -> Path:
     """Return a copy of a session with a fault in every file."""
-    for path in sorted((DATA / name).glob("*.c3d")):
+    for path in sorted(session.glob("*.c3d")):
         inject(path, folder / path.name, fault_of(parse_cause(text), {path.stem: (0.0, 1.0)}))
     return folder
 
@@ -30,8 +26,8 @@ def heard_in(folder: Path) -> tuple[Finding, ...]:
 
 
 @pytest.mark.parametrize("name", ["HC038A", "HC050A"])
-def test_clean_walks_of_children_name_nothing(name: str) -> None:
-    assert heard_in(DATA / name) == ()
+def test_clean_walks_of_children_name_nothing(name: str, data: Path) -> None:
+    assert heard_in(data / "biomechzoo" / name) == ()
 
 
 @pytest.mark.parametrize(
@@ -44,18 +40,19 @@ def test_clean_walks_of_children_name_nothing(name: str) -> None:
     ],
 )
 def test_a_fault_in_real_walks_is_named(
-    name: str, text: str, effect: str, target: str, size: float | None, tmp_path: Path
+    name: str, text: str, effect: str, target: str, size: float | None, data: Path, tmp_path: Path
 ) -> None:
-    (first, *others) = heard_in(spoiled(name, tmp_path, text))
+    (first, *others) = heard_in(spoiled(data / "biomechzoo" / name, tmp_path, text))
     assert (first.effect, first.target, others) == (effect, target, [])
     if size is not None:
         low, high = first.parameters[0].interval
         assert low <= size <= high
 
 
-def test_a_late_force_never_hides_itself(tmp_path: Path) -> None:
+def test_a_late_force_never_hides_itself(data: Path, tmp_path: Path) -> None:
     """The contact rules leave no frame of such walks: the session is diagnosed all the same, and says what it heard."""
-    found = diagnose_session(examine(read_session(spoiled("HC050A", tmp_path, "time_delay:delay=0.03")))).diagnosis
+    late = spoiled(data / "biomechzoo/HC050A", tmp_path, "time_delay:delay=0.03")
+    found = diagnose_session(examine(read_session(late))).diagnosis
     assert [one.effect for one in found.findings if one.effect != "labels_swapped"] == ["time_delay"]
     assert found.verdict == "named, incomplete"
     assert found.attention[0].text.startswith("Found: time delay")
