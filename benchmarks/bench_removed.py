@@ -25,11 +25,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+from hidden_faults import hidden
 from hidden_sessions import CACHE
 from honesty_sessions import PEOPLE, ROOM
 from kept_files import kept
 from test_hidden_causes import CAUSES
-from test_hidden_effects import hidden
 
 from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import causes

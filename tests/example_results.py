@@ -8,9 +8,11 @@ import numpy as np
 
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.quiet_standing import QuietStanding
+from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult, Still
 from biodance.pipeline.trial_result import Check, MarkerFit, Step, TrialResult, WrenchComparison
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
+from biodance.report.pages.session import page
 
 SQUARE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
 NAMES = tuple(f"M{i:02d}" for i in range(1, 34))
@@ -141,3 +143,10 @@ def refused_session() -> SessionResult:
     return SessionResult(
         session, session.subject, None, "No body.", (Step("body", "refused", "No stature."),), (result,), (), None, None
     )
+
+
+TIME = "2026-01-01T00:00:00Z"
+
+
+def html_of(result: SessionResult, created: str = TIME) -> str:
+    return page(result, provenance(result, created=created))

@@ -44,3 +44,10 @@ def apart(q: Array, other: Array, n_root: int) -> NDArray[np.float64]:
         return np.abs(q - other).max(axis=1)
     turn = (Rotation.from_quat(q[:, 3:7]) * Rotation.from_quat(other[:, 3:7]).inv()).magnitude()
     return np.maximum(np.abs(np.delete(q - other, range(3, 7), axis=1)).max(axis=1), turn)
+
+
+def noisy_dance(body: Body, frames: int, *, seed: int, reach: float = 0.6, sd: float = 0.004) -> tuple[Array, Markers]:
+    """Return postures of a dance and its markers with white noise of standard deviation ``sd`` m."""
+    rng = np.random.default_rng(seed)
+    q = dance(body, frames, rng, reach=reach)
+    return q, markers_of(body, q, noise=rng.normal(0, sd, (frames, len(body.markers.names), 3)))

@@ -12,6 +12,9 @@ from robot_lab import RobotLab, write_robot_trial
 from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.robot.hoap3 import hoap3
+from biodance.body.robot.urdf import read_urdf
+from biodance.lab.robot.recording import read_robot_recording
+from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.records import Array, Sip
 
 FEET = ("right_foot", "left_foot")
@@ -35,6 +38,14 @@ def real_robot() -> Body:
     phi, i = np.array(body.sip.phi), body.segment_index("trunk_head")
     phi[10 * i : 10 * i + 10] *= 1 - COVER / phi[10 * i]
     return replace(body, sip=Sip(body.segments, phi, body.sip.covariance))
+
+
+def matched(folder: Path, urdf: Path) -> MatchedTrial:
+    """Return the one trial of a recording of the robot of ``urdf``, its files on one clock."""
+    body = read_urdf(urdf, feet=FEET)
+    trials, lost = bring_together(body, read_robot_recording(folder, tuple(joint.name for joint in body.joints)))
+    assert not lost
+    return trials[0]
 
 
 def danced(body: Body, seed: int, seconds: float, *, nod: Array | float = 0.0) -> tuple[Array, Array, Array]:

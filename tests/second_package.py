@@ -107,11 +107,11 @@ MARKERS = Path(__file__).parent / "tiny_set.toml"
 TABLE = "segment,sex,quantity,axis,value,unit\nthigh,F,mass,,8,kg\nthigh,M,mass,,9,kg\nshank,FM,com,y,-0.4,length\n"
 
 
-def renamed_set() -> str:
-    """Return the plug-in gait set under the package's own labels."""
+def renamed_set(labels: dict[str, str]) -> str:
+    """Return the text of the plug-in gait set under other labels."""
     text = MARKER_SETS.shipped()["plug_in_gait"].read_text()
     text = re.sub(r"^\[aliases\].*?(?=^\[)", "", text, flags=re.MULTILINE | re.DOTALL)
-    for label, own in RENAMED.items():
+    for label, own in labels.items():
         text = re.sub(rf"\b{label}\b", own, text)
     return text
 
@@ -133,7 +133,7 @@ def install(place: Path, *, points: str = ENTRY_POINTS) -> Path:
         (package / f"{name}.py").write_text(code.lstrip())
     (package / "tiny_study.csv").write_text(TABLE)
     (package / "tiny_study.toml").write_text('title = "Two thighs"\nsource = "a test"\n')
-    (package / "tiny_set.toml").write_text(renamed_set())
+    (package / "tiny_set.toml").write_text(renamed_set(RENAMED))
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: tiny-lab\nVersion: 0.1\n")
     (info / "entry_points.txt").write_text(points)
     return place

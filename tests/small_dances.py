@@ -1,4 +1,6 @@
-"""A dance that is made by hand, in no time: two postures on both feet, an arm is raised."""
+"""A dance that is made by hand, in no time: two postures on both feet, an arm is raised; and a search for postures
+that is cut short.
+"""
 
 from functools import cache
 
@@ -13,6 +15,8 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import under
 from biodance.records import Subject
 
+SHORT_SEARCH = {"SWEEPS": ((4, 8),), "FRESH": ((8, 8),), "POLISH": ((8, 4),)}
+"""Numbers of `biodance.dance.postures.search` that find allowed postures quickly, not the best ones."""
 BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))
 
 

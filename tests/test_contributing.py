@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_effects import CASES, SECTIONS
+from effect_cases import CASES, SECTIONS
 
 import biodance.effects as family
 

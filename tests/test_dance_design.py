@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_dances import SHORT_SEARCH
 
 from biodance.body.human.human import human
 from biodance.dance import design as design_module
@@ -30,7 +31,7 @@ PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)
 @pytest.fixture(scope="module", autouse=True)
 def quick():
     with pytest.MonkeyPatch.context() as patch:
-        for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),))):
+        for name, sweeps in SHORT_SEARCH.items():
             patch.setattr(search, name, sweeps)
         yield
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_dances import SHORT_SEARCH
 
 from biodance.body.human.human import human
 from biodance.cli import run
@@ -80,7 +81,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),)), ("ATTEMPTS", 3)):
+    for name, sweeps in {**SHORT_SEARCH, "ATTEMPTS": 3}.items():
         monkeypatch.setattr(search, name, sweeps)
 
 

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, body, known, looks
+from diagnosed_sessions import RATE, body, known, looks, redrawn
 
 from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
-from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.effects import Gate
@@ -31,15 +30,12 @@ def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
     pass.
     """
     found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
-    posterior, k = found.posterior, found.problem.factor.shape[1]
-    rng = np.random.default_rng(7)
-    largest = np.take_along_axis(posterior.X, np.abs(posterior.X).argmax(axis=0)[None], axis=0)[0]
+    rng, columns = np.random.default_rng(7), found.posterior.X
+    largest = np.take_along_axis(columns, np.abs(columns).argmax(axis=0)[None], axis=0)[0]
 
     def strained(size: float) -> float:
-        u = rng.normal(size=posterior.X.shape[1]) * np.sign(largest)  # columns have the kernel's sign, bodies have not
-        u[:k] *= size
-        y = posterior.X @ u + rng.normal(size=len(posterior.y))
-        return strain(replace(found, posterior=LinearPosterior.for_target(posterior.X, posterior.factor, y)))
+        signs = np.sign(largest)  # columns have the kernel's sign, bodies have not
+        return strain(redrawn(found, rng, unlike=size, signs=signs))
 
     usual = np.array([strained(1.0) for _ in range(200)])
     assert abs(usual.mean()) < 0.25

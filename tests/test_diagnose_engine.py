@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, about_plate, body, delay, gain, known, looks, motion, nothing, offset, pull
+from diagnosed_sessions import RATE, body, delay, gain, known, looks, motion, nothing, offset, pull
 from scipy.signal import butter, filtfilt
 
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of

@@ -53,6 +53,16 @@ def test_every_link_between_pages_leads_to_a_file() -> None:
             assert any(part in target for part in made) or (page.parent / target).exists(), f"{page}: {target}"
 
 
+def test_every_test_that_a_page_names_exists() -> None:
+    tests = Path(__file__).parent
+    for page in [*DOCS.rglob("*.md"), *DOCS.parent.glob("*.md")]:
+        text = page.read_text()
+        for stem in set(re.findall(r"\b(test_\w+)\.py\b", text)):
+            assert (tests / f"{stem}.py").exists(), f"{page}: {stem}.py"
+        for stem, name in set(re.findall(r"\b(test_\w+)\.py::(test_\w+)", text)):
+            assert f"def {name}(" in (tests / f"{stem}.py").read_text(), f"{page}: {stem}.py::{name}"
+
+
 def test_every_example_is_a_tutorial() -> None:
     tutorials = hook("tutorials")
     contents = tutorials.contents()

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from effect_cases import CASES
 from scipy.integrate import solve_ivp
-from test_effects import CASES
 
 from biodance.body.parts import GRAVITY
 from biodance.effects import effect

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_effects import CASES
+from effect_cases import CASES
 
 from biodance.effects import effect
 from biodance.records import CHANNELS

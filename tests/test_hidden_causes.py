@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_hidden_effects import found, hidden
+from hidden_faults import found, hidden
 
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.virtual_lab.faults.causes import Hidden, parse_cause

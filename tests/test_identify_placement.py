@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from test_motion_functional_joints import displaced, hidden, scaling
+from joint_cases import displaced, hidden, scaling
 
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body

@@ -1,14 +1,17 @@
 """A knee that bends elsewhere than it was marked is told, one that was marked as people are is not."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
-from test_motion_functional_joints import displaced, hidden, moving, scaling
+from joint_cases import displaced, hidden, moving, scaling
+from standing_markers import stand
 
+from biodance.body.human.standing import standing
 from biodance.motion.ik.functional_joints import functional_joints
 from biodance.motion.ik.joint_unknowns import SIZE, JointUnknowns, own_centre, own_turn
-from biodance.records import Array
+from biodance.records import Array, Markers, Source, Trial
 
 
 def knees(theta: Array) -> list[str]:
@@ -42,3 +45,28 @@ def test_a_knee_that_bends_elsewhere_is_a_warning(ahead: float, turned: float) -
     for found, true in ((int(millimetres), 1e3 * abs(ahead)), (int(degrees), np.degrees(abs(turned)))):
         assert 0.7 * true - 9 < found < true + 9  # the placing leaves a part where the markers are
     assert not ahead or way == ("before" if ahead > 0 else "behind")
+
+
+def test_a_knee_alignment_device_stands_in_for_the_knee_marker() -> None:
+    pig = {f"{side}_{place}": f"{side[0].upper()}{name}" for side in ("right", "left") for place, name in LEGS.items()}
+    markers = stand(pig)
+    knee = markers["RKNE"][0]
+    arms = np.linalg.qr(np.array([[1.0, 2.0, -1.0], [0.5, -1.0, 1.0], [2.0, 1.0, 1.0]]))[0]
+    out = np.sign(arms @ [0.0, -1.0, 0.0])[:, None] * arms  # away from the body, which is on the left of the knee
+    xyz = np.concatenate([markers.xyz, np.tile(knee + 0.08 * out, (3, 1, 1))], axis=1)
+    device = Markers((*markers.names, "RKAX", "RKD1", "RKD2"), markers.time, xyz)
+    posture = standing(
+        Trial(
+            "static",
+            "static",
+            device.select([name for name in device.names if name != "RKNE"]),
+            (),
+            Source(Path("static.c3d"), "", "C3D", 100.0),
+            marker_set="plug_in_gait",
+        )
+    )
+    assert posture.landmarks["right_knee_lateral"] == pytest.approx(knee, abs=1e-9)
+    assert posture.landmarks["right_knee_axis"] == pytest.approx(device["RKAX"][0])
+
+
+LEGS = {"asis": "ASI", "psis": "PSI", "knee_lateral": "KNE", "ankle_lateral": "ANK", "heel": "HEE", "toe": "TOE"}

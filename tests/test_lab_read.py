@@ -2,8 +2,10 @@
 
 import os
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from lab_sessions import two_trials
 
@@ -110,3 +112,21 @@ def test_a_full_disk_names_the_place_that_was_asked_for(tmp_path, monkeypatch, c
     monkeypatch.setattr(cli, "app", full)
     assert cli.run(["report", "visit", "--out", str(tmp_path)]) == 2
     assert f"{tmp_path}: No space left on device." in capsys.readouterr().err
+
+
+def test_segment_poses_without_points_are_refused_in_one_sentence(tmp_path: Path) -> None:
+    import ezc3d
+
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["LABELS"]["value"] = ["dummy"]
+    file["parameters"]["POINT"]["RATE"]["value"] = [85.0]
+    points = np.full((4, 1, 20), np.nan)
+    points[3] = 1
+    file["data"]["points"] = points
+    file["data"]["rotations"] = np.tile(np.eye(4)[:, :, None, None], (1, 1, 2, 20))
+    file.add_parameter("ROTATION", "LABELS", ["pelvis_4X4", "l_thigh_4X4"])
+    file.add_parameter("ROTATION", "RATE", [85.0])
+    file.add_parameter("ROTATION", "USED", [2])
+    file.write(str(tmp_path / "theia.c3d"))
+    with pytest.raises(FileRefused, match=r"holds the poses of 2 segments \(pelvis, l_thigh .*no points"):
+        read_trial(tmp_path / "theia.c3d")

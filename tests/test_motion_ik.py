@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from marker_trials import apart, dance, markers_of, points
+from marker_trials import apart, dance, markers_of, noisy_dance, points
 from random_bodies import random_body
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -29,12 +29,6 @@ def trees() -> list:
         narrow = replace(body.limits, lower=0.3 * body.limits.lower, upper=0.3 * body.limits.upper)
         found.append(pytest.param(replace(body, limits=narrow), seed, id=f"{root}{seed}"))
     return found
-
-
-def noisy_dance(frames: int, seed: int) -> tuple[Array, Markers]:
-    rng = np.random.default_rng(seed)
-    q = dance(WOMAN, frames, rng, reach=0.6)
-    return q, markers_of(WOMAN, q, noise=rng.normal(0, 0.004, (frames, len(WOMAN.markers.names), 3)))
 
 
 def scipy_residual(body: Body, xyz: Array, start: Array) -> tuple[float, Array]:
@@ -66,7 +60,7 @@ def test_postures_come_back_from_their_markers(body, seed):
 
 
 def test_noisy_markers_end_at_the_optimum_of_scipy():
-    q, markers = noisy_dance(20, seed=4)
+    q, markers = noisy_dance(WOMAN, 20, seed=4)
     found = solve_ik(WOMAN, markers)
     weight = WOMAN.markers.weight
     for frame in range(len(q)):
@@ -101,7 +95,7 @@ def test_a_joint_beyond_its_limit_stays_at_it_and_the_rest_is_optimal():
 
 
 def test_a_hidden_marker_has_no_influence():
-    _, markers = noisy_dance(60, seed=5)
+    _, markers = noisy_dance(WOMAN, 60, seed=5)
     xyz = markers.xyz.copy()
     gone = [markers.names.index(name) for name in ("LKNE", "RELB", "C7")]
     xyz[:, gone] = np.nan
@@ -116,7 +110,7 @@ def test_a_hidden_marker_has_no_influence():
 
 
 def test_a_marker_hidden_for_some_frames_leaves_the_others_as_they_were():
-    _, markers = noisy_dance(60, seed=6)
+    _, markers = noisy_dance(WOMAN, 60, seed=6)
     xyz = markers.xyz.copy()
     xyz[20:30, markers.names.index("LANK")] = np.nan
     all_seen, some = solve_ik(WOMAN, markers), solve_ik(WOMAN, replace(markers, xyz=xyz))
@@ -127,7 +121,7 @@ def test_a_marker_hidden_for_some_frames_leaves_the_others_as_they_were():
 
 
 def test_the_order_and_the_choice_of_frames_do_not_matter():
-    _, markers = noisy_dance(150, seed=5)
+    _, markers = noisy_dance(WOMAN, 150, seed=5)
     whole = solve_ik(WOMAN, markers).residual
     for part in (slice(None, None, -1), slice(40, 110), slice(None, None, 3)):
         some = Markers(markers.names, np.arange(len(whole[part])) / 100, markers.xyz[part])
@@ -135,7 +129,7 @@ def test_the_order_and_the_choice_of_frames_do_not_matter():
 
 
 def test_the_order_and_the_number_of_markers_do_not_matter():
-    _, markers = noisy_dance(30, seed=9)
+    _, markers = noisy_dance(WOMAN, 30, seed=9)
     names = ("not on the body", *reversed(markers.names))
     xyz = np.concatenate([np.full((30, 1, 3), 7.0), markers.xyz[:, ::-1]], axis=1)
     one, other = solve_ik(WOMAN, markers), solve_ik(WOMAN, Markers(names, markers.time, xyz))
@@ -166,7 +160,7 @@ def test_a_body_that_lies_or_stands_on_its_hands_is_found():
 
 
 def test_a_frame_with_too_few_markers_leans_on_its_neighbours():
-    q, markers = noisy_dance(60, seed=12)
+    q, markers = noisy_dance(WOMAN, 60, seed=12)
     xyz = markers.xyz.copy()
     legless = [markers.names.index(name) for name in ("LKNE", "LTIB", "LANK", "LHEE", "LTOE", "LTHI")]
     xyz[10:14, legless], xyz[30], xyz[59, 3:] = np.nan, np.nan, np.nan
@@ -182,7 +176,7 @@ def test_a_frame_with_too_few_markers_leans_on_its_neighbours():
 
 
 def test_no_frame_with_enough_markers_names_what_is_missing():
-    _, markers = noisy_dance(5, seed=13)
+    _, markers = noisy_dance(WOMAN, 5, seed=13)
     legs = tuple(
         name for name in markers.names if name[0] == "L" and name[1:] in ("KNE", "TIB", "ANK", "HEE", "TOE", "THI")
     )
@@ -193,13 +187,13 @@ def test_no_frame_with_enough_markers_names_what_is_missing():
 
 @pytest.mark.parametrize("guess", [np.zeros((5, 29)), np.zeros((4, 30)), np.full((5, 30), np.nan)])
 def test_a_guess_that_does_not_fit_is_refused(guess):
-    _, markers = noisy_dance(5, seed=14)
+    _, markers = noisy_dance(WOMAN, 5, seed=14)
     with pytest.raises(BiodanceError, match=r"guess has shape .* expected \(5, 30\), all finite"):
         solve_ik(WOMAN, markers, guess=guess)
 
 
 def test_one_frame_is_enough():
-    _, markers = noisy_dance(8, seed=15)
+    _, markers = noisy_dance(WOMAN, 8, seed=15)
     together = solve_ik(WOMAN, markers)
     for frame in range(8):
         alone = solve_ik(WOMAN, Markers(markers.names, [0.0], markers.xyz[frame : frame + 1]))

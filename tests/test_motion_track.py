@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from marker_trials import dance, markers_of, points
+from marker_trials import noisy_dance, points
+from standing_markers import PERSON
 
 from biodance.body.human.human import human
+from biodance.body.human.limits import with_tracking_limits
 from biodance.errors import TrialRefused
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
-from biodance.motion.track import track
+from biodance.motion.track import track, upright_trunk
 from biodance.records import Markers, Source, Subject, Trial
 from biodance.settings import Settings
 from biodance.virtual_lab.movement.protocol import read_protocol
@@ -30,9 +32,7 @@ def trial_of(markers: Markers | None) -> Trial:
 
 @pytest.fixture(scope="module")
 def markers() -> Markers:
-    rng = np.random.default_rng(0)
-    q = dance(WOMAN, 120, rng, reach=0.5)
-    return markers_of(WOMAN, q, noise=rng.normal(0, 0.002, (120, len(WOMAN.markers.names), 3)))
+    return noisy_dance(WOMAN, 120, seed=0, reach=0.5, sd=0.002)[1]
 
 
 def test_a_simulated_squat_is_followed(tmp_path):
@@ -107,3 +107,18 @@ def test_a_static_of_one_frame_is_a_pose_at_rest(markers):
     assert not motion.v.any()
     assert motion.determined.all()
     assert motion.residual.max() < 0.02
+
+
+def test_an_unseen_trunk_stays_upright_over_a_swinging_pelvis() -> None:
+    from scipy.spatial.transform import Rotation
+
+    body = with_tracking_limits(human(PERSON))
+    held = body.holding({"trunk"}, body.neutral)
+    assert held.free.sum() == len(body.joints) - 3
+    q = np.tile(body.neutral, (200, 1))
+    swing = 0.15 * np.sin(2 * np.pi * np.arange(200) / 100)
+    upright = Rotation.from_quat(q[:, 3:7])
+    q[:, 3:7] = (Rotation.from_euler("xyz", np.stack([swing, 0.5 * swing, swing], axis=1)) * upright).as_quat()
+    trunk = poses(held, upright_trunk(held, q, 100.0)).rotation[:, body.segments.index("trunk_head")]
+    assert np.abs(trunk[:, 2, 1] - 1.0).max() < 1e-9
+    assert np.array_equal(upright_trunk(body, q, 100.0), q)

@@ -12,18 +12,15 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from example_results import full_session, refused_session
+from example_results import full_session, html_of, refused_session
 
 from biodance.doctor import BROWSERS
-from biodance.pipeline.provenance import provenance
-from biodance.pipeline.results import SessionResult
 from biodance.records.attention import without_path
 from biodance.report.figures.session import marker_figure, wrench_figure
 from biodance.report.figures.vector import STEPS, envelope, round_ticks
-from biodance.report.pages.session import check_table, key_figures, page
+from biodance.report.pages.session import check_table, key_figures
 from biodance.report.wording import format_number, millimetres
 
-TIME = "2026-01-01T00:00:00Z"
 VOID = {"meta", "img", "link", "br", "hr"}
 
 
@@ -49,10 +46,6 @@ def outline(html: str) -> Outline:
     parser.feed(html)
     assert parser.open == []
     return parser
-
-
-def html_of(result: SessionResult, created: str = TIME) -> str:
-    return page(result, provenance(result, created=created))
 
 
 @pytest.fixture(scope="module")

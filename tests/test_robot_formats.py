@@ -6,15 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from robot_recordings import FEET, drawing, recorded
+from robot_recordings import FEET, drawing, matched, recorded
 
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.lab.read import read_trial
-from biodance.lab.robot.recording import read_robot_recording
 from biodance.motion.clocks import onto_plate
 from biodance.pipeline.robot import identify_robot
-from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import of_file
 from biodance.records import CHANNELS
 from biodance.spatial import wrench_about_point
@@ -48,20 +46,12 @@ def as_text_and_parquet(source: Path, target: Path) -> Path:
     return target
 
 
-def brought(folder: Path, place: Path) -> MatchedTrial:
-    """Return the one trial of a recording."""
-    body = read_urdf(place / "hoap3.urdf", feet=FEET)
-    trials, lost = bring_together(body, read_robot_recording(folder, tuple(joint.name for joint in body.joints)))
-    assert not lost
-    return trials[0]
-
-
 def test_parquet_and_text_say_what_csv_and_c3d_say(place: Path, tmp_path: Path) -> None:
     folder = as_text_and_parquet(place / "good", tmp_path / "other")
     with pytest.raises(BiodanceError, match=r"does not say plate_size_m.*run_plate.toml"):
-        brought(folder, place)
+        matched(folder, place / "hoap3.urdf")
     (folder / "run_plate.toml").write_text(_SAID)
-    one, other = (brought(run, place) for run in (place / "good", folder))
+    one, other = (matched(run, place / "hoap3.urdf") for run in (place / "good", folder))
     assert [path.suffix for path in other.recorded.files] == [".parquet", ".csv"]
     assert other.plate.delay == pytest.approx(one.plate.delay, abs=0.002)
     assert other.plate.yaw == pytest.approx(one.plate.yaw, abs=0.002)

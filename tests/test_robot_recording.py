@@ -7,18 +7,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from robot_lab import RobotLab
-from robot_recordings import COVER, FEET, drawing, real_robot, recorded
+from robot_recordings import COVER, FEET, drawing, matched, real_robot, recorded
 
-from biodance.body.robot.urdf import read_urdf
 from biodance.cli import run
 from biodance.errors import BiodanceError
-from biodance.lab.robot.recording import read_robot_recording
 from biodance.motion.clocks import PlateFit, fit_plate, from_plate, onto_plate
 from biodance.pipeline.robot import identify_robot
-from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import told_of
 from biodance.records import Wrench
-from biodance.records.attention import Attention
 
 
 @pytest.fixture(scope="module")
@@ -43,14 +39,6 @@ def refused(folder: Path, place: Path) -> str:
     with pytest.raises(BiodanceError) as told:
         identify_robot(folder, urdf=place / "hoap3.urdf", feet=FEET)
     return str(told.value)
-
-
-def matched(folder: Path, place: Path) -> tuple[MatchedTrial, list[Attention]]:
-    """Return the one trial of a recording, brought together, and what is told of it."""
-    body = read_urdf(place / "hoap3.urdf", feet=FEET)
-    trials, lost = bring_together(body, read_robot_recording(folder, tuple(joint.name for joint in body.joints)))
-    assert not lost
-    return trials[0], told_of(trials)
 
 
 def test_a_missing_cover_is_found_from_files_alone(
@@ -104,7 +92,8 @@ def test_clocks_apart_by_seconds_are_brought_together_and_said(place: Path, tmp_
     folder = table(
         place / "good", tmp_path / "late", lambda frame: frame.assign(**{"time (s)": frame["time (s)"] + 7.25})
     )
-    one, told = matched(folder, place)
+    one = matched(folder, place / "hoap3.urdf")
+    told = told_of((one,))
     assert one.plate.delay == pytest.approx(RobotLab().ahead - 7.25, abs=0.01)
     (clocks,) = (said for said in told if said.about == "time_delay")
     assert clocks.level == "warn"
@@ -116,7 +105,7 @@ def test_a_missing_encoder_is_named_and_a_still_joint_may_be_declared(place: Pat
     assert "no encoder for the joint left_elbow_pitch" in refused(folder, place)
     assert "fixed = {left_elbow_pitch" in refused(folder, place)
     (folder / "recording.toml").write_text("[joints]\nfixed = {left_elbow_pitch = -0.3}\n")
-    _, told = matched(folder, place)
+    told = told_of((matched(folder, place / "hoap3.urdf"),))
     assert any("Taken as not moving: left_elbow_pitch" in said.text for said in told)
 
 
@@ -129,7 +118,7 @@ def test_degrees_are_refused_unless_said(place: Path, tmp_path: Path) -> None:
     folder = table(place / "good", tmp_path / "degrees", turned)
     assert "In degrees?" in refused(folder, place)
     (folder / "recording.toml").write_text('angle_unit = "deg"\n')
-    _, told = matched(folder, place)
+    told = told_of((matched(folder, place / "hoap3.urdf"),))
     assert any("converted from degrees" in said.text for said in told)
 
 

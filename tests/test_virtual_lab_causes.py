@@ -2,7 +2,6 @@
 which made it.
 """
 
-import ast
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import biodance.virtual_lab
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.read import read_trial
 from biodance.records import Subject, Trial
@@ -78,18 +76,6 @@ def test_every_cause_arrives_in_the_files(text: str, squats: Protocol, clean: Tr
     after = made(tmp_path / "s", squats, text)
     before_bytes, after_bytes = clean.source.path.read_bytes(), after.source.path.read_bytes()
     assert before_bytes != after_bytes
-
-
-def test_the_hiding_side_knows_nothing_of_the_finding_side() -> None:
-    for path in Path(biodance.virtual_lab.__file__).parent.glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = (
-                [node.module or ""]
-                if isinstance(node, ast.ImportFrom)
-                else [a.name for a in getattr(node, "names", ())]
-            )
-            if isinstance(node, ast.Import | ast.ImportFrom):
-                assert not any(name.startswith(("biodance.effects", "biodance.diagnose")) for name in names), path
 
 
 def added(after: Trial, before: Trial) -> np.ndarray:

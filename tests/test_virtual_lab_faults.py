@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_faults import about_centre, standing_recording
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.lab.read import read_trial
@@ -13,7 +14,6 @@ from biodance.records import Subject, Trial
 from biodance.virtual_lab.faults.causes import Hidden, hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit
-from biodance.virtual_lab.simulate import simulate_session
 from biodance.virtual_lab.tolerances import instruments_perfect
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
@@ -21,21 +21,13 @@ TRIAL = "standing_1"
 
 
 def recorded(folder: Path, texts: tuple[str, ...], *, plate_type: int = 2) -> Trial:
-    plan = read_protocol("standing")
     visit = LabVisit(laboratory=Laboratory(plate_type=plate_type), tolerances=instruments_perfect())
-    visit, loads = hide(tuple(parse_cause(t) for t in texts), SUBJECT, plan, seed=4, visit=visit)
-    simulate_session(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
-    return read_trial(next(p for p in sorted(folder.glob("*.c3d")) if "static" not in p.name))
+    return read_trial(standing_recording(folder, *texts, visit=visit))
 
 
 @pytest.fixture(scope="module", params=[2, 4])
 def clean(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Trial]:
     return request.param, recorded(tmp_path_factory.mktemp("clean") / "s", (), plate_type=request.param)
-
-
-def about_centre(trial: Trial, centre: np.ndarray) -> np.ndarray:
-    wrench = trial.plates[0].wrench
-    return np.concatenate([wrench.force, wrench.moment - np.cross(centre, wrench.force)], axis=1)
 
 
 def test_channel_faults_have_the_size_asked_for(clean: tuple[int, Trial], tmp_path: Path) -> None:
@@ -47,7 +39,7 @@ def test_channel_faults_have_the_size_asked_for(clean: tuple[int, Trial], tmp_pa
         "plate_offset:target=Mx,offset=8",
     )
     after = recorded(tmp_path / "s", texts, plate_type=kind)
-    x, y = about_centre(before, centre), about_centre(after, centre)
+    x, y = (about_centre(one.plates[0], centre) for one in (before, after))
     tolerance = 0.2 if kind == 2 else 2.0  # TYPE 4 is stored in coarse volts
     np.testing.assert_allclose(y[:, 2], 1.04 * x[:, 2], atol=tolerance)
     np.testing.assert_allclose(y[:, 4], x[:, 4] + 0.01 * 1.04 * x[:, 2], atol=tolerance)

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_faults import about_centre, standing_recording
 from inject import inject
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import read_trial
-from biodance.records import Array, Subject, Trial
-from biodance.virtual_lab.faults.causes import fault_of, hide, parse_cause
-from biodance.virtual_lab.movement.protocol import read_protocol
+from biodance.records import Subject, Trial
+from biodance.virtual_lab.faults.causes import fault_of, parse_cause
 from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit
-from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
 CLOCK = (0.1, 0.9)
@@ -30,11 +29,7 @@ def written(path: Path, out: Path, text: str) -> Trial:
 
 
 def simulated(folder: Path, plate_type: int, *texts: str) -> Path:
-    plan = read_protocol("standing")
-    visit = LabVisit(laboratory=Laboratory(plate_type=plate_type))
-    visit, loads = hide(tuple(parse_cause(text) for text in texts), SUBJECT, plan, seed=4, visit=visit)
-    simulate_session(SUBJECT, plan, folder, seed=4, visit=visit, loads=loads)
-    return next(path for path in sorted(folder.glob("*.c3d")) if "static" not in path.name)
+    return standing_recording(folder, *texts, visit=LabVisit(laboratory=Laboratory(plate_type=plate_type)))
 
 
 @pytest.fixture(scope="module", params=[2, 4])
@@ -79,13 +74,6 @@ def test_what_does_not_fit_into_a_copy_is_refused(clean: tuple[int, Path], tmp_p
         inject(path, tmp_path / "b.c3d", lambda recording: recording)
 
 
-def about_centre(trial: Trial, plate: int) -> Array:
-    found = trial.plates[plate]
-    return np.concatenate(
-        [found.wrench.force, found.wrench.moment - np.cross(found.centre, found.wrench.force)], axis=1
-    )
-
-
 REAL = (
     "biomechzoo/HC030A/HC030A05.c3d",
     "biomechzoo/HC032A/HC032A01.c3d",
@@ -99,13 +87,14 @@ REAL = (
 def test_real_recordings_of_four_laboratories_take_faults(name: str, data: Path, tmp_path: Path) -> None:
     path = data / name
     before = read_trial(path)
-    x = about_centre(before, 0)
-    gain = about_centre(written(path, tmp_path / "gain.c3d", "plate_gain:target=plate1:Fz,gain=0.04"), 0)
+    centre = before.plates[0].centre
+    x = about_centre(before.plates[0], centre)
+    gain = about_centre(written(path, tmp_path / "gain.c3d", "plate_gain:target=plate1:Fz,gain=0.04").plates[0], centre)
     np.testing.assert_allclose(gain - x, 0.04 * x * np.eye(6)[2], atol=0.05)
     moved = written(path, tmp_path / "moved.c3d", "plate_position:target=plate1:y,shift=0.02")
     np.testing.assert_allclose(moved.plates[0].centre - before.plates[0].centre, [0, 0.02, 0], atol=1e-6)
-    np.testing.assert_allclose(about_centre(moved, 0), x, atol=1e-3)
-    late = about_centre(written(path, tmp_path / "late.c3d", "time_delay:delay=0.02"), 0)
+    np.testing.assert_allclose(about_centre(moved.plates[0], moved.plates[0].centre), x, atol=1e-3)
+    late = about_centre(written(path, tmp_path / "late.c3d", "time_delay:delay=0.02").plates[0], centre)
     shift = 0.02 * before.plates[0].wrench.rate
     if shift == round(shift):
         np.testing.assert_allclose(

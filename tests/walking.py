@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.records import Markers, Plate, Source, Trial, Wrench
+from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 
 MASS, G, FOOT = 60.0, 9.80665, 0.18
 STRIKES = {"right": 0.8, "left": 1.4}
@@ -127,3 +127,8 @@ def standing(wrong: Wrong | None = None, *, push: float = 0.0, weight: float = M
     return Trial(
         "static", "static", Markers(tuple(fixed), frames, xyz), (unseen,), Source(Path("s.c3d"), "", "made", RATE)
     )
+
+
+def session(*trials: Trial, mass: float = MASS) -> Session:
+    """Return a session of made trials."""
+    return Session(Subject(mass=mass, stature=1.7, sex="F"), trials, Path("made"))

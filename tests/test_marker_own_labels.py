@@ -3,19 +3,19 @@ line to the page.
 """
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from test_pipeline_session import PLATE, SUBJECT, arm_swing, recorded
+from perfect_recordings import PLATE, SUBJECT, arm_swing, recorded
+from second_package import renamed_set
 
 from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS, segment_of
-from biodance.lab.markers.sets import FAMILY, read_marker_set
+from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.records import Markers
@@ -52,11 +52,7 @@ def folder(tmp_path: Path) -> Path:
 
 def own_file(place: Path) -> Path:
     """Write the set as a user would: plug-in gait with other labels."""
-    text = FAMILY.files()["plug_in_gait"].read_text()
-    text = re.sub(r"^\[aliases\].*?(?=^\[)", "", text, flags=re.MULTILINE | re.DOTALL)
-    for label, own in RENAMED.items():
-        text = re.sub(rf"\b{label}\b", own, text)
-    (place / "mine.toml").write_text(text)
+    (place / "mine.toml").write_text(renamed_set(RENAMED))
     return place / "mine.toml"
 
 

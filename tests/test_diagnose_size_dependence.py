@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, known, looks, redrawn
 
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_at_own_noise
@@ -13,7 +13,6 @@ from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.engine import HANGS, diagnose_trials
 from biodance.diagnosis.engine import _counts as told
-from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
@@ -150,15 +149,8 @@ def test_a_loud_person_makes_no_body_strange_and_a_strange_body_stays_strange() 
     as unlike the table as people are stays strange beside the usual noise.
     """
     found, _ = build_model(problem(body(), looks(3, trials=2)), known(), ("plate_offset",))
-    posterior, k, rng = found.posterior, found.problem.factor.shape[1], np.random.default_rng(7)
-
-    def of(size: float, loud: float):
-        u = rng.normal(size=posterior.X.shape[1])
-        u[:k] *= size
-        y = posterior.X @ u + loud * rng.normal(size=len(posterior.y))
-        return replace(found, posterior=LinearPosterior.for_target(posterior.X, posterior.factor, y))
-
-    loud, strange = of(2.0, 2.4), of(3.0, 1.0)  # clear ones: the columns' basis is the kernel's own
+    rng = np.random.default_rng(7)
+    loud, strange = redrawn(found, rng, unlike=2.0, loud=2.4), redrawn(found, rng, unlike=3.0)
     assert np.median(energies(loud)) > 2.0
     assert strain(loud) > STRAINED
     assert strain_at_own_noise(loud) < strain(loud)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from effect_cases import SECTIONS
 from human_cases import CORNERS, human_case
 
 import biodance.effects as family
@@ -30,7 +31,6 @@ from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
 
 MASS = 70.0
-SECTIONS = ("Signature:", "Look-alikes:", "Separated by")
 
 
 def standing(rng: np.random.Generator, *, seconds: float = 10.0, rate: float = 1000.0) -> Array:

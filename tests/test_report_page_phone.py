@@ -2,8 +2,8 @@
 
 import pytest
 from browser import BROWSER, Page
+from example_results import full_session, html_of
 from identified_sessions import session_result
-from test_report_page import full_session, html_of
 
 _WIDER = """[...document.querySelectorAll('html, .wide, .wide *')].filter(one => one.clientWidth > 0
   && one.scrollWidth > one.clientWidth + 1).map(one => one.tagName + ' ' + one.innerText.slice(0, 60))"""

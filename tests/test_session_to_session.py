@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identified_sessions import SUBJECT, body, session_result
+from plate_trials import CORNERS, POINT, trial
 from small_dances import small_dance
-from test_lab_corrections import CORNERS, POINT, trial
 
 import biodance
 from biodance.body.body_file import body_text

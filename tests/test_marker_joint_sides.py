@@ -4,7 +4,7 @@ that end every label of a set.
 
 import numpy as np
 import pytest
-from test_marker_guess import OWN, stand
+from standing_markers import OWN, stand
 
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.names import meanings_of

@@ -1,41 +1,16 @@
-"""The culprit's effect is not in the family: no innocent is named in its place, and "nothing wrong" is not said."""
+"""Findings of the simulation and of the witnesses together: each fault once, and none that the other excludes."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, gain, known, looks
 
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.engine import SEVERAL, UNASKED, diagnose_trials
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
-
-
-def shifted(local, session):
-    """The plate lies 60 mm from where the file has it, towards +x of the laboratory."""
-    local[:, 3:] -= np.cross([0.06, 0.0, 0.0], local[:, :3])
-    return local
-
-
-def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
-    some = looks(1, trials=2, hidden=about_plate(shifted))
-    one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_crosstalk",)).diagnosis
-    assert (one.verdict, one.findings) == ("unexplained", ())
-    assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
-    assert len(one.resembles) > 1
-    assert SEVERAL in one.notes
-
-
-def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
-    """A gain of 5 % is 25 times what these plates have."""
-    some = looks(1, trials=2, hidden=gain(0.05))
-    one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
-    assert (one.verdict, one.findings) == ("unexplained", ())
-    assert UNASKED in one.notes
 
 
 def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str, str]) -> Finding:
@@ -44,9 +19,13 @@ def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str
 
 
 NAMES = ("plate_position", "plate1:y")
+
 HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
+
 LOAD = finding("added_mass", "right_forearm_hand", 2.4, "kg")
+
 WEIGHT = finding("body_mass", "", 2.5, "kg", ("plate_gain", "Fz"))
+
 BY_SIMULATION = Diagnosis("named, complete", (LOAD,), limits=(Unobservable("body_mass", "", 1.6, "kg"),))
 
 

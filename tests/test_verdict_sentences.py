@@ -1,0 +1,140 @@
+"""No verdict and no sentence contradicts a check or a trial that was not judged: all of them beside one another."""
+
+import itertools
+from dataclasses import replace
+
+import pytest
+from diagnosed_sessions import body
+from example_results import full_session
+
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
+from biodance.effects import Gate, effects
+from biodance.pipeline.attention import headline, identified_attention, is_well, session_attention, told
+from biodance.pipeline.finding_words import EXPLAINS, in_words
+from biodance.pipeline.trial_result import Check
+from biodance.records.attention import Attention, Judged, strongest_first
+
+FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
+
+GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
+
+BAD = replace(GOOD, value="31.0 mm", inside=False)
+
+HEAVY = Check("mass on the plates against declared", "static", "6.0 %", "at most 2 %", False, "Weigh again.")
+
+WALK = Judged("walk", 0.0, "no 1 s of contact. More.", missed=True)
+
+STATIC = Judged("static", 3.0)
+
+
+def sessions():
+    """Yield every verdict beside every check and trial, as `told` says it."""
+    result = full_session()
+    left = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
+    whole = Diagnosis("nothing wrong", ())
+    some = (
+        whole,
+        replace(whole, verdict="named, complete", findings=(FOUND,)),
+        replace(whole, verdict="named, incomplete", findings=(FOUND,), adequacy=left),
+        replace(whole, verdict="unexplained", adequacy=left),
+        replace(whole, verdict="unexplained", adequacy=left, resembles=(FOUND,)),
+        replace(whole, verdict="unexplained", adequacy=left, doubt="standing alone tells no cause"),
+        replace(whole, verdict="unexplained"),
+    )
+    for one, check, row in itertools.product(some, (GOOD, BAD, HEAVY), ((STATIC,), (STATIC, WALK), (WALK,))):
+        trials = tuple(replace(trial, checks=()) for trial in result.trials)
+        yield one, check, row, told(one, replace(result, trials=trials, checks=(check,)), row)
+
+
+def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
+    count = 0
+    for before, check, rows, one in sessions():
+        said = next(line for line in one.attention if line.about == ABOUT)
+        whole = check.inside and not any(row.missed for row in rows)
+        count += 1
+        assert one.verdict != "named, complete" or whole
+        if one.verdict == "nothing wrong":
+            assert ("what could be judged" in said.text) == (not whole)
+            assert (said.level == "note") == whole == is_well(one)
+        if not check.inside:
+            assert check.what in said.text
+        if WALK in rows:
+            assert "not judged: walk" in said.text
+        if one.verdict == "unexplained":
+            assert not one.findings
+            told_nothing = bool(before.doubt) or STATIC not in rows or not before.adequacy
+            assert said.text.startswith("Cannot tell") == told_nothing
+        assert not is_well(one) or whole
+        assert list(one.attention) == list(strongest_first(one.attention))
+        assert one.judged == rows
+    assert count == 63
+
+
+def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
+    result = full_session()
+    trials = tuple(replace(trial, checks=()) for trial in result.trials)
+    odd = replace(body(), notes=("Warning: the right thigh is 38 mm shorter than the left thigh: check the markers.",))
+    doubtful = replace(result, trials=trials, checks=(), body=odd)
+    one = told(Diagnosis("nothing wrong", ()), doubtful, (STATIC,))
+    assert one.verdict == "unexplained"
+    assert one.attention[0].text.startswith("Cannot tell")
+    assert "thigh is 38 mm shorter" in one.attention[0].text
+    assert told(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
+    thigh = replace(FOUND, effect="segment_length", target="right_thigh")
+    assert told(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
+
+
+def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
+    full = full_session()
+    result = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=())
+    assert told(Diagnosis("nothing wrong", ()), result, (STATIC,)).verdict == "nothing wrong"
+    one = told(Diagnosis("nothing wrong", ()), result, (replace(STATIC, seconds=0.0), WALK))
+    assert one.verdict == "unexplained"
+    assert one.attention[0].text.startswith("Cannot tell")
+    assert not is_well(one)
+
+
+def test_a_check_points_to_the_cause_that_was_found() -> None:
+    result = replace(full_session(), checks=(HEAVY,))
+    plain = next(one for one in session_attention(result) if one.about == HEAVY.what)
+    named = next(one for one in session_attention(result, [FOUND]) if one.about == HEAVY.what)
+    assert plain.level == "warn"
+    assert "Weigh again." in plain.text
+    assert named.level == "note"
+    assert "Plate gain Fz" in named.text
+    assert "Weigh again." not in named.text
+    family = {name for causes in EXPLAINS.values() for name in causes}
+    from biodance.effects import discrete_effects
+
+    assert family <= {*effects(), *discrete_effects()}
+
+
+def test_sentences_come_strongest_first_and_once() -> None:
+    note, fail = Attention("note", "a"), Attention("fail", "b")
+    assert strongest_first([note, fail, note]) == (fail, note)
+
+
+def test_a_size_that_is_hardly_known_says_so() -> None:
+    shaky = replace(FOUND, parameters=(Estimate("gain", 0.06, 0.05, "1"),))
+    line = headline(Diagnosis("named, complete", (shaky,)), "80 s of movement", (STATIC,), ())
+    assert "hardly known" in line.text
+    assert "hardly known" not in headline(Diagnosis("named, complete", (FOUND,)), "80 s", (STATIC,), ()).text
+
+
+@pytest.mark.parametrize(("late", "told"), [(0.034, "forces late"), (-0.034, "forces early")])
+def test_a_delay_says_in_words_which_way_it_goes(late: float, told: str) -> None:
+    delayed = Finding("time_delay", "", (Estimate("delay", late, 0.004, "s"),), (Alias("time_delay", "", 80.0),), 0.9)
+    assert in_words(delayed) == f"time delay (delay {1000 * late:.0f} ± 4 ms; {told})"
+    unsure = replace(delayed, parameters=(Estimate("delay", late, 0.03, "s"),))
+    assert told not in in_words(unsure)
+
+
+def test_identify_says_first_what_the_checks_of_the_recordings_found() -> None:
+    gate = Gate("labels of the markers", False, "A and B carry each other's names in walk.", "labels_swapped", "A/B")
+    full = full_session()
+    first, *others = identified_attention(full, [gate])
+    assert (first.level, first.about) == ("fail", ABOUT)
+    assert first.text == "Found: labels swapped A/B. A and B carry each other's names in walk."
+    assert ABOUT not in [one.about for one in others]
+    assert identified_attention(full, []) == session_attention(full)

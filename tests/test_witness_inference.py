@@ -1,0 +1,108 @@
+"""The witnesses of a session together: what is wrong is named with its size, chance and contradiction name nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from walking import MASS, STANCE, Wrong, session, standing, walk
+
+from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence, undo_causes
+from biodance.diagnosis.witness_inference import infer_causes, size_from_witnesses
+from biodance.witnesses import observe, recording
+
+
+def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> None:
+    """0.3 % of the weight is a lean of 0.17 degrees; all trials share it."""
+    seen = observe(recording(standing(push=4.0, weight=62.0), mass=MASS), ["standing_force"])
+    one = next(one for one in seen if one.what == "mean Fx")
+    (share,) = [size / (62.0 * 9.81) for size in one.norms.values()]
+    assert 0.003 < share < 0.004
+    twice = collect_evidence(session(standing(push=4.0), standing(push=4.0)))
+    assert size_from_witnesses(twice, ("plate_offset", "Fx"))[1] > 1.5
+
+
+def test_clean_walks_and_standing_name_nothing() -> None:
+    evidence = collect_evidence(session(standing(), walk(), walk(name="again")))
+    assert infer_causes(evidence).findings == ()
+    rows = {(row.effect, row.target): row for row in cause_visibilities(evidence)}
+    assert rows["plate_position", "plate1:y"].sd < 0.004
+    assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
+    assert rows["plate_gain", "plate2:Fx"].witnesses == ()
+
+
+@pytest.mark.parametrize(("heavier", "a_load"), [(0.05, True), (-0.05, False)])
+def test_who_weighs_more_than_declared_may_carry_a_load(heavier: float, a_load: bool) -> None:
+    """A load is weight, too; but nobody carries less than nothing."""
+    weighed = standing(weight=(1 + heavier) * MASS)
+    (one,) = infer_causes(collect_evidence(session(weighed, replace(weighed, name="later")))).findings
+    alike = {(alias.effect, alias.target) for alias in one.set}
+    assert [n in alike for n in (("plate_gain", "Fz"), ("body_mass", ""), ("added_mass", ""))] == [True, True, a_load]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "names", "size"),
+    [
+        (Wrong(moved=(0.0, 0.02)), ("plate_position", "plate1:y"), 0.02),
+        (Wrong(late=0.03), ("time_delay", ""), 0.03),
+        (Wrong(gain=0.06), ("plate_gain", "plate1:Fz"), 0.06),
+        (Wrong(signs=(-1, -1, 1, -1, -1, -1)), ("axis_error", "plate1:Fz"), None),
+    ],
+)
+def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str], size: float | None) -> None:
+    found = infer_causes(collect_evidence(session(standing(wrong), walk(wrong), walk(wrong, name="again")))).findings
+    assert [(one.effect, one.target) for one in found] == [names]
+    if size is not None:
+        low, high = found[0].parameters[0].interval
+        assert low <= size <= high
+        assert found[0].parameters[0].sd < 0.3 * size
+
+
+def test_putting_a_delay_right_gives_back_what_was_seen_without_it() -> None:
+    """What 40 ms add to steps is no straight line: where they are taken off, everything is as in the clean walk."""
+    late = collect_evidence(session(standing(), walk(Wrong(late=0.04)))).counting
+    clean = {one.stride: one.value - one.expected for one in collect_evidence(session(standing(), walk())).observations}
+    added, _ = undo_causes(late, {("time_delay", ""): 0.04})
+    compared = [
+        (one.value - one.expected + more - clean[one.stride]) / one.sd
+        for one, more in zip(late.observations, added, strict=True)
+        if one.stride in clean and np.isfinite(more)
+    ]
+    straight = late.traces["time_delay", ""] / [one.sd for one in late.observations]
+    assert len(compared) > 20
+    assert np.abs(compared).max() < 0.5 < np.abs(0.04 * straight).max()
+
+
+def test_witnesses_that_contradict_each_other_exclude_little() -> None:
+    """30 ms early here and 30 ms late there is no clock that is right to some milliseconds."""
+    delay = ("time_delay", "")
+    agreed = size_from_witnesses(collect_evidence(session(walk(), walk(name="again"))), delay)
+    torn = size_from_witnesses(
+        collect_evidence(session(walk(Wrong(late=0.03)), walk(Wrong(late=-0.03), name="again"))), delay
+    )
+    assert torn[1] > 2.0 * agreed[1]
+    assert all(abs(torn[0] - late) < 4.0 * torn[1] for late in (0.03, -0.03))
+
+
+def test_one_odd_step_names_nothing() -> None:
+    odd = walk(Wrong(late=0.03))
+    others = [walk(name=f"walk{i}") for i in range(3)]
+    shifted = infer_causes(collect_evidence(session(*others, odd))).findings
+    assert not [one for one in shifted if one.effect != "time_delay"]
+
+
+def test_seconds_of_single_contact_count() -> None:
+    assert collect_evidence(session(walk())).seconds["walk"] == pytest.approx(2 * STANCE, abs=0.02)
+
+
+def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
+    """Its clock comes 4 ms later than elsewhere: expected then. 30 ms in all its sessions are a fault all the same."""
+    late = session(standing(), walk(Wrong(late=0.004)), walk(Wrong(late=0.004), name="again"))
+    before, own, fault = (
+        [one for one in collect_evidence(late, None, norms).observations if one.witness == "force_onset"]
+        for norms in ({}, {"force_onset": (0.004, 0.0001)}, {"force_onset": (0.03, 0.0001)})
+    )
+    assert len(before) >= 2
+    for was, now, wrong in zip(before, own, fault, strict=True):
+        assert now.expected - was.expected == pytest.approx(0.004, rel=0.01)
+        assert now.norms["laboratory onset"] < 0.1 * was.norms["laboratory onset"]
+        assert wrong == was
