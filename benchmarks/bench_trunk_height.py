@@ -19,7 +19,7 @@ import biodance
 from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling, measure_static
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.pipeline.body import placed_by_movement
 from biodance.pipeline.trial import Prepared, examine_trial, prepare_trial
@@ -62,7 +62,7 @@ def tracked(body: Body, read: Sequence[Prepared], mass: float) -> dict[str, Fit]
 def log_evidence(body: Body, fits: Sequence[Fit], about: Array) -> float:
     """Return the logarithm of the evidence of the trials, each band under the noise learned with this body."""
     total = statistics_together(body, fits, layout_for(about))
-    noise, belief = learn_noise(total, may_carry(body, widened(body.sip, body.joint_errors)))
+    noise, belief = learn_noise(total, with_unknown_load(body, widened(body.sip, body.joint_errors)))
     return belief.log_evidence - 0.5 * float(total.count @ np.linalg.slogdet(noise.covariance)[1])
 
 

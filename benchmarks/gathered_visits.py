@@ -12,7 +12,7 @@ from virtual_visits import CACHE, TrackedVisit, visit
 import biodance
 from biodance.identification.identification import Identification, conclude, conclude_trials
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, mismatch
 from biodance.identification.statistics import Statistics, empty, layout_for, statistics, usable
 from biodance.library import locate
@@ -68,5 +68,5 @@ def _gathered(one: TrackedVisit) -> Gathered:
     total = empty(10 * len(one.body.segments), layout)
     for fit in one.fits:
         total = total + statistics(one.body, fit, layout)
-    noise, _ = learn_noise(total, may_carry(one.body, widened(one.body.sip)))
+    noise, _ = learn_noise(total, with_unknown_load(one.body, widened(one.body.sip)))
     return Gathered(one, total, noise, mismatch(one.body, one.fits, noise))

@@ -11,7 +11,7 @@ from biodance.body.parts import GRAVITY
 from biodance.identification.added_mass import added_mass
 from biodance.identification.identification import Identification
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import mismatch
 from biodance.identification.statistics import Fit, Statistics
 from biodance.lab.filters import LowPass, low_pass
@@ -34,7 +34,7 @@ def loads_table(reference: Identification, later: Gathered) -> list[Load]:
 def loaded_arm(reference: Identification, later: Gathered) -> Load:
     """Return the same for the arm's load, with noise and disturbances learned from the loaded session itself."""
     total = _combined(later, _with_loads(later), *ARM)
-    noise, _ = learn_noise(total, may_carry(later.visit.body, widened(later.visit.body.sip)))
+    noise, _ = learn_noise(total, with_unknown_load(later.visit.body, widened(later.visit.body.sip)))
     found = mismatch(later.visit.body, later.visit.fits, noise)
     return _load(reference, replace(later, noise=noise, found=found), total, *ARM)
 

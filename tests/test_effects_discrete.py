@@ -263,7 +263,7 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
     ("module", "base", "missing"),
     [
         ("gate", "DiscreteEffect", "look"),
-        ("missing_joint", "MissingJoint", "loosened"),
+        ("missing_joint", "MissingJoint", "extended_body"),
         ("effect", "Effect", "columns or transform"),
     ],
 )

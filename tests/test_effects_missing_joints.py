@@ -12,9 +12,9 @@ from biodance.body.human.human import human
 from biodance.body.inertia import shift_matter, smallest_eigenvalues
 from biodance.diagnosis.accept import case_fit
 from biodance.effects import Case, effect
-from biodance.effects.head_joint import with_neck
-from biodance.effects.shoulder_girdle import with_clavicles
-from biodance.effects.trunk_joint import with_thorax
+from biodance.effects.head_joint import HeadJoint
+from biodance.effects.shoulder_girdle import ShoulderGirdle
+from biodance.effects.trunk_joint import TrunkJoint
 from biodance.identification.identification import identify_body
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
@@ -22,7 +22,11 @@ from biodance.motion.smoothing import smooth
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Plate, Source, Subject, Trial
 
-KINDS = {"head_joint": with_neck, "trunk_joint": with_thorax, "shoulder_girdle": with_clavicles}
+KINDS = {
+    "head_joint": HeadJoint.extended_body,
+    "trunk_joint": TrunkJoint.extended_body,
+    "shoulder_girdle": ShoulderGirdle.extended_body,
+}
 INSIDE = slice(60, -60)
 
 

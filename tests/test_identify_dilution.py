@@ -8,7 +8,7 @@ from identify_trials import smooth_motion
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.body.human.human import human
-from biodance.identification.calibration import carried_away, undiluted
+from biodance.identification.calibration import gains_move_masses, undiluted
 from biodance.identification.identification import identify_body
 from biodance.identification.loads import compact_load
 from biodance.identification.posterior import posterior
@@ -91,7 +91,7 @@ def test_masses_may_move_by_what_is_uncertain(shaken: Statistics, sds: float, ca
     moved = before.mean.copy()
     moved[thigh] += sds * np.sqrt(before.covariance[thigh, thigh])
     moved[thigh + 1] += 100.0
-    assert carried_away(before, replace(before, mean=moved)) is carried
+    assert gains_move_masses(before, replace(before, mean=moved)) is carried
 
 
 def test_segments_of_no_person_are_left_alone(shaken: Statistics) -> None:
@@ -110,7 +110,7 @@ def test_statistics_without_their_fastest_band_are_those_of_fewer_bands(shaken: 
 def test_a_band_that_only_noise_fills_is_left_out_and_said(slow: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     real = smooth_motion(BODY, np.random.default_rng(3), frames=400, size=0.3)
     fit = Fit("t", real, predict_wrench(BODY, real), np.ones(400, dtype=bool))
-    monkeypatch.setattr("biodance.identification.calibration.carried_away", lambda *_: slow)
+    monkeypatch.setattr("biodance.identification.calibration.gains_move_masses", lambda *_: slow)
     found = identify_body(BODY, (fit,))
     assert found.diluted is slow
     assert found.noise.bands.edges[-1] == (2.5 if slow else 6.0)

@@ -13,7 +13,7 @@ from biodance.body.inertia import rigid_inertia
 from biodance.body.parts import JointError
 from biodance.identification.information import Information
 from biodance.identification.knowledge import known_together
-from biodance.identification.placement import goes_along, more_probable_table, placed_as, with_sides
+from biodance.identification.placement import matter_follows_joint, more_probable_table, with_matter_placed, with_sides
 from biodance.motion.ik.joint_unknowns import JointUnknowns, own_centre
 from biodance.records import Sip
 from biodance.uncertainty.caution import from_true_centres, misplaced, widened
@@ -63,7 +63,7 @@ def test_the_more_probable_place_is_kept(along: bool, seed: int) -> None:
     body = low_joint()
     true = body.at_joint if along else body.sip
     found, _, words = more_probable_table(moments(body, true, seed), widened(body.sip), body)
-    assert goes_along(found, body) == along
+    assert matter_follows_joint(found, body) == along
     assert ("along with the joint" in words[0]) == along
 
 
@@ -85,13 +85,13 @@ def test_a_prior_of_another_mass_is_placed_at_that_mass_and_back_again() -> None
     body = low_joint()
     placed, _, _ = more_probable_table(moments(body, body.sip), widened(body.sip), body)
     heavy = Sip(body.segments, 1.1 * placed.phi, 1.21 * np.asarray(placed.covariance))
-    there = placed_as(heavy, body, along=True)
+    there = with_matter_placed(heavy, body, along=True)
     np.testing.assert_allclose(there.com, body.at_joint.com, atol=1e-12)
     assert there.mass.sum() == pytest.approx(heavy.mass.sum())
-    back = placed_as(there, body, along=False)
+    back = with_matter_placed(there, body, along=False)
     np.testing.assert_allclose(back.phi, heavy.phi)
     np.testing.assert_allclose(back.covariance, heavy.covariance)
-    assert placed_as(heavy, replace(body, at_joint=None), along=True) is heavy
+    assert with_matter_placed(heavy, replace(body, at_joint=None), along=True) is heavy
 
 
 def legs_of(body: Body, heavier: float) -> Information:

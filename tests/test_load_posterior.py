@@ -57,7 +57,7 @@ def test_the_mass_of_a_load_near_the_middle_of_its_segment_is_right_in_the_mean(
         shown = columns @ (2.4 * (middle + 0.4 * factor @ rng.normal(size=3))) + rng.normal(size=10)
         one = LoadView.of(columns, shown, (middle, factor), np.zeros(10))
         evidence = one.log_ratio(MASSES) + log_mass_prior(MASSES)
-        weights = [np.exp(log - log.max()) for log in (evidence, evidence + one.log_told(MASSES))]
+        weights = [np.exp(log - log.max()) for log in (evidence, evidence + one.log_place_information(MASSES))]
         errors.append([weight @ MASSES / weight.sum() - 2.4 for weight in weights])
     by_evidence, size = np.mean(errors, axis=0)
     assert abs(size) < 0.05

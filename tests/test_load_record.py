@@ -15,12 +15,12 @@ from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.identification.load_words import say_load
 from biodance.motion.kinematics import poses
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.finding_words import in_words, or_else
+from biodance.pipeline.finding_words import alternatives_in_words, in_words
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.trial_result import Check
 from biodance.report.documents.diagnosis import diagnosis_document
 from biodance.report.documents.identification import added_mass_document
-from biodance.report.wording import told_sizes
+from biodance.report.wording import sizes_in_words
 
 PLACE = np.array([0.01, -0.12, 0.02])
 NOTHING = Diagnosis("nothing wrong", ())
@@ -53,7 +53,7 @@ def test_the_finding_is_the_record_of_the_search(named: tuple[Finding, ...]) -> 
     np.testing.assert_array_equal(numbers["parameters"]["place"]["value"], record["place_m"])
     assert [a["target"] for a in numbers["set"]] == list(record["set"]) == [name for name, _ in FOREARM]
     assert in_words(one) == "added mass left forearm hand or left upper arm (mass 2.4 ± 0.3 kg)"
-    assert told_sizes(numbers["parameters"]) == "mass 2.40 ± 0.30 kg, place 10, −120, 20 ± 1, −12, 2 mm"
+    assert sizes_in_words(numbers["parameters"]) == "mass 2.40 ± 0.30 kg, place 10, −120, 20 ± 1, −12, 2 mm"
     assert "2.40 kg on the left forearm hand (80 % probable) or left upper arm" in say_load(search)
 
 
@@ -68,7 +68,7 @@ def test_weight_that_a_gain_explains_is_no_second_cause() -> None:
     told = with_load(replace(NOTHING, verdict="named, complete", findings=(GAIN,)), found(*FOREARM))
     (one,) = told.findings
     assert (one.effect, [a.effect for a in one.set]) == ("plate_gain", ["plate_gain", "added_mass", "added_mass"])
-    assert or_else(one) == ", not told from added mass left forearm hand, added mass left upper arm"
+    assert alternatives_in_words(one) == ", not told from added mass left forearm hand, added mass left upper arm"
     assert in_words(one) == "plate gain Fz (gain 4 ± 1 %)"
 
 

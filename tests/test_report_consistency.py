@@ -17,7 +17,7 @@ from biodance.cli.session import print_reported
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.engine import STRANGE, UNASKED
-from biodance.pipeline.attention import _checked, headline, session_attention, told
+from biodance.pipeline.attention import _checked, headline, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.provenance import provenance
@@ -71,7 +71,7 @@ def surfaces(verdict: Diagnosis, check: Check, judged: tuple[Judged, ...]) -> di
     full = FULL
     trial = replace(full.trials[0], fit=None, comparison=None, standing=None, checks=(check,))
     result = replace(full, trials=(trial,), checks=(), standing=None, still=None)
-    found = SessionDiagnosis(told(verdict, result, judged))
+    found = SessionDiagnosis(reconcile_with_checks(verdict, result, judged))
     made, first = MADE, found.diagnosis.attention
     numbers = json.loads(to_text(diagnosis_document(found)))
     screen = StringIO()
@@ -99,7 +99,7 @@ def test_nothing_says_all_is_well_beside_a_failed_check_or_an_unjudged_trial(ver
 
 
 def test_diagnose_begins_with_its_headline() -> None:
-    found = SessionDiagnosis(told(WHOLE, replace(FULL, checks=()), (STATIC,)))
+    found = SessionDiagnosis(reconcile_with_checks(WHOLE, replace(FULL, checks=()), (STATIC,)))
     screen = StringIO()
     print_diagnosis(json.loads(to_text(diagnosis_document(found))), Console(file=screen, width=1000))
     assert screen.getvalue().startswith(found.diagnosis.attention[0].text)
@@ -113,7 +113,7 @@ def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> N
         (replace(strange, notes=(STRANGE, UNASKED)), "fail", "Something is wrong"),
         (replace(strange, adequacy=LEFT), "fail", "Something is wrong"),
     ):
-        first = told(one, replace(FULL, checks=()), (STATIC,)).attention[0]
+        first = reconcile_with_checks(one, replace(FULL, checks=()), (STATIC,)).attention[0]
         assert (first.level, first.text[: len(begins)]) == (level, begins)
         assert "It resembles plate gain Fz (gain 6 ± 0.2 %), which is not enough." in first.text
 
@@ -128,7 +128,7 @@ def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> N
     ],
 )
 def test_who_cannot_tell_says_what_to_do_next(verdict: Diagnosis, judged: tuple[Judged, ...], then: str) -> None:
-    first = told(verdict, replace(FULL, checks=()), judged).attention[0].text
+    first = reconcile_with_checks(verdict, replace(FULL, checks=()), judged).attention[0].text
     assert first.startswith("Cannot tell")
     assert f"To know it, {then}" in first
 

@@ -13,7 +13,7 @@ from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.motion.clocks import PlateFit, fit_plate, from_plate, onto_plate
 from biodance.pipeline.robot import identify_robot
-from biodance.pipeline.robot_words import told_of
+from biodance.pipeline.robot_words import attention_of
 from biodance.records import Wrench
 
 
@@ -93,7 +93,7 @@ def test_clocks_apart_by_seconds_are_brought_together_and_said(place: Path, tmp_
         place / "good", tmp_path / "late", lambda frame: frame.assign(**{"time (s)": frame["time (s)"] + 7.25})
     )
     one = matched(folder, place / "hoap3.urdf")
-    told = told_of((one,))
+    told = attention_of((one,))
     assert one.plate.delay == pytest.approx(RobotLab().ahead - 7.25, abs=0.01)
     (clocks,) = (said for said in told if said.about == "time_delay")
     assert clocks.level == "warn"
@@ -105,7 +105,7 @@ def test_a_missing_encoder_is_named_and_a_still_joint_may_be_declared(place: Pat
     assert "no encoder for the joint left_elbow_pitch" in refused(folder, place)
     assert "fixed = {left_elbow_pitch" in refused(folder, place)
     (folder / "recording.toml").write_text("[joints]\nfixed = {left_elbow_pitch = -0.3}\n")
-    told = told_of((matched(folder, place / "hoap3.urdf"),))
+    told = attention_of((matched(folder, place / "hoap3.urdf"),))
     assert any("Taken as not moving: left_elbow_pitch" in said.text for said in told)
 
 
@@ -118,7 +118,7 @@ def test_degrees_are_refused_unless_said(place: Path, tmp_path: Path) -> None:
     folder = table(place / "good", tmp_path / "degrees", turned)
     assert "In degrees?" in refused(folder, place)
     (folder / "recording.toml").write_text('angle_unit = "deg"\n')
-    told = told_of((matched(folder, place / "hoap3.urdf"),))
+    told = attention_of((matched(folder, place / "hoap3.urdf"),))
     assert any("converted from degrees" in said.text for said in told)
 
 

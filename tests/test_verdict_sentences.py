@@ -10,7 +10,13 @@ from example_results import full_session
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.effects import Gate, effects
-from biodance.pipeline.attention import headline, identified_attention, is_well, session_attention, told
+from biodance.pipeline.attention import (
+    headline,
+    identified_attention,
+    is_well,
+    reconcile_with_checks,
+    session_attention,
+)
 from biodance.pipeline.finding_words import EXPLAINS, in_words
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, strongest_first
@@ -29,7 +35,7 @@ STATIC = Judged("static", 3.0)
 
 
 def sessions():
-    """Yield every verdict beside every check and trial, as `told` says it."""
+    """Yield every verdict beside every check and trial, as `reconcile_with_checks` says it."""
     result = full_session()
     left = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
     whole = Diagnosis("nothing wrong", ())
@@ -44,7 +50,7 @@ def sessions():
     )
     for one, check, row in itertools.product(some, (GOOD, BAD, HEAVY), ((STATIC,), (STATIC, WALK), (WALK,))):
         trials = tuple(replace(trial, checks=()) for trial in result.trials)
-        yield one, check, row, told(one, replace(result, trials=trials, checks=(check,)), row)
+        yield one, check, row, reconcile_with_checks(one, replace(result, trials=trials, checks=(check,)), row)
 
 
 def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
@@ -76,20 +82,25 @@ def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     trials = tuple(replace(trial, checks=()) for trial in result.trials)
     odd = replace(body(), notes=("Warning: the right thigh is 38 mm shorter than the left thigh: check the markers.",))
     doubtful = replace(result, trials=trials, checks=(), body=odd)
-    one = told(Diagnosis("nothing wrong", ()), doubtful, (STATIC,))
+    one = reconcile_with_checks(Diagnosis("nothing wrong", ()), doubtful, (STATIC,))
     assert one.verdict == "unexplained"
     assert one.attention[0].text.startswith("Cannot tell")
     assert "thigh is 38 mm shorter" in one.attention[0].text
-    assert told(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
+    assert (
+        reconcile_with_checks(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict
+        == "named, incomplete"
+    )
     thigh = replace(FOUND, effect="segment_length", target="right_thigh")
-    assert told(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
+    assert (
+        reconcile_with_checks(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
+    )
 
 
 def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
     full = full_session()
     result = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=())
-    assert told(Diagnosis("nothing wrong", ()), result, (STATIC,)).verdict == "nothing wrong"
-    one = told(Diagnosis("nothing wrong", ()), result, (replace(STATIC, seconds=0.0), WALK))
+    assert reconcile_with_checks(Diagnosis("nothing wrong", ()), result, (STATIC,)).verdict == "nothing wrong"
+    one = reconcile_with_checks(Diagnosis("nothing wrong", ()), result, (replace(STATIC, seconds=0.0), WALK))
     assert one.verdict == "unexplained"
     assert one.attention[0].text.startswith("Cannot tell")
     assert not is_well(one)

@@ -34,20 +34,17 @@ class HeadJoint(MissingJoint):
     """Root mean square of thirty virtual sessions, whose head nods by 2.5 deg on two axes."""
 
     @classmethod
-    def loosened(cls, case: Case) -> Body | None:
-        """Return `with_neck` of the case."""
-        return with_neck(case)
-
-
-def with_neck(case: Case) -> Body | None:
-    """Return the body with three joints in the neck; None where the markers do not show the head, or it has them."""
-    body, places = case.body, neck_and_vertex(case.body)
-    seen = tuple(body.markers.names[c] for c in case.marker_columns if body.markers.names[c].endswith("HD"))
-    if places is None or len(seen) < _MARKERS or "head" in body.links:
-        return None
-    neck, vertex = places
-    head = share_of_body(body, "head", top=vertex, bottom=neck)
-    return branch_off(body, Cut("trunk_head", "head", _AXES, neck, head, seen))
+    def extended_body(cls, case: Case) -> Body | None:
+        """Return the body with three joints in the neck; None where the markers do not show the head, or it has
+        them.
+        """
+        body, places = case.body, neck_and_vertex(case.body)
+        seen = tuple(body.markers.names[c] for c in case.marker_columns if body.markers.names[c].endswith("HD"))
+        if places is None or len(seen) < _MARKERS or "head" in body.links:
+            return None
+        neck, vertex = places
+        head = share_of_body(body, "head", top=vertex, bottom=neck)
+        return branch_off(body, Cut("trunk_head", "head", _AXES, neck, head, seen))
 
 
 EFFECT = HeadJoint

@@ -38,25 +38,23 @@ class ShoulderGirdle(MissingJoint):
     """Root mean square of thirty virtual sessions (0.033 to 0.08), whose collar bones follow the arms."""
 
     @classmethod
-    def loosened(cls, case: Case) -> Body | None:
-        """Return `with_clavicles` of the case."""
-        return with_clavicles(case)
-
-
-def with_clavicles(case: Case) -> Body | None:
-    """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both
-    shoulders, or it has them.
-    """
-    body = case.body
-    seen = {body.markers.names[c] for c in case.marker_columns}
-    if shoulders(body) is None or not seen.issuperset(SHOULDERS) or "right_clavicle" in body.links:
-        return None
-    for side, sign in (("right", 1.0), ("left", -1.0)):
-        shoulder = body.joint_index(f"{side}_shoulder_flexion")
-        place = sternoclavicular(body, side)
-        axes = {f"{side}_clavicle_elevation": -sign * np.eye(3)[0], f"{side}_clavicle_protraction": sign * np.eye(3)[1]}
-        body = branch_off(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), (), (shoulder,)))
-    return doubting(body, SHOULDERS)
+    def extended_body(cls, case: Case) -> Body | None:
+        """Return the body with two joints at the inner end of each collar bone; None where the markers do not show both
+        shoulders, or it has them.
+        """
+        body = case.body
+        seen = {body.markers.names[c] for c in case.marker_columns}
+        if shoulders(body) is None or not seen.issuperset(SHOULDERS) or "right_clavicle" in body.links:
+            return None
+        for side, sign in (("right", 1.0), ("left", -1.0)):
+            shoulder = body.joint_index(f"{side}_shoulder_flexion")
+            place = sternoclavicular(body, side)
+            axes = {
+                f"{side}_clavicle_elevation": -sign * np.eye(3)[0],
+                f"{side}_clavicle_protraction": sign * np.eye(3)[1],
+            }
+            body = branch_off(body, Cut("trunk_head", f"{side}_clavicle", axes, place, np.zeros(10), (), (shoulder,)))
+        return doubting(body, SHOULDERS)
 
 
 EFFECT = ShoulderGirdle

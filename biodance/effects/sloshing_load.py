@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
+from biodance.effects._base.oscillator import oscillator_wrench, point_motion, relative_motion
 from biodance.records import Array
 from biodance.spatial import point_mass
 
@@ -76,7 +76,7 @@ class SloshingLoad(Effect):
         place, acceleration = point_motion(case, index, local)
         x, relative = relative_motion(acceleration, case.motion.rate, frequency=frequency, damping=_DAMPING)
         level = np.array([1.0, 1.0, 0.0])
-        return rigid, riding_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
+        return rigid, oscillator_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 
     def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the frequency itself instead of its difference."""

@@ -48,26 +48,21 @@ class TrunkJoint(MissingJoint):
     """Root mean square of thirty virtual sessions, whose thorax moves by 1.2 deg on two axes."""
 
     @classmethod
-    def loosened(cls, case: Case) -> Body | None:
-        """Return `with_thorax` of the case."""
-        return with_thorax(case)
-
-
-def with_thorax(case: Case) -> Body | None:
-    """Return the body with two joints at L1/L2; None where the markers do not show the thorax."""
-    body, middle = case.body, shoulders(case.body)
-    if middle is None:
-        return None
-    index = body.segment_index("trunk_head")
-    on = tuple(name for name, s in zip(body.markers.names, body.markers.segment, strict=True) if s == index)
-    if sum(body.markers.segment[c] == index for c in case.marker_columns) < _MARKERS:
-        return None
-    place = _PLACE * middle
-    loins = _PLACE / XIPHION * share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))
-    thorax = body.sip.phi[10 * index : 10 * index + 10] - loins
-    arms = tuple(i for i, joint in enumerate(body.joints) if joint.parent == body.segment_joint[index])
-    extended = branch_off(body, Cut("trunk_head", "thorax", _AXES, place, thorax, on, arms))
-    return doubting(extended, [name for name in body.markers.names if name.endswith(ELSEWHERE)])
+    def extended_body(cls, case: Case) -> Body | None:
+        """Return the body with two joints at L1/L2; None where the markers do not show the thorax."""
+        body, middle = case.body, shoulders(case.body)
+        if middle is None:
+            return None
+        index = body.segment_index("trunk_head")
+        on = tuple(name for name, s in zip(body.markers.names, body.markers.segment, strict=True) if s == index)
+        if sum(body.markers.segment[c] == index for c in case.marker_columns) < _MARKERS:
+            return None
+        place = _PLACE * middle
+        loins = _PLACE / XIPHION * share_of_body(body, "middle_trunk", top=place, bottom=np.zeros(3))
+        thorax = body.sip.phi[10 * index : 10 * index + 10] - loins
+        arms = tuple(i for i, joint in enumerate(body.joints) if joint.parent == body.segment_joint[index])
+        extended = branch_off(body, Cut("trunk_head", "thorax", _AXES, place, thorax, on, arms))
+        return doubting(extended, [name for name in body.markers.names if name.endswith(ELSEWHERE)])
 
 
 EFFECT = TrunkJoint

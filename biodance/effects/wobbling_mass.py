@@ -8,7 +8,7 @@ heel drops, which excite more than 5 Hz; below that even ten kilograms hardly sh
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.oscillator import point_motion, relative_motion, riding_wrench
+from biodance.effects._base.oscillator import oscillator_wrench, point_motion, relative_motion
 from biodance.records import Array
 
 _FREQUENCY = {"trunk_head": 5.0}
@@ -48,7 +48,7 @@ class WobblingMass(Effect):
         moved = relative_motion(
             acceleration, case.motion.rate, frequency=_FREQUENCY.get(self.target, LIMBS), damping=_DAMPING
         )
-        return riding_wrench(place, acceleration, moved, gravity=case.body.gravity)[:, :, None]
+        return oscillator_wrench(place, acceleration, moved, gravity=case.body.gravity)[:, :, None]
 
     def possible(self, theta: Array) -> bool:
         """Return whether the size is positive: only a mass that is there wobbles."""

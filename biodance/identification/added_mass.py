@@ -179,7 +179,7 @@ class _Judged:
 def _suspect(segment: str, i: int, bodies: tuple[_Judged, ...], load: Array, none: float) -> LoadCandidate:
     """Return the hypothesis of a load on segment ``i`` from the log probabilities of it (rivals, n) and of ``none``."""
     chance = float(logsumexp(load))
-    size = load + np.array([one.views[i].log_told(MASSES) for one in bodies])
+    size = load + np.array([one.views[i].log_place_information(MASSES) for one in bodies])
     size += (logsumexp(load, axis=1) - logsumexp(size, axis=1))[:, None]
     here = np.exp(size - np.logaddexp(chance, none))
     posterior = LoadPosterior(float(np.exp(none - np.logaddexp(chance, none))), here.sum(axis=0))

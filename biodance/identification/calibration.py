@@ -16,7 +16,7 @@ from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
 from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, temper
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
@@ -62,7 +62,7 @@ def undiluted(total: Statistics, phi: Array, segments: tuple[str, ...]) -> Stati
     return Statistics(gram, total.count, total.layout)
 
 
-def carried_away(before: Posterior, after: Posterior) -> bool:
+def gains_move_masses(before: Posterior, after: Posterior) -> bool:
     """Whether giving back what noise takes moves a mass by more than its standard deviation.
 
     A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
@@ -111,28 +111,28 @@ def discounted(total: Statistics, noise: Noise, found: Mismatch | None, room: Si
     return Calibrated(temper(data, found, sizes), sizes, noise)
 
 
-def give_back(
+def undo_dilution(
     body: Body, total: Statistics, measured: Calibrated, found: Mismatch, before: Sip, *, open_table: bool
 ) -> Calibrated:
     """Return the ``measured`` data of ``total`` with their dilution given back; as they are, and ``diluted``, where
     that moves a mass by more than its standard deviation. ``before`` is the table, whose open questions the data
     answer if ``open_table``.
     """
-    room = may_carry(body, before)
+    room = with_unknown_load(body, before)
     now = measured
     for _ in range(_ROUNDS):
         table = more_probable_table(now.data, before, body)[0] if open_table else before
         belief = posterior(now.data, table)
-        real = undiluted(total, _carrying(belief, now.data, body).mean, body.segments)
+        real = undiluted(total, _with_probable_load(belief, now.data, body).mean, body.segments)
         now = discounted(real, learn_noise(real, room, rounds=_AGAIN)[0], found, room)
-        if carried_away(belief, posterior(now.data, table)):
+        if gains_move_masses(belief, posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
     return now
 
 
-def _carrying(belief: Posterior, data: Information, body: Body) -> Posterior:
+def _with_probable_load(belief: Posterior, data: Information, body: Body) -> Posterior:
     """Return the belief with a load where the data make one more probable: arms that are too light for what they
     carry show more than is predicted, and no dilution.
     """
-    loaded = posterior(data, may_carry(body, belief.prior))
+    loaded = posterior(data, with_unknown_load(body, belief.prior))
     return max(belief, loaded, key=lambda one: one.log_evidence)

@@ -14,11 +14,11 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.calibration import discounted, give_back
+from biodance.identification.calibration import discounted, undo_dilution
 from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
@@ -225,9 +225,9 @@ def conclude_trials(
     """Return the identification from the statistics ``total`` of the trials ``fits``, disturbances counted.
 
     Where movement is so slow that what its fastest band shows cannot be told from noise in the kinematics (regression
-    dilution that cannot be given back, `dilution.carried_away`), that band is left out.
+    dilution that cannot be given back, `dilution.gains_move_masses`), that band is left out.
     """
-    room = may_carry(body, prior or widened(body.sip, body.joint_errors))
+    room = with_unknown_load(body, prior or widened(body.sip, body.joint_errors))
 
     def concluded(some: Statistics) -> Identification:
         noise, _ = learn_noise(some, room)
@@ -258,10 +258,10 @@ def conclude(
     noise alone, far too short, and the notes say so.
     """
     before = prior or widened(body.sip, body.joint_errors)
-    room = before if machine else may_carry(body, before)
+    room = before if machine else with_unknown_load(body, before)
     got = discounted(total, noise or learn_noise(total, room)[0], found, room)
     if found is not None and not machine:
-        got = give_back(body, total, got, found, before, open_table=prior is None)
+        got = undo_dilution(body, total, got, found, before, open_table=prior is None)
     data = got.data
     before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
     belief = posterior(data, before)

@@ -10,7 +10,7 @@ Whether there is a load is a question of evidence, for which mass and place need
 not: the data tell mass and first moments, m and m x, and a place that is as likely anywhere in and near the box spreads
 the first moments of m kg over a volume of m³. The evidence prefers lighter loads for it: 2.4 ± 0.3 kg near the middle
 of a segment came out 0.1 kg light. The size is weighed by Jeffreys' prior, for which a mass is not the less probable
-the better its first moments are known: `LoadView.log_told` gives back what the evidence takes.
+the better its first moments are known: `LoadView.log_place_information` gives back what the evidence takes.
 """
 
 from dataclasses import dataclass
@@ -94,7 +94,7 @@ class LoadView:
         """Return the log likelihood ratio (n,) of loads of ``masses`` (n,) kg against none."""
         return _log_ratio(masses[:, None], self.shown, self.squares, self.surprise, self.unit, self.strength)
 
-    def log_told(self, masses: Array) -> Array:
+    def log_place_information(self, masses: Array) -> Array:
         """Return half the logarithm (n,) of how much better the place of loads of ``masses`` (n,) kg is known after
         the data: what the evidence of each mass pays for places that the data exclude.
         """

@@ -55,7 +55,7 @@ def _factor(moment: Array) -> Array:
     return np.asarray(vector[:, keep] * np.sqrt(value[keep]))
 
 
-def may_carry(body: Body, prior: Sip, *, share: Array | None = None) -> Sip:
+def with_unknown_load(body: Body, prior: Sip, *, share: Array | None = None) -> Sip:
     """Return ``prior`` with a covariance that leaves room for an undeclared load on every segment.
 
     ``share`` (N,) of a load's second moment for every segment, by default `UNDECLARED`. Noise is learned under it: with

@@ -24,7 +24,7 @@ _TOLD = 1.0
 """mm: a joint of the trunk nearer to the table's cut than this is not told."""
 
 
-def goes_along(prior: Sip, body: Body) -> bool:
+def matter_follows_joint(prior: Sip, body: Body) -> bool:
     """Whether the table ``prior`` of ``body`` has the trunk's matter along with the joint."""
     if body.at_joint is None:
         return False
@@ -32,11 +32,11 @@ def goes_along(prior: Sip, body: Body) -> bool:
     return bool(off[1] < off[0])
 
 
-def placed_as(prior: Sip, body: Body, *, along: bool) -> Sip:
+def with_matter_placed(prior: Sip, body: Body, *, along: bool) -> Sip:
     """Return the table ``prior`` of ``body`` with the trunk's matter ``along`` with the joint or at the table's cut,
     unsure of its place; as it is where it lies there already or there is no other place.
     """
-    if body.at_joint is None or goes_along(prior, body) == along:
+    if body.at_joint is None or matter_follows_joint(prior, body) == along:
         return prior
     return _at(body, float(prior.mass.sum()), along=along)
 

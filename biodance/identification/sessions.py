@@ -11,7 +11,7 @@ from biodance.errors import BiodanceError, NotSolved
 from biodance.identification.added_mass import added_mass
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.unloaded_body import scaled_to_mass, table_like
@@ -75,7 +75,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     mass = float(earlier.belief.prior.mass.sum())
     tables = (scaled_to_mass(table_like(one, earlier), mass) for one in (earlier, later))
     first, second = (_with_room(*three) for three in zip(tables, (earlier, later), (later, earlier), strict=True))
-    mutual = _owed(first) @ earlier.belief.prior.covariance @ _owed(second).T
+    mutual = _prior_influence(first) @ earlier.belief.prior.covariance @ _prior_influence(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
     values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]
     rows = []
@@ -92,7 +92,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     return tuple(rows)
 
 
-def _owed(belief: Posterior) -> Array:
+def _prior_influence(belief: Posterior) -> Array:
     """Return A (p, p) = C P^-1 of a belief with covariance C: what of a step of the prior's mean is still in its mean.
 
     In the units of each parameter's own standard deviation, where the inverse hangs on no rounding.
@@ -117,4 +117,4 @@ def _with_room(table: Sip, one: Identification, other: Identification) -> Poster
     """
     chance = {found.segment: found.probability for found in added_mass(one, reference=other).suspects}
     share = np.array([chance[segment] for segment in one.body.segments])
-    return posterior(one.data, may_carry(one.body, table, share=share))
+    return posterior(one.data, with_unknown_load(one.body, table, share=share))

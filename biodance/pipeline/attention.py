@@ -13,7 +13,7 @@ from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import Gate
 from biodance.identification.load_words import size_and_segments
-from biodance.pipeline.finding_words import LOAD, cause_of, in_words, listed, or_else
+from biodance.pipeline.finding_words import LOAD, alternatives_in_words, cause_of, in_words, listed
 from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
@@ -41,7 +41,7 @@ _WEIGHT = "mass on the plates"
 _ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
 
 
-def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
+def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
     """Return the diagnosis with what it rests on and its sentences, and never "complete" beside a check outside its
     limit, an unjudged trial or a doubtful body, nor "nothing wrong" beside the last: forces fit a body with a hip 50 mm
     off as well.
@@ -54,13 +54,13 @@ def told(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> D
         one = replace(one, verdict="named, incomplete")
     if one.verdict == "nothing wrong" and result.doubts:
         one = replace(one, verdict="unexplained", doubt=_FITS + _doubtful(result.doubts))
-    if one.verdict == "nothing wrong" and _stood_only(result, judged):
+    if one.verdict == "nothing wrong" and _only_standing_judged(result, judged):
         one = replace(one, verdict="unexplained", doubt=_FITS + _ONLY_STOOD)
     first = headline(one, amount(result, judged), judged, outside)
     return replace(one, judged=judged, attention=strongest_first([first, *session_attention(result, one.findings)]))
 
 
-def _stood_only(result: SessionResult, judged: tuple[Judged, ...]) -> bool:
+def _only_standing_judged(result: SessionResult, judged: tuple[Judged, ...]) -> bool:
     """Return whether only standing was judged of a session that holds movement, not even by its steps."""
     static = {one.trial.name for one in result.trials if one.trial.role == "static"}
     moved = any(row.seconds > 0 for row in judged if row.trial not in static)
@@ -89,8 +89,8 @@ def amount(result: SessionResult, judged: tuple[Judged, ...]) -> str:
 def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> Attention:
     """Return the one sentence that says the verdict, what it rests on, and what it does not know."""
     its_own = tuple(check for check in outside if cause_of(check.what, one.findings))
-    beside = _beside(judged, tuple(check for check in outside if check not in its_own))
-    names = " and ".join(f"{in_words(finding)}{or_else(finding)}" for finding in one.findings)
+    beside = _unjudged_and_failed(judged, tuple(check for check in outside if check not in its_own))
+    names = " and ".join(f"{in_words(finding)}{alternatives_in_words(finding)}" for finding in one.findings)
     like = f" It resembles {' and '.join(map(in_words, one.resembles))}, which is not enough." if one.resembles else ""
     level: Level = "fail"
     if one.findings:
@@ -114,7 +114,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         )
         whole = f" for {SHORTEST_RUN:g} s without a break" if partly else ""
         level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
-        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}.{_heard(one)}"
+        text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}.{_witness_sentence(one)}"
         text += (_MOVE if where else _MEND) + _sentence(beside)
     elif one.doubt:
         level = "warn"
@@ -133,12 +133,12 @@ def _checks(one: Diagnosis) -> str:
     """Return where the named causes that have no size were seen, as sentences: which labels, in which trials."""
     bare = {(finding.effect, finding.target) for finding in one.findings if not finding.parameters}
     said = [gate.text for gate in one.gates if not gate.ok and (gate.effect, gate.target) in bare]
-    return "".join(f"{_short(text)}. " for text in dict.fromkeys(said))
+    return "".join(f"{_first_sentence(text)}. " for text in dict.fromkeys(said))
 
 
 def _doubtful(doubts: Sequence[str]) -> str:
     """Return what is doubtful of a body, without advice."""
-    return listed([_short(text.removeprefix(WARNING).partition(": check")[0]) for text in doubts])
+    return listed([_first_sentence(text.removeprefix(WARNING).partition(": check")[0]) for text in doubts])
 
 
 def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
@@ -198,13 +198,13 @@ def _level(status: str) -> Level:
     return "fail" if status == "refused" else "warn"
 
 
-def _beside(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
+def _unjudged_and_failed(judged: tuple[Judged, ...], outside: tuple[Check, ...]) -> str:
     """Return what was not judged and which checks failed, to go on a sentence with."""
     missed: dict[str, list[str]] = {}
     stepped_only = [row.trial for row in judged if row.missed and row.seconds > 0]
     for row in judged:
         if row.missed and not row.seconds > 0:
-            why = without_path(_short(row.why_not), row.trial).removeprefix(f"Trial {row.trial}: ")
+            why = without_path(_first_sentence(row.why_not), row.trial).removeprefix(f"Trial {row.trial}: ")
             missed.setdefault(why, []).append(row.trial)
     parts = [f"; not judged: {listed(names)}, because: {why}" for why, names in missed.items()]
     parts += [f"; only the steps on plates were judged of {listed(stepped_only)}"] if stepped_only else []
@@ -224,11 +224,11 @@ def _named_checks(checks: tuple[Check, ...]) -> str:
     return listed([f"{what} ({listed(where)})" for what, where in alike.items()])
 
 
-def _short(reason: str) -> str:
+def _first_sentence(reason: str) -> str:
     return reason.split(". ")[0].rstrip(".")
 
 
-def _heard(one: Diagnosis) -> str:
+def _witness_sentence(one: Diagnosis) -> str:
     """Return that the witnesses were asked, as a sentence; "" where they saw nobody on a plate."""
     trials = len({o.trial for o in one.witnesses.observations if o.witness != _EMPTY}) if one.witnesses else 0
     return f" Plates and clocks, judged alone, look right in {trials} trial{'s' * (trials > 1)}." if trials else ""

@@ -114,21 +114,23 @@ def make_dance(
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
-            free = aside.submit(_freely, own, plan, seed)
+            free = aside.submit(_freer_expectation, own, plan, seed)
             expected, counted, freely = makers.expect(dance), numbers.result(), free.result()
-        reason = " ".join(_told(margin) for margin in broken(margins) if not margin.limit.endswith(OF_PERFORMERS))
+        reason = " ".join(
+            _broken_limit(margin) for margin in broken(margins) if not margin.limit.endswith(OF_PERFORMERS)
+        )
     if reason:
         dance = counted = expected = freely = None
     spent = time.perf_counter() - started
     return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason, freely)
 
 
-def _freely(body: Body, plan: Plan, seed: int) -> Expectation | None:
+def _freer_expectation(body: Body, plan: Plan, seed: int) -> Expectation | None:
     """Return what the same postures chosen freely would tell; None where the plan leaves the choice free."""
     return expect(freer_dance(body, plan, seed=seed), steps=1) if np.isfinite(plan.instructions) else None
 
 
-def _told(m: Margin) -> str:
+def _broken_limit(m: Margin) -> str:
     what = f"{m.limit} {m.what}".replace("_", " ").strip()
     return f"The limit on {what} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
 

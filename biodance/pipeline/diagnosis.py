@@ -22,7 +22,7 @@ from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
-from biodance.pipeline.attention import told
+from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_looks, cases_of, chosen_looks, judged_trials, left_out
@@ -143,7 +143,7 @@ def diagnose_session(
     used = chosen_looks(result.trials) if found.examined else ()
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
-    return replace(found, diagnosis=told(whole, result, judged_trials(result, used)))
+    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
 
 
 def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
@@ -170,7 +170,7 @@ def _diagnosed(
     effects: Chosen[Effect | DiscreteEffect],
     tell: Callable[[str], None],
 ) -> SessionDiagnosis:
-    """Return what was found; `told` says it."""
+    """Return what was found; `reconcile_with_checks` says it."""
     fitted = chosen_looks(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
@@ -193,16 +193,15 @@ def _diagnosed(
         )
     except TrialRefused as why:
         return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, str(why), *result.doubts))
-    examined = noted(
-        examined, *_untold(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes
-    )
+    notes = (*_reference_note(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
+    examined = noted(examined, *notes)
     if failed:
         return SessionDiagnosis(
             by_checks(checks, examined.diagnosis, suspicious=bool(examined.passes_threshold)), examined
         )
     if not own.believed:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
-        return SessionDiagnosis(_disbelieved(without_names(examined).diagnosis), examined)
+        return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
     doubt = _other_body(result.body, tuple(one.name for one in result.shown_joints.gains if one.taken))
     if doubt and examined.diagnosis.verdict == "unexplained" and not examined.diagnosis.doubt:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=doubt))
@@ -252,7 +251,7 @@ def _cannot_tell(checks: tuple[Gate, ...], *notes: str) -> Diagnosis:
     return Diagnosis(verdict="unexplained", findings=(), gates=checks, notes=notes)
 
 
-def _disbelieved(one: Diagnosis) -> Diagnosis:
+def _only_resembled(one: Diagnosis) -> Diagnosis:
     """Return the diagnosis without its names, which are only resembled: the tolerances under which they were found do
     not hold here.
     """
@@ -271,7 +270,7 @@ def _prior(reference: SessionIdentification | None, result: SessionResult) -> Si
     return expect_unloaded(reference.identification, result.identification.identification)
 
 
-def _untold(reference: SessionIdentification | None) -> tuple[str, ...]:
+def _reference_note(reference: SessionIdentification | None) -> tuple[str, ...]:
     """Say that the reference tells nothing of the body, if so."""
     if reference is None or reference.identification.status == "solved":
         return ()

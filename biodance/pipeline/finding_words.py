@@ -65,7 +65,7 @@ def _size(one: Estimate) -> str:
     return f"{one.name.replace('_', ' ')} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
 
 
-def or_else(finding: Finding) -> str:
+def alternatives_in_words(finding: Finding) -> str:
     """Return the other causes that a finding cannot be told from, to go on its name with."""
     others = [cause_in_words(a.effect, a.target) for a in finding.set[1:] if a.effect != finding.effect]
     return f", not told from {listed(others)}" if others else ""

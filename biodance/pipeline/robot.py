@@ -24,7 +24,7 @@ from biodance.motion.grounded import RATE
 from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
-from biodance.pipeline.robot_words import cause_words, misweighed, of_file, refusals, told_of, weights
+from biodance.pipeline.robot_words import attention_of, cause_words, misweighed, of_file, refusals, weights
 from biodance.records import Wrench
 from biodance.records.attention import Attention, Judged, strongest_first
 from biodance.spatial import cross, elementary_rotation, quaternion_matrix, wrench_about_point
@@ -109,7 +109,7 @@ def identify_robot(
     body = read_urdf(urdf, feet=feet, mend=mend)
     found = read_robot_recording(recording, tuple(joint.name for joint in body.joints))
     trials, refused = bring_together(body, found, tell=tell)
-    fitted, kept = _parted(trials)
+    fitted, kept = _fitted_and_kept(trials)
     if not fitted:
         reasons = " ".join(refused.values()) or "No trial has the role fit."
         raise TrialRefused(reasons)
@@ -122,7 +122,7 @@ def identify_robot(
     best = plain if doubtful else best
     wrong = misweighed(best.identified)
     words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best.identified.identification))
-    said = strongest_first([*of_file(body.notes), *refusals(refused), *told_of(trials), *words])
+    said = strongest_first([*of_file(body.notes), *refusals(refused), *attention_of(trials), *words])
     judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
     named = () if doubtful else causes
@@ -154,10 +154,10 @@ def _predicts_better(one: SessionIdentification, other: SessionIdentification) -
     """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm, over all channels, of the RMS of
     what is slower than `_SLOW`, where causes show.
     """
-    return bool(_left(one) < _left(other))
+    return bool(_residual_rms(one) < _residual_rms(other))
 
 
-def _left(one: SessionIdentification) -> float:
+def _residual_rms(one: SessionIdentification) -> float:
     rms = []
     for trial in one.validations or one.fitted:
         slow = low_pass(trial.measured.value - trial.identified.value, trial.measured.rate, LowPass(cutoff=_SLOW))
@@ -165,7 +165,7 @@ def _left(one: SessionIdentification) -> float:
     return float(np.mean(np.log(rms))) if rms else float("inf")
 
 
-def _parted(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[MatchedTrial]]:
+def _fitted_and_kept(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], list[MatchedTrial]]:
     """Return the trials to identify from and those kept; where none was kept, the end of every one is."""
     fitted = [one for one in trials if one.recorded.role == "fit"]
     kept = [one for one in trials if one.recorded.role in ("validate", "check")]

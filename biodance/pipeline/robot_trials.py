@@ -75,9 +75,9 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
             f"of this robot, in N, zeroed while empty?"
         )
     base = recording.base
-    grounded, fit = _stood(body, time, angle, measured, base=_inclined(one, base, time))
+    grounded, fit = _grounded_motion(body, time, angle, measured, base=_base_from_imu(one, base, time))
     if base.markers:
-        grounded = _marked(body, one, base, grounded, angle, fit)
+        grounded = _base_from_markers(body, one, base, grounded, angle, fit)
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
     odd = surprise(body, motion)
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
@@ -98,7 +98,7 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
     return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
 
 
-def _stood(
+def _grounded_motion(
     body: Body,
     time: Array,
     angle: Array,
@@ -117,7 +117,7 @@ def _stood(
     return max(tried, key=lambda pair: pair[1].correlation)
 
 
-def _inclined(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | None:
+def _base_from_imu(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | None:
     """Return what the base's IMU shows at ``time`` (T,) s; None without one."""
     if base.imu is None:
         return None
@@ -129,7 +129,9 @@ def _inclined(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | Non
     return base_of_inclinations(*angle.T)
 
 
-def _marked(body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, angle: Array, fit: PlateFit) -> Grounded:
+def _base_from_markers(
+    body: Body, one: RobotTrial, base: BaseSensors, found: Grounded, angle: Array, fit: PlateFit
+) -> Grounded:
     """Return the motion with the base where its markers are, in the frame of the first standing sole; only frames with
     all markers count.
     """
@@ -159,13 +161,13 @@ def _exchanged(
     low, high = limits[0] - 0.35, limits[1] + 0.35
     inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
     moving = few.std(axis=0) > 0.01
-    best, pair = min(_BETTER * _lacking(body, coarse, few, measured), 2 * (1 - _FAITHFUL)), None
+    best, pair = min(_BETTER * _correlation_deficit(body, coarse, few, measured), 2 * (1 - _FAITHFUL)), None
     for i, j in combinations(range(few.shape[1]), 2):
         if not (inside[i, j] and inside[j, i] and (moving[i] or moving[j])):
             continue
         other = few.copy()
         other[:, [i, j]] = few[:, [j, i]]
-        size = _lacking(body, coarse, other, measured)
+        size = _correlation_deficit(body, coarse, other, measured)
         if size < best:
             best, pair = size, (body.joints[i].name, body.joints[j].name)
     return pair
@@ -179,16 +181,16 @@ def _explains(body: Body, time: Array, angle: Array, measured: Wrench, pair: tup
     i, j = (names.index(name) for name in pair)
     other = angle.copy()
     other[:, [i, j]] = angle[:, [j, i]]
-    found, fit = _stood(body, time, other, measured)
+    found, fit = _grounded_motion(body, time, other, measured)
     motion = robot_fit("exchanged", found, other, on_motion_clock(measured, time, fit))
     most = 2 * motion.fit.use.sum() > found.use.sum()
     return bool(most and fit.correlation > _FAITHFUL and surprise(body, motion) < ODD)
 
 
-def _lacking(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
+def _correlation_deficit(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
     """Return what the correlation at a coarse motion lacks to one; infinite where nothing fits."""
     try:
-        found, fit = _stood(body, time, angle, measured, settings=LowPass(cutoff=0.2 * _COARSE))
+        found, fit = _grounded_motion(body, time, angle, measured, settings=LowPass(cutoff=0.2 * _COARSE))
         legal = _SCALES[0] < fit.scale < _SCALES[1] and found.use.any()
         return 1 - fit.correlation if legal else np.inf
     except BiodanceError:

@@ -26,7 +26,7 @@ def refusals(refused: dict[str, str]) -> list[Attention]:
     return [Attention("warn", why, name, "trial") for name, why in refused.items()]
 
 
-def told_of(trials: list[MatchedTrial]) -> list[Attention]:
+def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
     """Return what a person should know of the recordings: clocks, plates, encoders, what contradicts the drawing."""
     out = []
     for one in trials:
@@ -60,7 +60,7 @@ def cause_words(causes: tuple[RobotFinding, ...], *, doubtful: bool = False) -> 
     for one in causes:
         others = " or ".join(_named(rival) for rival in one.rivals[:3])
         more = f" The recording does not tell it from: {others}." if others else ""
-        text = f"{_told(one)} It was taken out before the masses were identified.{more}"
+        text = f"{_finding_sentence(one)} It was taken out before the masses were identified.{more}"
         out.append(Attention("warn", text, "", one.cause.kind))
     return out
 
@@ -69,7 +69,7 @@ def _named(cause: RobotCause) -> str:
     return f"{cause.kind.replace('_', ' ')} of {cause.where}"
 
 
-def _told(one: RobotFinding) -> str:
+def _finding_sentence(one: RobotFinding) -> str:
     """Return a finding as a sentence, with its 95 % interval."""
     where, value, reach = one.cause.where, one.value, SIGMAS * one.sd
     angle = f"{np.degrees(value):.2f} ± {np.degrees(reach):.2f} degrees"

@@ -50,11 +50,11 @@ def _tolerances(found: LearnedLaboratory) -> list[str]:
     for line in to_toml(found.tolerances, under="tolerances").splitlines():
         within = line if line.startswith("[") else within
         size = _SIZE.match(line) if within == "[tolerances.sizes]" else None
-        lines.append(f"{line}  # {_rests(size['key'], found, before.size(size['key']))}" if size else line)
+        lines.append(f"{line}  # {_basis(size['key'], found, before.size(size['key']))}" if size else line)
     return lines
 
 
-def _rests(key: str, found: LearnedLaboratory, before: float) -> str:
+def _basis(key: str, found: LearnedLaboratory, before: float) -> str:
     count = found.shown.get(key, 0.0)
     if count < _HARDLY:
         return "as shipped: no session shows it"

@@ -13,7 +13,7 @@ from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, told_together, without_path
-from biodance.report.wording import format_number, millimetres, named, size_seen, told_sizes, trial_and_subject
+from biodance.report.wording import format_number, millimetres, named, size_seen, sizes_in_words, trial_and_subject
 
 
 def _line(console: Console, text: str) -> None:
@@ -214,7 +214,7 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
     for finding in found["findings"]:
         others = ", ".join(named(a["effect"], a["target"]) for a in finding["set"][1:])
         told = f"; it could also be: {others}" if others else ""
-        name, sizes = named(finding["effect"], finding["target"]), told_sizes(finding["parameters"])
+        name, sizes = named(finding["effect"], finding["target"]), sizes_in_words(finding["parameters"])
         console.print(f"found: [bold]{escape(name)}[/]{escape(f': {sizes}' * bool(sizes) + told)}", soft_wrap=True)
         if finding["gain"]:
             low, high = (100 * x for x in finding["gain"]["ci95"])

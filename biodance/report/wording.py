@@ -37,14 +37,14 @@ def named(effect: str, target: str) -> str:
     return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
 
 
-def told_sizes(parameters: dict[str, dict[str, Any]]) -> str:
+def sizes_in_words(parameters: dict[str, dict[str, Any]]) -> str:
     """Return the parameters of a finding (its JSON) with their standard deviations; three axes as one vector."""
     vectors = {name: row for name, row in parameters.items() if isinstance(row["value"], list)}
     rows = {name: row for name, row in parameters.items() if name.rpartition("_")[0] not in vectors}
-    return ", ".join(f"{name.replace('_', ' ')} {_told(row)}" for name, row in rows.items())
+    return ", ".join(f"{name.replace('_', ' ')} {_size_in_words(row)}" for name, row in rows.items())
 
 
-def _told(row: dict[str, Any]) -> str:
+def _size_in_words(row: dict[str, Any]) -> str:
     """Return a value, or three, with their standard deviations and unit: ``−19, −186, −28 ± 41, 75, 40 mm``."""
     parts = [row[key] if isinstance(row[key], list) else [row[key]] for key in ("value", "sd")]
     factor, unit, digits = SHOWN_UNITS.get(row["unit"], (1.0, row["unit"], 2))

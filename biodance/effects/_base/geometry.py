@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.changes import carried_by, neutral_turn
-from biodance.effects._base.moved_geometry import MovedMatter, PostureAnswer, centres_of, moved_matter, wrench_of
+from biodance.effects._base.moved_geometry import MovedMatter, PostureSensitivity, centres_of, moved_matter, wrench_of
 from biodance.lab.filters import LowPass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
 _RATE = 25.0
-"""Hz, at least, of the frames in which the answer is computed."""
+"""Hz, at least, of the frames in which the sensitivity is computed."""
 _ENDS = 10
 """Frames at each end of the trial that are all computed."""
 _TOGETHER = 8
@@ -34,15 +34,15 @@ MEANS = 60
 class Geometry:
     """What a trial says about its body's geometry.
 
-    ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``answer`` of the posture; ``matter`` P, Q, S (F, 9,
-    nv) per unit of every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3, nv) rad of
-    the segments per unit of every coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,) the parameters
-    of the matter; ``smoothed`` the low-pass of the motion.
+    ``time`` (F,) s of the chosen frames, ``wanted`` (T,) s of all; ``sensitivity`` of the posture; ``matter`` P, Q, S
+    (F, 9, nv) per unit of every coordinate; ``direct`` (F, 9, N, 3) per metre of every segment; ``turns`` (F, N, 3,
+    nv) rad of the segments per unit of every coordinate; ``seen`` (F, K) 1 where a marker was seen; ``phi`` (10N,)
+    the parameters of the matter; ``smoothed`` the low-pass of the motion.
     """
 
     time: Array
     wanted: Array
-    answer: PostureAnswer
+    sensitivity: PostureSensitivity
     matter: Array
     direct: Array
     turns: Array
@@ -53,16 +53,16 @@ class Geometry:
     @cached_property
     def marker_changes(self) -> "Changes":
         """What one metre of every marker of the model does, three axes of its segment each: P = 3 K."""
-        answer = self.answer
-        count = len(answer.segment)
-        own, turn = range(count), answer.pose.rotation[:, list(answer.segment)]
+        sensitivity = self.sensitivity
+        count = len(sensitivity.segment)
+        own, turn = range(count), sensitivity.pose.rotation[:, list(sensitivity.segment)]
 
         def moved(some: Index) -> Array:
             place = np.zeros((some.size, count, 3, count, 3))
             place[:, own, :, own] = np.moveaxis(turn[some], 1, 0)
             return place.reshape(some.size, count, 3, -1)
 
-        posture = answer.follow_markers()
+        posture = sensitivity.follow_markers()
         return Changes(self._wrench(self.matter @ posture), self._residual(posture, moved))
 
     @cached_property
@@ -71,15 +71,15 @@ class Geometry:
         segment nearer to the root, all else kept in the neutral posture; and that segment longer towards the joint, all
         beyond it carried along.
         """
-        answer, slopes, direct, moved = self.answer, [], [], []
-        hanging = below(answer.body)
-        for chain in chains(answer.body):
-            centre, carried = _moves(answer, chain)
-            slopes.append(answer.joint_slopes(chain, centre, carried))
+        sensitivity, slopes, direct, moved = self.sensitivity, [], [], []
+        hanging = below(sensitivity.body)
+        for chain in chains(sensitivity.body):
+            centre, carried = _moves(sensitivity, chain)
+            slopes.append(sensitivity.joint_slopes(chain, centre, carried))
             direct.append(self.direct[:, :, hanging[chain[-1]] > 0].sum(axis=2) @ carried)
             moved.append(carried)
-        on = [answer.hangs[chain[-1]][:, None, None] for chain in chains(answer.body)]
-        posture = answer.follow(np.concatenate(slopes, axis=2))
+        on = [sensitivity.distal[chain[-1]][:, None, None] for chain in chains(sensitivity.body)]
+        posture = sensitivity.follow(np.concatenate(slopes, axis=2))
         wrench = self._wrench(self.matter @ posture + np.concatenate(direct, axis=2))
         pairs = list(zip(on, moved, strict=True))
         return Changes(
@@ -98,7 +98,7 @@ class Geometry:
         return slice(None, None, max(1, len(self.time) // MEANS))
 
     def _wrench(self, nine: Array) -> NDArray[np.float32]:
-        return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.answer.body.gravity)
+        return wrench_of(nine, self.time, self.wanted, smoothed=self.smoothed, gravity=self.sensitivity.body.gravity)
 
     def _residual(self, posture: Array, moved: Callable[[Index], Array]) -> Array:
         """Return the change (K, 3, P) m of the mean marker residual (measured less model, segment axes) when the
@@ -113,15 +113,15 @@ class Geometry:
 
     def _mean_change(self, few: Index, share: Array, posture: Array, moved: Array) -> Array:
         """Return what frames ``few`` (f,) add to that mean, of which they are the ``share`` (f, K)."""
-        answer, segment = self.answer, list(self.answer.segment)
+        sensitivity, segment = self.sensitivity, list(self.sensitivity.segment)
         frames, count = share.shape
         wide = (frames, count, 3, posture.shape[2])
-        place = (answer.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved
+        place = (sensitivity.tangent[few].reshape(frames, 3 * count, -1) @ posture[few]).reshape(wide) + moved
         turns = self.turns[few][:, segment].reshape(frames, 3 * count, -1)
-        weight = np.where(answer.weight > 0, answer.weight, 1.0)[few]
-        apart = skew(answer.apart[few] / weight[..., None])
+        weight = np.where(sensitivity.weight > 0, sensitivity.weight, 1.0)[few]
+        apart = skew(sensitivity.apart[few] / weight[..., None])
         change = -(apart @ (turns @ posture[few]).reshape(wide)) - place
-        back = np.swapaxes(answer.pose.rotation[few][:, segment], 2, 3) * share[..., None, None]
+        back = np.swapaxes(sensitivity.pose.rotation[few][:, segment], 2, 3) * share[..., None, None]
         return np.asarray((back @ change).sum(axis=0))
 
 
@@ -146,11 +146,11 @@ class GeometryChanges:
     phi: Array
 
 
-def _moves(answer: PostureAnswer, chain: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return how a joint's origin and what hangs on it move (F, 3, 4) in the four changes of ``joint_changes``."""
-    joint, pose = answer.body.joints[chain[0]], answer.pose
+def _moves(sensitivity: PostureSensitivity, chain: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return how a joint's origin and what is distal to it move (F, 3, 4) in the four changes of ``joint_changes``."""
+    joint, pose = sensitivity.body.joints[chain[0]], sensitivity.pose
     parent = pose.root_rotation if joint.parent < 0 else pose.joint_rotation[:, joint.parent]
-    kept = pose.rotation[:, carried_by(answer.body, chain[0])] @ neutral_turn(answer.body, chain[0])
+    kept = pose.rotation[:, carried_by(sensitivity.body, chain[0])] @ neutral_turn(sensitivity.body, chain[0])
     out = parent @ (joint.translation / max(float(np.linalg.norm(joint.translation)), 1e-9))[:, None]
     return np.concatenate([parent, out], axis=2), np.concatenate([parent - kept, out], axis=2)
 
@@ -179,7 +179,9 @@ def geometry(
     seen = np.asarray(np.isfinite(measured).all(axis=2), dtype=float)
     weight = seen * body.markers.weight[list(columns)]
     apart = weight[..., None] * np.where(seen[..., None] > 0, markers - measured, 0.0)
-    answer = PostureAnswer(body, pose, motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight)
+    sensitivity = PostureSensitivity(
+        body, pose, motion.q[every, body.nq - len(body.joints) :], segment, markers, apart, weight
+    )
     phi, links = body.link_parameters(phi), list(range(len(body.links)))
     com = pose.points(links, centres_of(phi))
     place, turn = jacobian(body, pose, links, com)
@@ -189,7 +191,7 @@ def geometry(
     return Geometry(
         motion.time[every],
         motion.time,
-        answer,
+        sensitivity,
         _by_posture(parts, place, turn),
         parts.by_place,
         turn.reshape(shape),

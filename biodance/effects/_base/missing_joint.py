@@ -1,7 +1,7 @@
 """A joint that the body has and the model lacks: tracked again with it, to see how it moves and what that changes in
 the wrench.
 
-The author of such a cause writes the body with the joint (``loosened``) and the angle that everybody moves it by
+The author of such a cause writes the body with the joint (``extended_body``) and the angle that everybody moves it by
 (``natural``).
 """
 
@@ -42,13 +42,13 @@ class MissingJoint(Effect, ABC):
 
     @classmethod
     @abstractmethod
-    def loosened(cls, case: Case) -> Body | None:
+    def extended_body(cls, case: Case) -> Body | None:
         """Return the body of ``case`` with the joint; None where the trial's markers do not show it."""
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
         """Return one target where the markers show the joint."""
-        return ("",) if cls.loosened(case) is not None else ()
+        return ("",) if cls.extended_body(case) is not None else ()
 
     def columns(self, case: Case) -> Array:
         """Return (T, 6, 2) the wrench that the joint's motion adds, per radian: of the angle shown, and of more than
@@ -90,7 +90,7 @@ class MissingJoint(Effect, ABC):
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the trial tracked with the body that has the joint."""
-        body = self.loosened(case)
+        body = self.extended_body(case)
         return (
             case
             if body is None
@@ -121,7 +121,7 @@ class Movement:
 def _movement(case: Case, effect: MissingJoint) -> Movement | None:
     """Return how the joint moves; None where the markers do not determine it or are not there."""
     if effect.name not in case.memory:
-        body = effect.loosened(case)
+        body = effect.extended_body(case)
         try:
             case.memory[effect.name] = None if body is None else _tracked(case, body)
         except TrialRefused:

@@ -3,7 +3,7 @@ again, and by it to the wrench.
 
 Posture: the tracked one makes the cost C = 1/2 sum w |p - m|² stationary. When the geometry changes by a parameter, so
 does the gradient g, and the posture follows by dq = -H^-1 dg (implicit function theorem), with H the exact second
-derivatives (docs/derivations.md, "Answer of the posture"). The coordinates are the lab-frame tangent of
+derivatives (docs/derivations.md, "Sensitivity of the posture"). The coordinates are the lab-frame tangent of
 `kinematics.jacobian`: root place, root turn, angles. H is inverted once per frame and serves every cause.
 
 Wrench: with places c, velocities c', spins w, inertias I and masses m of the segments, and their displacements d and
@@ -42,7 +42,7 @@ they are.
 
 
 @dataclass(frozen=True, eq=False)
-class PostureAnswer:
+class PostureSensitivity:
     """F frames of a tracked body: ``pose``; ``angles`` (F, n) rad; ``segment`` (K) and ``markers`` (F, K, 3) m of the
     model; ``apart`` (F, K, 3) m weight times (model less measured), zero where hidden; ``weight`` (F, K).
     """
@@ -56,8 +56,8 @@ class PostureAnswer:
     weight: Array
 
     @cached_property
-    def hangs(self) -> Array:
-        """(n, K) 1 where a marker hangs on a joint."""
+    def distal(self) -> Array:
+        """(n, K) 1 where a marker is distal to a joint."""
         return below(self.body)[:, list(self.segment)]
 
     @cached_property
@@ -84,7 +84,7 @@ class PostureAnswer:
             flat = (len(wide), -1, self.body.nv)
             np.matmul(np.swapaxes(self.tangent[some].reshape(flat), 1, 2), wide.reshape(flat), out=H[some])
         turns = slice(self.body.n_root // 2, None)
-        H[:, turns, turns] += self._bending()
+        H[:, turns, turns] += self._curvature()
         size = np.maximum(self.weight.sum(axis=1), 1e-3)[:, None] * np.where(
             np.arange(self.body.nv) < self.body.n_root // 2, 1.0, 0.01
         )
@@ -96,18 +96,18 @@ class PostureAnswer:
         inverse[:, held] = 0.0
         return np.asarray(inverse)
 
-    def _bending(self) -> Array:
+    def _curvature(self) -> Array:
         """Return (F, 3 + n, 3 + n): the part of H by which residuals bend the cost: a_i . (X_j - tr X_j) a_j for i
-        above j, with X_j the sum of w (p - o_j) (p - m)' over what hangs on j.
+        above j, with X_j the sum of w (p - o_j) (p - m)' over what is distal to j.
         """
         root = self.body.n_root // 2
-        hangs = np.concatenate([np.ones((root, len(self.segment))), self.hangs])
+        distal = np.concatenate([np.ones((root, len(self.segment))), self.distal])
         origin = np.concatenate(
             [np.repeat(self.pose.root_position[:, None], root, axis=1), self.pose.joint_position], axis=1
         )
-        pull = hangs @ self.apart
+        pull = distal @ self.apart
         outer = (self.markers[..., :, None] * self.apart[..., None, :]).reshape(*self.apart.shape[:2], 9)
-        X = (hangs @ outer).reshape(*pull.shape[:2], 3, 3) - origin[..., :, None] * pull[..., None, :]
+        X = (distal @ outer).reshape(*pull.shape[:2], 3, 3) - origin[..., :, None] * pull[..., None, :]
         bent = (X @ self.axes[..., None])[..., 0] - np.einsum("fjii->fj", X)[..., None] * self.axes
         table = self.axes @ np.swapaxes(bent, 1, 2)
         above = np.triu(self._above())
@@ -158,16 +158,16 @@ class PostureAnswer:
         """
         turn = self.pose.rotation[some][:, list(self.segment)]
         pushed = np.moveaxis(self.tangent[some] * self.weight[some, :, None, None], 3, 1)
-        turning = np.concatenate([np.ones((self.body.n_root // 2, len(self.segment))), self.hangs])
+        turning = np.concatenate([np.ones((self.body.n_root // 2, len(self.segment))), self.distal])
         lever = cross(self.axes[some, :, None], self.apart[some, None])  # a' [x] = (a x x)'
         pushed[:, self.body.n_root // 2 :] -= lever * turning[:, :, None]
         return np.asarray(np.einsum("fvki,fkij->fvkj", pushed, turn, optimize=True).reshape(*pushed.shape[:2], -1))
 
     def joint_slopes(self, chain: tuple[int, ...], centre: Array, carried: Array) -> Array:
         """Return (F, nv, P): the gradient's change when the common origin of the joints ``chain`` moves by ``centre``
-        and all that hangs on them by ``carried`` (F, 3, P) m, lab frame.
+        and all that is distal to them by ``carried`` (F, 3, P) m, lab frame.
         """
-        on, root = self.hangs[chain[-1]] > 0, self.body.n_root // 2
+        on, root = self.distal[chain[-1]] > 0, self.body.n_root // 2
         pushed = np.swapaxes((self.tangent[:, on] * self.weight[:, on, None, None]).sum(axis=1), 1, 2) @ carried
         pull = skew(self.apart[:, on].sum(axis=1))
         turns = np.where(self._above()[:, root + chain[0], None], self.axes, 0.0) @ -pull @ carried

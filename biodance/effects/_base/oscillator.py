@@ -48,7 +48,7 @@ def point_motion(case: Case, segment: int, local: Array) -> tuple[Array, Array]:
     return move.position[:, segment] + arm, acceleration
 
 
-def riding_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array], *, gravity: Array) -> Array:
+def oscillator_wrench(place: Array, acceleration: Array, moved: tuple[Array, Array], *, gravity: Array) -> Array:
     """Return (T, 6) per kilogram about the lab origin: what the relative motion ``moved`` (x, x'') adds at a point
     (T, 3).
     """

@@ -130,7 +130,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "failures": found.failures,
         "notes": one.notes,
         "witnesses": _witnesses(one.witnesses),
-        "witness_table": _sights(one.witnesses),
+        "witness_table": _visibilities(one.witnesses),
     }
 
 
@@ -143,7 +143,7 @@ def _witnesses(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
     ]
 
 
-def _sights(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
+def _visibilities(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
     """Return how well each cause was seen; an ``sd`` of null: every witness was blind to it."""
     return [
         keyed(one, "effect target sd unit witnesses")
