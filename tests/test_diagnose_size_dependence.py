@@ -53,7 +53,7 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
         assert by_load.share == pytest.approx(1.0, abs=0.35)
 
 
-def test_a_zero_that_the_reader_took_off_in_one_trial_is_the_zero_of_the_others() -> None:
+def test_a_zero_that_the_reader_took_off_in_one_trial_is_that_of_the_others() -> None:
     """Two of four trials saw the plate empty: the reader took the 25 N off there, and nowhere else."""
     some = looks(
         1, trials=4, hidden=about_plate(lambda local, session: zero(local, session) if session[0] < 0.4 else local)
