@@ -3,7 +3,7 @@
 import numpy as np
 from diagnosed_sessions import about_plate, body, gain, known, looks
 
-from biodance.diagnosis.engine import SEVERAL, UNASKED, diagnose_trials
+from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, SEVERAL_CROSSTALKS, diagnose_trials
 
 
 def shifted(local, session):
@@ -18,7 +18,7 @@ def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
     assert len(one.resembles) > 1
-    assert SEVERAL in one.notes
+    assert SEVERAL_CROSSTALKS in one.notes
 
 
 def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
@@ -26,4 +26,4 @@ def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
     some = looks(1, trials=2, hidden=gain(0.05))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
-    assert UNASKED in one.notes
+    assert OUTSIDE_TOLERANCES in one.notes

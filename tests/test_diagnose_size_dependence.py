@@ -11,8 +11,7 @@ from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strai
 from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.engine import HANGS, diagnose_trials
-from biodance.diagnosis.engine import _counts as told
+from biodance.diagnosis.engine import SIZE_VARIES, _is_reportable, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
@@ -47,7 +46,7 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
     assert (wrong.diagnosis.verdict, wrong.diagnosis.findings) == ("unexplained", ())
     like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
     assert like.hangs_on
-    assert any(HANGS in note for note in wrong.diagnosis.notes)
+    assert any(SIZE_VARIES in note for note in wrong.diagnosis.notes)
     if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
         by_load = next(one for one in size_dependences(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
         assert by_load.share == pytest.approx(1.0, abs=0.35)
@@ -79,11 +78,11 @@ def test_what_is_told_must_move_something_that_matters() -> None:
     (named,) = found.named
     leak = NamedCause(effects()["plate_crosstalk"].at("Fy->Fz", found.problem.cases[0]), np.array([0.01]), np.eye(1))
     assert changes_wrench(found, named)
-    assert told(found, named)
+    assert _is_reportable(found, named)
     assert not changes_wrench(found, replace(named, theta=np.array([0.2])))
     assert matters(leak.effect, leak.theta)
-    assert not told(found, leak)
-    assert told(found, replace(leak, course={"some trial": np.ones(3)}))
+    assert not _is_reportable(found, leak)
+    assert _is_reportable(found, replace(leak, course={"some trial": np.ones(3)}))
 
 
 def a_finding(value: float, hangs_on: str = "") -> Finding:

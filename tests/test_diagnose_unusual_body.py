@@ -8,7 +8,7 @@ import pytest
 from diagnosed_sessions import body, delay, known, looks, nothing
 
 from biodance.diagnosis.adequacy import STRAINED, strain
-from biodance.diagnosis.engine import STRANGE, diagnose_trials
+from biodance.diagnosis.engine import UNUSUAL_BODY, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Round
 from biodance.diagnosis.screening import ScoredCandidate
@@ -28,7 +28,7 @@ def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_i
     strange = diagnosed(delay, unlike=4.0)
     assert strain(strange.naming.found) > STRAINED
     assert strange.diagnosis.verdict == "named, incomplete"
-    assert STRANGE in strange.diagnosis.notes
+    assert UNUSUAL_BODY in strange.diagnosis.notes
     (finding,) = strange.diagnosis.findings
     (size,) = finding.parameters
     assert finding.effect == "time_delay"

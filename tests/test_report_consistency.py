@@ -16,7 +16,7 @@ from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.diagnosis.engine import STRANGE, UNASKED
+from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, UNUSUAL_BODY
 from biodance.pipeline.attention import _checked, headline, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.judged_trials import TOO_SHORT
@@ -107,10 +107,10 @@ def test_diagnose_begins_with_its_headline() -> None:
 
 def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> None:
     quiet = (replace(LEFT[0], z=1.0),)
-    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=(STRANGE,), resembles=(FOUND,))
+    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=(UNUSUAL_BODY,), resembles=(FOUND,))
     for one, level, begins in (
         (strange, "warn", "Cannot tell whether anything is wrong"),
-        (replace(strange, notes=(STRANGE, UNASKED)), "fail", "Something is wrong"),
+        (replace(strange, notes=(UNUSUAL_BODY, OUTSIDE_TOLERANCES)), "fail", "Something is wrong"),
         (replace(strange, adequacy=LEFT), "fail", "Something is wrong"),
     ):
         first = reconcile_with_checks(one, replace(FULL, checks=()), (STATIC,)).attention[0]
@@ -124,7 +124,11 @@ def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> N
         (replace(WHOLE, verdict="unexplained"), (MISSED,), "mend what stands below"),
         (replace(WHOLE, verdict="unexplained"), (STATIC, replace(MISSED, why_not=TOO_SHORT)), "record some seconds"),
         (VERDICTS[5], (STATIC,), "compare with another session of the same person"),
-        (replace(VERDICTS[3], adequacy=(replace(LEFT[0], z=1.0),), notes=(STRANGE,)), (STATIC,), "compare with anoth"),
+        (
+            replace(VERDICTS[3], adequacy=(replace(LEFT[0], z=1.0),), notes=(UNUSUAL_BODY,)),
+            (STATIC,),
+            "compare with anoth",
+        ),
     ],
 )
 def test_who_cannot_tell_says_what_to_do_next(verdict: Diagnosis, judged: tuple[Judged, ...], then: str) -> None:

@@ -39,29 +39,30 @@ from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
 
-STRANGE = (
+UNUSUAL_BODY = (
     "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
     "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass hides "
     "in it."
 )
 
-UNASKED = (
+OUTSIDE_TOLERANCES = (
     "What the plates measured fits only if something that is small in every laboratory is many times as large here, "
     "and none of the causes looked for is it."
 )
-SEVERAL = (
+SEVERAL_CROSSTALKS = (
     "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
     "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
 )
-HANGS = (
+_OF_ASSESSMENT = (UNUSUAL_BODY, OUTSIDE_TOLERANCES, SEVERAL_CROSSTALKS)
+SIZE_VARIES = (
     "is only what this resembles: a true cause has one size in every trial, band and channel, under every load and at "
     "every place, and the size of this one hangs on"
 )
-LOUD = (
+NOISY_LABORATORY = (
     "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
     "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
 )
-STANDING = (
+ONLY_STANDING = (
     "Only quiet standing could be compared with the whole body: sway, soft tissue and a plate's zero look alike there, "
     "so this comparison names no cause that has a size. A few squats on the plates tell them apart."
 )
@@ -109,9 +110,9 @@ def diagnose_trials(
     """
     known = tolerances or shipped()
     asked = family(effects)
-    put = problem(body, looks, prior=prior, chosen=asked)
-    quiet = not any(is_moving(case) for case, picks in zip(put.cases, put.spectrum.picks, strict=True) if picks)
-    naming, said = _as_loud(put, known, asked, search=search and not quiet, still=quiet)
+    posed = problem(body, looks, prior=prior, chosen=asked)
+    standing = not any(is_moving(case) for case, picks in zip(posed.cases, posed.spectrum.picks, strict=True) if picks)
+    naming, noise_note = _named_at_own_noise(posed, known, asked, search=search and not standing, standing=standing)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     bare = Diagnosis(
         verdict="nothing wrong",
@@ -119,79 +120,87 @@ def diagnose_trials(
         gates=gates,
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
-        notes=put.notes,
-        doubt="standing alone tells no cause" if quiet else "",
+        notes=posed.notes,
+        doubt="standing alone tells no cause" if standing else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = assess(Examined(bare, naming))
-    notes = (*found.diagnosis.notes, *([STANDING] if quiet else []), *said)
+    notes = (*found.diagnosis.notes, *([ONLY_STANDING] if standing else []), *noise_note)
     return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
 
 
-def _as_loud(
-    put: Problem, known: Tolerances, asked: Mapping[str, Effect], *, search: bool, still: bool
+def _named_at_own_noise(
+    posed: Problem, known: Tolerances, asked: Mapping[str, Effect], *, search: bool, standing: bool
 ) -> tuple[Naming, tuple[str, ...]]:
     """Return the naming with tolerances scaled to the noise of this laboratory, and a note on the scaling. The scale is
-    `residual_scale` of the residual left by a first naming; quiet standing (``still``) does not determine it.
+    `residual_scale` of the residual left by a first naming; quiet ``standing`` does not determine it.
     """
-    every = causes_of(put, known, asked)
+    every = causes_of(posed, known, asked)
 
     def named(under: Tolerances) -> Naming:
         if not search:
-            return name_causes(put, under, asked, rounds=0, every=every)
-        return with_transient_contact(name_causes(put, under, asked, every=every), asked)
+            return name_causes(posed, under, asked, rounds=0, every=every)
+        return with_transient_contact(name_causes(posed, under, asked, every=every), asked)
 
     naming = named(known)
-    louder = 1.0 if still else residual_scale(naming.found)
-    if louder <= LOUDER:
+    scale = 1.0 if standing else residual_scale(naming.found)
+    if scale <= LOUDER:
         return naming, ()
     del naming  # no two of them at once: they are the largest that a diagnosis keeps
-    return named(replace(known, noise=louder**2 * known.noise, zeros=louder**2 * known.zeros)), (LOUD.format(louder),)
+    return named(replace(known, noise=scale**2 * known.noise, zeros=scale**2 * known.zeros)), (
+        NOISY_LABORATORY.format(scale),
+    )
 
 
 def assess(examined: Examined) -> Examined:
     """Return the session with the verdict and findings of its naming, and the adequacy of the remaining residual."""
     naming, one = examined.naming, examined.diagnosis
-    left, put, known = adequacy(naming.found), naming.found.problem, naming.found.tolerances
+    remaining, posed, known = adequacy(naming.found), naming.found.problem, naming.found.tolerances
     named = tuple(_measured(cause, naming.found) for cause in naming.found.named)
-    hung = {names: one.over for names, one in significant_dependences(naming.found).items()}
+    dependences = {names: one.over for names, one in significant_dependences(naming.found).items()}
     every = [
-        (cause, replace(_finding(cause, r, known, put.cases[0]), hangs_on=hung.get(cause_key(cause), "")))
+        (cause, replace(_finding(cause, r, known, posed.cases[0]), hangs_on=dependences.get(cause_key(cause), "")))
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
-    large = [pair for pair in every if _counts(naming.found, pair[0])]
-    strange = _strange(naming.found, named=bool(large))
-    told = verdict(len(large), largest_z(left), one.gates, strained=bool(strange))
-    doubted = _with_weaker([p for p in large if _one_of_several(p[0], named) or p[1].hangs_on], large)
-    if told == "unexplained" and strange == (STRANGE,) and largest_z(left) <= LIMIT and len(doubted) < len(large):
+    reportable = [pair for pair in every if _is_reportable(naming.found, pair[0])]
+    conflicts = _conflict_notes(naming.found, named=bool(reportable))
+    outcome = verdict(len(reportable), largest_z(remaining), one.gates, strained=bool(conflicts))
+    doubted = _with_less_evidence([p for p in reportable if _one_of_several(p[0], named) or p[1].hangs_on], reportable)
+    if (
+        outcome == "unexplained"
+        and conflicts == (UNUSUAL_BODY,)
+        and largest_z(remaining) <= LIMIT
+        and len(doubted) < len(reportable)
+    ):
         sure = robust_causes(naming.found, naming.accepted)
-        stand = [pair for pair in large if cause_key(pair[0]) in sure and any(p.known for p in pair[1].parameters)]
-        doubted = [pair for pair in large if pair in doubted or pair not in stand]
-        told = "named, incomplete" if len(doubted) < len(large) else told
-    trusted = [] if told == "unexplained" else [pair for pair in large if pair not in doubted]
-    several = any(_one_of_several(cause, named) for cause, _ in large)
-    if doubted and told != "unexplained":
-        told = "named, incomplete" if trusted else "unexplained"
-    if told == "named, complete" and any(row.z > LIMIT for row in left):
-        told = "named, incomplete"
-    said = (
-        *strange,
-        *((SEVERAL,) if several else ()),
-        *(_hangs(pair[1]) for pair in large if pair[1].hangs_on),
+        stand = [pair for pair in reportable if cause_key(pair[0]) in sure and any(p.known for p in pair[1].parameters)]
+        doubted = [pair for pair in reportable if pair in doubted or pair not in stand]
+        outcome = "named, incomplete" if len(doubted) < len(reportable) else outcome
+    trusted = [] if outcome == "unexplained" else [pair for pair in reportable if pair not in doubted]
+    several = any(_one_of_several(cause, named) for cause, _ in reportable)
+    if doubted and outcome != "unexplained":
+        outcome = "named, incomplete" if trusted else "unexplained"
+    if outcome == "named, complete" and any(row.z > LIMIT for row in remaining):
+        outcome = "named, incomplete"
+    earlier = (note for note in one.notes if note not in _OF_ASSESSMENT and SIZE_VARIES not in note)
+    notes = (
+        *conflicts,
+        *((SEVERAL_CROSSTALKS,) if several else ()),
+        *(_dependence_note(pair[1]) for pair in reportable if pair[1].hangs_on),
     )
     found = replace(
         one,
-        verdict=told,
-        notes=(*(note for note in one.notes if note not in (STRANGE, UNASKED, SEVERAL) and HANGS not in note), *said),
+        verdict=outcome,
+        notes=(*earlier, *notes),
         findings=tuple(finding for _, finding in trusted),
-        resembles=tuple(finding for pair in large if pair not in trusted for finding in pair[1:]),
-        tolerated=tuple(pair[1] for pair in every if pair not in large),
-        adequacy=left,
+        resembles=tuple(finding for pair in reportable if pair not in trusted for finding in pair[1:]),
+        tolerated=tuple(pair[1] for pair in every if pair not in reportable),
+        adequacy=remaining,
     )
-    return Examined(found, naming, tuple(cause for cause, _ in trusted or large))
+    return Examined(found, naming, tuple(cause for cause, _ in trusted or reportable))
 
 
-def _counts(found: Model, cause: NamedCause) -> bool:
+def _is_reportable(found: Model, cause: NamedCause) -> bool:
     """Return whether a cause is large enough to be told: its size matters, and what it changes in this session's wrench
     does (5 % of a shear of 2 N is a tenth of a newton, however well it is seen). One that comes and goes is felt while
     it is there.
@@ -199,12 +208,12 @@ def _counts(found: Model, cause: NamedCause) -> bool:
     return matters(cause.effect, cause.theta) and (bool(cause.course) or changes_wrench(found, cause))
 
 
-def _hangs(one: Finding) -> str:
+def _dependence_note(one: Finding) -> str:
     """Say that a cause is only resembled, because its size hangs on something."""
-    return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {HANGS} {one.hangs_on}."
+    return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {SIZE_VARIES} {one.hangs_on}."
 
 
-def _with_weaker(
+def _with_less_evidence(
     doubted: list[tuple[NamedCause, Finding]], large: list[tuple[NamedCause, Finding]]
 ) -> list[tuple[NamedCause, Finding]]:
     """Return the ``doubted`` causes with every cause of less evidence than the strongest of them: it explains what a
@@ -234,10 +243,10 @@ def without_names(examined: Examined, gates: tuple[Gate, ...] = ()) -> Examined:
     """
     naming, one = examined.naming, replace(examined.diagnosis, gates=gates)
     found = assess(Examined(one, replace(naming, found=naming.bare, accepted=())))
-    told = replace(
+    unnamed = replace(
         found.diagnosis, gates=examined.diagnosis.gates, resembles=(*one.findings, *one.resembles), tolerated=()
     )
-    return replace(found, diagnosis=told)
+    return replace(found, diagnosis=unnamed)
 
 
 def without_name(examined: Examined, index: int) -> Examined:
@@ -251,14 +260,14 @@ def without_name(examined: Examined, index: int) -> Examined:
     return replace(found, diagnosis=replace(found.diagnosis, resembles=resembles))
 
 
-def _strange(found: Model, *, named: bool) -> tuple[str, ...]:
+def _conflict_notes(found: Model, *, named: bool) -> tuple[str, ...]:
     """Say what had to be unlike people or laboratories for the rest to fit; where a cause is ``named``, it has to fit
     without any excuse.
     """
     once = with_strides_once(found)
     body = (strain(once) if named else strain_at_own_noise(once)) > STRAINED
     rest = stretch(found) > STRETCHED
-    return (*((STRANGE,) if body else ()), *((UNASKED,) if rest else ()))
+    return (*((UNUSUAL_BODY,) if body else ()), *((OUTSIDE_TOLERANCES,) if rest else ()))
 
 
 def _relative(row: Unobservable) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
-from biodance.diagnosis.engine import SEVERAL, STRANGE, UNASKED
+from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, SEVERAL_CROSSTALKS, UNUSUAL_BODY
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
@@ -257,17 +257,17 @@ def _only_strange(one: Diagnosis) -> bool:
     """Return whether a strange body alone speaks against "nothing wrong": how unlike the table people are was learned
     from few laboratories, and clean people of another one are beyond it.
     """
-    return STRANGE in one.notes and UNASKED not in one.notes and largest_z(one.adequacy) <= LIMIT
+    return UNUSUAL_BODY in one.notes and OUTSIDE_TOLERANCES not in one.notes and largest_z(one.adequacy) <= LIMIT
 
 
 def _where(one: Diagnosis) -> str:
     """Return where what is left is largest, with its size."""
     rows = [row for row in one.adequacy if row.matters and row.z > LIMIT] or list(one.adequacy)
-    if STRANGE in one.notes and largest_z(one.adequacy) <= LIMIT:
-        return f"w{STRANGE[1:-1]}"
-    if UNASKED in one.notes and largest_z(one.adequacy) <= LIMIT:
+    if UNUSUAL_BODY in one.notes and largest_z(one.adequacy) <= LIMIT:
+        return f"w{UNUSUAL_BODY[1:-1]}"
+    if OUTSIDE_TOLERANCES in one.notes and largest_z(one.adequacy) <= LIMIT:
         return "what the plates measured fits only if something that is small elsewhere is many times as large here"
-    if SEVERAL in one.notes and largest_z(one.adequacy) <= LIMIT:
+    if SEVERAL_CROSSTALKS in one.notes and largest_z(one.adequacy) <= LIMIT:
         return "what the plates measured fits only several cross-talks at once, as of a plate that lies elsewhere"
     if not rows:
         return "what is left is unlike sessions without fault"
@@ -280,7 +280,7 @@ def _where(one: Diagnosis) -> str:
 
 def _incomplete(one: Diagnosis, rests_on: str) -> str:
     """Return what is more to say of a diagnosis that is not complete."""
-    if STRANGE in one.notes or largest_z(one.adequacy) > LIMIT:
+    if UNUSUAL_BODY in one.notes or largest_z(one.adequacy) > LIMIT:
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
     return (
         f"Apart from that, {rests_on} look like a session without fault."
