@@ -41,11 +41,11 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
         diagnose_trials(body(), some, tolerances=known(), effects=(name,)) for name, _ in (guilty, innocent)
     )
     assert [(f.effect, f.target) for f in right.diagnosis.findings] == [guilty]
-    assert not right.diagnosis.findings[0].hangs_on
+    assert not right.diagnosis.findings[0].varies_with
     assert max(abs(one.z) for one in size_dependences(right.naming.found)) < LIMIT
     assert (wrong.diagnosis.verdict, wrong.diagnosis.findings) == ("unexplained", ())
     like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
-    assert like.hangs_on
+    assert like.varies_with
     assert any(SIZE_VARIES in note for note in wrong.diagnosis.notes)
     if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
         by_load = next(one for one in size_dependences(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
@@ -85,9 +85,9 @@ def test_what_is_told_must_move_something_that_matters() -> None:
     assert _is_reportable(found, replace(leak, course={"some trial": np.ones(3)}))
 
 
-def a_finding(value: float, hangs_on: str = "") -> Finding:
+def a_finding(value: float, varies_with: str = "") -> Finding:
     size = Estimate("offset", value, 0.5, "N")
-    return Finding(*ZERO, (size,), (Alias(*ZERO, 30.0),), 0.5, hangs_on=hangs_on)
+    return Finding(*ZERO, (size,), (Alias(*ZERO, 30.0),), 0.5, varies_with=varies_with)
 
 
 HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
@@ -111,8 +111,8 @@ def test_a_witness_names_nothing_of_which_the_simulation_saw_no_trace(simulation
 MASS = ("body_mass", "")
 
 
-def weighed(value: float, sd: float, hangs_on: str = "") -> Finding:
-    return Finding(*MASS, (Estimate("error", value, sd, "kg"),), (Alias(*MASS, 12.0),), 0.5, hangs_on=hangs_on)
+def weighed(value: float, sd: float, varies_with: str = "") -> Finding:
+    return Finding(*MASS, (Estimate("error", value, sd, "kg"),), (Alias(*MASS, 12.0),), 0.5, varies_with=varies_with)
 
 
 def observed(witness: str) -> witness_evidence.WitnessEvidence:
@@ -122,7 +122,7 @@ def observed(witness: str) -> witness_evidence.WitnessEvidence:
 
 
 @pytest.mark.parametrize(
-    ("value", "hangs_on", "witness", "named"),
+    ("value", "varies_with", "witness", "named"),
     [
         (-4.2, "2.5-6 Hz", "standing_force", True),
         (-4.2, "Mx", "stride_force", True),
@@ -133,10 +133,10 @@ def observed(witness: str) -> witness_evidence.WitnessEvidence:
     ],
 )
 def test_what_the_plates_weigh_stays_named_though_fast_bands_depart(
-    value: float, hangs_on: str, witness: str, named: bool
+    value: float, varies_with: str, witness: str, named: bool
 ) -> None:
     limits = (Unobservable(*MASS, 0.5, "kg"),)
-    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(weighed(value, 0.4, hangs_on),))
+    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(weighed(value, 0.4, varies_with),))
     said = observed(witness)
     one = combine_findings(simulation, WitnessFindings((weighed(-3.9, 0.8),), said), said, judged=True)
     assert [(f.effect, f.parameters[0].value) for f in one.findings] == ([("body_mass", -3.9)] if named else [])

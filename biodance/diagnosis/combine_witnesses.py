@@ -94,7 +94,7 @@ def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvi
     witnesses observe (`_weighing_agrees`). Exchanged labels do not affect the plates and do not count. If the
     simulation doubts its own result, it must have some evidence of a cause that is `_PLAIN`.
     """
-    hanging = [other for other in one.resembles if _names(other) == _names(finding) and other.hangs_on]
+    hanging = [other for other in one.resembles if _names(other) == _names(finding) and other.varies_with]
     if hanging:
         return not _weighing_agrees(finding, hanging[0], evidence)
     labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
@@ -111,7 +111,7 @@ def _weighing_agrees(finding: Finding, hanging: Finding, evidence: WitnessEviden
     depends only on moments and fast bands: these do not affect the mean force.
     """
     alone = _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _WEIGHING
-    return alone and hanging.hangs_on in WEIGHTLESS and _same_size(finding, hanging)
+    return alone and hanging.varies_with in WEIGHTLESS and _same_size(finding, hanging)
 
 
 def _same_size(finding: Finding, other: Finding) -> bool:

@@ -112,8 +112,8 @@ class Finding:
         What settles it in the laboratory.
     changes : tuple of str
         What accepting it changes in the body.
-    hangs_on : str
-        Of one that is only resembled: what its size hangs on, though a true cause has one size; "" for none.
+    varies_with : str
+        Of one that is only resembled: what its size varies with, though a true cause has one size; "" for none.
 
     Examples
     --------
@@ -129,7 +129,7 @@ class Finding:
     gain: Gain | None = None
     advice: str = ""
     changes: tuple[str, ...] = ()
-    hangs_on: str = ""
+    varies_with: str = ""
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)

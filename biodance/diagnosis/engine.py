@@ -1,6 +1,4 @@
-"""A session's diagnosis: name causes, ask whether what is left is like a session without fault, and say what could
-not be seen.
-"""
+"""A session's diagnosis: which causes are named, whether the rest is like a session without fault, what was not seen."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -159,13 +157,14 @@ def assess(examined: Examined) -> Examined:
     named = tuple(_measured(cause, naming.found) for cause in naming.found.named)
     dependences = {names: one.over for names, one in significant_dependences(naming.found).items()}
     every = [
-        (cause, replace(_finding(cause, r, known, posed.cases[0]), hangs_on=dependences.get(cause_key(cause), "")))
+        (cause, replace(_finding(cause, r, known, posed.cases[0]), varies_with=dependences.get(cause_key(cause), "")))
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
     reportable = [pair for pair in every if _is_reportable(naming.found, pair[0])]
     conflicts = _conflict_notes(naming.found, named=bool(reportable))
     outcome = verdict(len(reportable), largest_z(remaining), one.gates, strained=bool(conflicts))
-    doubted = _with_less_evidence([p for p in reportable if _one_of_several(p[0], named) or p[1].hangs_on], reportable)
+    dubious = [pair for pair in reportable if _one_of_several(pair[0], named) or pair[1].varies_with]
+    doubted = _with_less_evidence(dubious, reportable)
     if (
         outcome == "unexplained"
         and conflicts == (UNUSUAL_BODY,)
@@ -186,7 +185,7 @@ def assess(examined: Examined) -> Examined:
     notes = (
         *conflicts,
         *((SEVERAL_CROSSTALKS,) if several else ()),
-        *(_dependence_note(pair[1]) for pair in reportable if pair[1].hangs_on),
+        *(_dependence_note(pair[1]) for pair in reportable if pair[1].varies_with),
     )
     found = replace(
         one,
@@ -210,7 +209,7 @@ def _is_reportable(found: Model, cause: NamedCause) -> bool:
 
 def _dependence_note(one: Finding) -> str:
     """Say that a cause is only resembled, because its size hangs on something."""
-    return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {SIZE_VARIES} {one.hangs_on}."
+    return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {SIZE_VARIES} {one.varies_with}."
 
 
 def _with_less_evidence(
