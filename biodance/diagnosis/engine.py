@@ -1,4 +1,4 @@
-"""A session's diagnosis: which causes are named, whether the rest is like a session without fault, what was not seen."""
+"""A session's diagnosis: the causes named, whether the rest is like a session without fault, what was not seen."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
