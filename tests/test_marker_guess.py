@@ -16,8 +16,7 @@ from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.inspect import inspect_paths
 from biodance.lab.markers.dress import dress
 from biodance.lab.markers.guess import guess_set
-from biodance.lab.markers.keypoints import joints_from_video
-from biodance.lab.markers.names import meanings, meanings_of
+from biodance.lab.markers.names import joints_from_video, meanings, meanings_of
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.upright import axis_to_head

@@ -14,11 +14,11 @@ from biodance.lab.markers.dress import said_of
 from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
+from biodance.lab.markers.still import standing_mass
 from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature
-from biodance.lab.weight import standing_mass
 from biodance.records import Markers, Plate, Trial
 from biodance.settings import COP_FORCE
 

@@ -13,6 +13,7 @@ from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.markers.dress import dress
 from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.markers.still import is_still, movement
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.archive import visit_date
@@ -28,7 +29,6 @@ from biodance.lab.session.recordings import (
 from biodance.lab.session.strangers import PEOPLE, each_once, of_one_person
 from biodance.lab.session.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
-from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
 

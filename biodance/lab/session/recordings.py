@@ -7,10 +7,10 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError
+from biodance.lab.markers.still import is_still, movement
 from biodance.lab.read import read_head, sniffed
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
-from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Trial
 
 STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")

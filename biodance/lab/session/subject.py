@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from biodance.lab.markers.sets import landmark, read_marker_set
+from biodance.lab.markers.still import standing_mass
 from biodance.lab.session.file import SubjectEntry
-from biodance.lab.weight import standing_mass
 from biodance.records import Subject, Trial
 from biodance.settings import CheckLimits
 
