@@ -17,7 +17,7 @@ from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.markers.sets import MarkerSet, wearing
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
-from biodance.records import Array, Mask, Role, Trial, runs
+from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
 
 _FEWEST = 4
 """Markers that must be seen; fewer may rest on something, or be rounded to the same digits."""
@@ -34,11 +34,11 @@ def frozen_frames(xyz: Array) -> Mask:
     frames, into or out of which they move abruptly; nowhere in a recording that never moves, as a posture kept as many
     equal frames is.
     """
-    seen: Mask = np.asarray(np.isfinite(xyz).all(axis=2))
-    equal = np.all(xyz[1:] == xyz[:-1], axis=2) | ~(seen[1:] | seen[:-1])
+    seen = ~any_coordinate(~np.isfinite(xyz))
+    equal = ~any_coordinate(xyz[1:] != xyz[:-1]) | ~(seen[1:] | seen[:-1])
     repeats = np.zeros(len(xyz), dtype=bool)
     repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
-    if repeats.sum() >= len(repeats) - 1:
+    if not repeats.any() or repeats.sum() >= len(repeats) - 1:
         return np.zeros(len(xyz), dtype=bool)
     steps = np.zeros(len(xyz))
     steps[1:] = np.nan_to_num(np.linalg.norm(xyz[1:] - xyz[:-1], axis=2)).max(axis=1)

@@ -11,12 +11,14 @@ from biodance.records.arrays import (
     Array,
     Index,
     Mask,
+    any_coordinate,
     assign,
     by_name,
     freeze,
     frozen_array,
     longest_run,
     runs,
+    spread_frames,
 )
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
@@ -44,6 +46,7 @@ __all__ = [
     "Subject",
     "Trial",
     "Wrench",
+    "any_coordinate",
     "assign",
     "by_name",
     "freeze",
@@ -51,4 +54,5 @@ __all__ = [
     "longest_run",
     "runs",
     "side_in_name",
+    "spread_frames",
 ]

@@ -44,6 +44,23 @@ def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> 
     return array
 
 
+def any_coordinate(flags: Mask) -> Mask:
+    """Return (...) where one of the three coordinates is flagged, (..., 3): ``flags.any(axis=-1)`` in a third of its
+    time.
+    """
+    return np.asarray(flags[..., 0] | flags[..., 1] | flags[..., 2])
+
+
+_SPREAD = 256
+
+
+def spread_frames(values: Array) -> Array:
+    """Return some hundred frames of ``values`` (T, ...), spread over the recording: enough to tell how large something
+    is and where it lies.
+    """
+    return values[:: max(1, len(values) // _SPREAD)]
+
+
 def _is_frozen(value: ArrayLike) -> TypeGuard[Array]:
     """Return whether nobody can write into an array, nor into what it might be a view of."""
     return isinstance(value, np.ndarray) and value.dtype == float and not value.flags.writeable and value.base is None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.errors import BiodanceError, known_index
-from biodance.records.arrays import Array, assign, check_time, frozen_array, in_time, rate_of, span
+from biodance.records.arrays import Array, any_coordinate, assign, check_time, frozen_array, in_time, rate_of, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,8 +70,7 @@ class Markers:
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
         """Where a marker was seen, (T, K) bool; read-only."""
-        lost = np.isnan(self.xyz)
-        seen = np.logical_not(lost[..., 0] | lost[..., 1] | lost[..., 2])  # three times as fast as any(axis=2)
+        seen = np.logical_not(any_coordinate(np.isnan(self.xyz)))
         seen.setflags(write=False)
         return seen
 

@@ -7,8 +7,9 @@ the wrench that the motion needs by
 
     d2/dt2 (F2 y) + d/dt (F1 y) + F0 y,    y = (u, r),
 
-from the rate of momentum and angular momentum (docs/derivations.md, section 16). All of it is linear:
-`Response.wrench` goes forward, `Response.back` is its exact transpose.
+from the rate of momentum and angular momentum (docs/derivations.md, section 16). F1 makes no force, and F0 y is the
+moment g x (m u) of the displaced weight, whose m u are the forces of F2 y: nine functionals a frame, F2 y and the
+moments of F1 y, say all. All of it is linear: `Response.wrench` goes forward, `Response.back` is its exact transpose.
 """
 
 from abc import ABC, abstractmethod
@@ -43,7 +44,7 @@ _NOTHING = 1e-17
 class Response:
     """How ``body`` in ``motion`` (F frames at an even rate) with its ``pose`` answers.
 
-    ``place``, ``turn`` (F, N, 18, 3) the functionals F2, F1, F0 of a segment's CoM moved and of the segment turned.
+    ``place``, ``turn`` (F, N, 9, 3) the functionals of a segment's CoM moved and of the segment turned.
     """
 
     body: Body
@@ -55,8 +56,7 @@ class Response:
     @classmethod
     def of(cls, body: Body, motion: Motion) -> "Response":
         """Return the response of ``body`` in ``motion``."""
-        place, turn = (part.reshape(*part.shape[:2], 18, 3) for part in functionals(body, motion))
-        return cls(body, motion, poses(body, motion.q), place, turn)
+        return cls(body, motion, poses(body, motion.q), *functionals(body, motion))
 
     def at(self, some: slice) -> "Response":
         """Return the response in some of the frames; its `wrench` and `back` are those of a run of its own."""
@@ -77,7 +77,7 @@ class Response:
 
     @cached_property
     def tangent(self) -> Array:
-        """(F, 18, nv): the functionals of the coordinates."""
+        """(F, 9, nv): the functionals of the coordinates."""
         com = centres_of_mass(self.body, self.pose)
         return tangent_of(self.body, self.pose, com, self.place, self.turn)
 
@@ -88,7 +88,7 @@ class Response:
 
     @cached_property
     def answer(self) -> Array:
-        """(F, 18, 3M): functionals per marker displacement, ``tangent @ follow`` without `follow`."""
+        """(F, 9, 3M): functionals per marker displacement, ``tangent @ follow`` without `follow`."""
         normal, weighted = self._tracking
         return -np.swapaxes(np.linalg.solve(normal, np.swapaxes(self.tangent, 1, 2)), 1, 2) @ weighted
 
@@ -111,7 +111,7 @@ class Response:
         return self.motion.q[:, self.body.nq - len(self.body.joints) :]
 
     def of_markers(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
-        """Return the functionals (F, 18, K) of model markers ``rows`` that ``moved`` (F, R, K) m."""
+        """Return the functionals (F, 9, K) of model markers ``rows`` that ``moved`` (F, R, K) m."""
         return np.asarray(self.answer[:, :, rows] @ moved)
 
     def left(self, moved: Array, rows: Index | slice = slice(None)) -> Array:
@@ -121,27 +121,26 @@ class Response:
         return np.asarray(left)
 
     def wrench(self, functional: Array) -> Array:
-        """Return the wrench (F, 6, K) about the lab origin from functionals (F, 18, K)."""
+        """Return the wrench (F, 6, K) about the lab origin from functionals (F, 9, K)."""
         second, first = derivatives(self.motion.time.size)
-        rate = self.motion.rate
-        parts = functional.reshape(len(functional), 3, -1)
-        value = np.array(parts[:, 2])
-        second.add(rate**2, parts[:, 0], value)
-        first.add(rate, parts[:, 1], value)
-        return value.reshape(len(functional), 6, -1)
+        frames, _, size = functional.shape
+        flat, value = functional.reshape(frames, -1), np.zeros((frames, 6 * size))
+        second.add(self.motion.rate**2, flat[:, : 6 * size], value)
+        first.add(self.motion.rate, flat[:, 6 * size :], value[:, 3 * size :])
+        wrench = value.reshape(frames, 6, size)
+        wrench[:, 3:] += skew(self.body.gravity) @ functional[:, :3]
+        return wrench
 
     def back(self, weight: Array) -> Array:
-        """Return what ``weight`` (F, 6, p) on the wrench weighs on functionals (F, 18, p): the transpose of
-        `wrench`.
-        """
+        """Return what ``weight`` (F, 6, p) on the wrench weighs on functionals (F, 9, p): the transpose of `wrench`."""
         second, first = derivatives(self.motion.time.size)
-        frames, rate = len(weight), self.motion.rate
-        flat = weight.reshape(frames, -1)
-        out = np.zeros((frames, 3, flat.shape[1]))
-        out[:, 2] = flat
-        second.add_transposed(rate**2, flat, out[:, 0])
-        first.add_transposed(rate, flat, out[:, 1])
-        return out.reshape(frames, 18, -1)
+        frames, _, size = weight.shape
+        flat, value = weight.reshape(frames, -1), np.zeros((frames, 9 * size))
+        second.add_transposed(self.motion.rate**2, flat, value[:, : 6 * size])
+        first.add_transposed(self.motion.rate, flat[:, 3 * size :], value[:, 6 * size :])
+        back = value.reshape(frames, 9, size)
+        back[:, :3] += skew(self.body.gravity).T @ weight[:, 3:]
+        return back
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +207,8 @@ def centres_of_mass(body: Body, pose: Poses) -> Array:
 
 
 def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
-    """Return (F, N, 3, 6, 3) twice: F2, F1, F0 of a displacement of a segment's CoM (m, lab) and of a turn of the
-    segment (rad, lab).
+    """Return (F, N, 9, 3) twice: F2 and the moments of F1 of a displacement of a segment's CoM (m, lab) and of a turn
+    of the segment (rad, lab).
     """
     move = segment_motion(body, motion)
     frames, count = motion.time.size, len(body.segments)
@@ -218,13 +217,12 @@ def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:
     inertia = move.rotation @ central_inertia(body) @ np.swapaxes(move.rotation, -1, -2)
     spin = (inertia @ move.angular_velocity[..., None])[..., 0]
     whirl = skew(move.angular_velocity)
-    place, turn = np.zeros((2, frames, count, 3, 6, 3))
-    place[:, :, 0, :3] = mass * np.eye(3)
-    place[:, :, 0, 3:] = mass * skew(com)
-    place[:, :, 1, 3:] = -2 * mass * skew(np.gradient(com, 1.0 / motion.rate, axis=0))
-    place[:, :, 2, 3:] = mass * skew(body.gravity)
-    turn[:, :, 0, 3:] = inertia
-    turn[:, :, 1, 3:] = -skew(spin) - (whirl @ inertia - inertia @ whirl)
+    place, turn = np.zeros((2, frames, count, 9, 3))
+    place[:, :, :3] = mass * np.eye(3)
+    place[:, :, 3:6] = mass * skew(com)
+    place[:, :, 6:] = -2 * mass * skew(np.gradient(com, 1.0 / motion.rate, axis=0))
+    turn[:, :, 3:6] = inertia
+    turn[:, :, 6:] = -skew(spin) - (whirl @ inertia - inertia @ whirl)
     return place, turn
 
 
@@ -256,14 +254,14 @@ class ErrorSource(ABC):
 
     @abstractmethod
     def functional(self, trial: Response) -> Array:
-        """Return the functionals (F, 18, K) of the wrench of every error in a trial."""
+        """Return the functionals (F, 9, K) of the wrench of every error in a trial."""
 
     @abstractmethod
     def residual(self, trial: Response) -> Array:
         """Return the mean residual (M, 3, K) m of every marker, model less measured, in segment axes."""
 
     def transpose(self, trial: Response, back: Array) -> Array:
-        """Return (K, p): sum over time of what ``back`` (F, 18, p) weighs on functionals, times those of every
+        """Return (K, p): sum over time of what ``back`` (F, 9, p) weighs on functionals, times those of every
         error.
         """
         return np.tensordot(self.functional(trial), back, axes=((0, 1), (0, 1)))

@@ -19,7 +19,7 @@ class _WithAngles(ErrorSource):
 
     @abstractmethod
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
-        """Yield for every segment functionals (F, 18, P) per radian, and the angles that they go with."""
+        """Yield for every segment functionals (F, 9, P) per radian, and the angles that they go with."""
 
     def functional(self, trial: Response) -> Array:
         """Return the functionals, times the angles."""
@@ -69,7 +69,7 @@ class Slide(_WithAngles):
         for s, on, rows, near in self._parts:
             if self._alone[s]:
                 answer = trial.answer[:, :, rows].reshape(len(trial.answer), -1, 3)
-                yield -(answer @ trial.pose.rotation[:, s]).reshape(len(answer), 18, -1), near
+                yield -(answer @ trial.pose.rotation[:, s]).reshape(len(answer), 9, -1), near
             else:
                 yield trial.of_markers(self._moved(trial, s, on), rows), near
 

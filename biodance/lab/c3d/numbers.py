@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from biodance.lab.c3d.layout import Layout
 from biodance.lab.c3d.parameters import MIPS, doubles, floats
-from biodance.records import Array
+from biodance.records import Array, any_coordinate
 
 Numbers = tuple[NDArray[Any], NDArray[Any]]
 """Points (T, K, 3) in file units with NaN = not seen, analog (T * samples, C) in units."""
@@ -39,7 +39,7 @@ def read_numbers(content: bytes, layout: Layout) -> Numbers:
     points = doubles(quads[..., :3])
     if not layout.floating:
         points *= layout.scale
-    seen = (quads[..., 3] >= 0) & np.isfinite(points).all(axis=2) & (points != 0).any(axis=2)
+    seen = (quads[..., 3] >= 0) & ~any_coordinate(~np.isfinite(points)) & any_coordinate(points != 0)
     points[~seen] = np.nan
     rest = doubles(analog_rows[:, 4 * layout.points :])
     with np.errstate(invalid="ignore", over="ignore"):

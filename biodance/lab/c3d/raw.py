@@ -19,7 +19,7 @@ from biodance.lab.c3d.layout import Layout, parameter_numbers, read_layout, text
 from biodance.lab.c3d.numbers import Numbers, read_numbers, second_opinion
 from biodance.lab.c3d.parameters import RESAVE, Parameters, read_header, read_parameters
 from biodance.lab.plain_text import refuse_huge
-from biodance.records import Array
+from biodance.records import Array, any_coordinate, spread_frames
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
 SPELLINGS = {
@@ -77,13 +77,11 @@ def metres_per_unit(
 
 _FRAMES = 4096
 """Frames looked at at once: little memory, however long the recording."""
-_SIZED = 256
-"""Frames whose size is looked at, spread over the recording."""
 
 
 def _extents(points: Array) -> Array:
     """Return the largest side of the box about the markers (T, K, 3) in frames that show four of them."""
-    frames = points[np.isfinite(points).all(axis=2).sum(axis=1) >= 4]
+    frames = points[(~any_coordinate(~np.isfinite(points))).sum(axis=1) >= 4]
     if not len(frames):
         return np.empty(0)
     return np.asarray((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1))
@@ -91,7 +89,7 @@ def _extents(points: Array) -> Array:
 
 def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     """Return a length in file units, what it should be in metres, and its name; NaN if the file holds none."""
-    extents = _extents(points[:: max(1, len(points) // _SIZED)])
+    extents = _extents(spread_frames(points))
     if extents.size:
         extent = float(np.median(extents))
         if 0 < extent < math.inf:
@@ -242,7 +240,8 @@ def _smells(
     reads others.
     """
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
-    leaps = _leaps(numbers[0][:, [column for column in range(layout.points) if column not in no_markers]], parameters)
+    markers = [column for column in range(layout.points) if column not in no_markers]
+    leaps = _leaps(numbers[0], markers, parameters)
     if not leaps and not layout.notes:
         return (), "biodance"
     opinion = second_opinion(path, numbers, layout)
@@ -260,18 +259,18 @@ def _smells(
     return (f"{smell}; {opinion}, so only biodance has read these numbers.",), "biodance"
 
 
-def _leaps(points: Array, parameters: Parameters) -> int:
-    """Return how often a marker moves by more than a metre between two frames in which it is seen; 0 if the unit is
-    not known.
+def _leaps(points: Array, markers: list[int], parameters: Parameters) -> int:
+    """Return how often a marker, one of these columns of ``points``, moves by more than a metre between two frames in
+    which it is seen; 0 if the unit is not known.
     """
     try:
-        metre = 1.0 / metres_per_unit(parameters, points, where="")[0]
+        metre = 1.0 / metres_per_unit(parameters, spread_frames(points)[:, markers], where="")[0]
     except FileRefused:
         return 0
     found = 0
     for start in range(0, len(points), _FRAMES):
-        step = np.abs(np.diff(points[start : start + _FRAMES + 1], axis=0)).max(axis=2, initial=0.0)
-        found += int(np.count_nonzero(step > LEAP * metre))
+        step = np.abs(np.diff(points[start : start + _FRAMES + 1, markers], axis=0))
+        found += int(np.count_nonzero(any_coordinate(step > LEAP * metre)))
     return found
 
 

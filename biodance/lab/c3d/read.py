@@ -94,12 +94,23 @@ def _in_lab(raw: RawC3d, labels: MarkerLabels) -> tuple[Markers | None, float, A
     """Return the markers in m in the lab frame, the file's unit of length in m, lab_R_file (3, 3), what was decided
     and what is doubtful.
     """
-    points = raw.points[:, list(labels.columns)]
+    all_in_order = labels.columns == tuple(range(raw.points.shape[1]))
+    points = raw.points if all_in_order else raw.points[:, list(labels.columns)]
     metres, units, doubts = metres_per_unit(raw.parameters, points, where=str(raw.path))
     own = _markers(raw, labels, points)
     turn, axes, doubtful = turn_to_z_up(raw, own)
-    markers = None if own is None else replace(own, xyz=metres * own.xyz @ turn.T)
+    markers = None if own is None else replace(own, xyz=_turned(own.xyz, metres * turn))
     return markers, metres, turn, (*units, *axes), (*doubts, *doubtful)
+
+
+def _turned(points: Array, axes: Array) -> Array:
+    """Return ``points @ axes.T``, read-only, for axes (3, 3) of which each has one component that is not zero."""
+    turned = np.empty_like(points)
+    for row, axis in enumerate(axes):
+        (only,) = np.flatnonzero(axis)
+        np.multiply(points[..., only], axis[only], out=turned[..., row])
+    turned.setflags(write=False)
+    return turned
 
 
 def _read(raw: RawC3d) -> tuple[str, ...]:

@@ -171,6 +171,9 @@ def _without_repeats(
         places.setdefault(split_label(raw.labels[column])[1], []).append(column)
     kept: dict[int, str] = {}
     for name, same in places.items():
+        if len(same) == 1:
+            kept[same[0]] = name
+            continue
         different: list[int] = []
         for column in sorted(same, key=lambda c: -int(np.isfinite(raw.points[:, c, 0]).sum())):
             unseen = not np.isfinite(raw.points[:, column]).any()

@@ -9,7 +9,7 @@ from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.upright import axis_to_head, clear_axis
 from biodance.lab.plates.corners import is_rectangle
-from biodance.records import Array, Markers
+from biodance.records import Array, Markers, spread_frames
 
 _CLOUD = 6
 """Markers that show how a body lies."""
@@ -95,7 +95,7 @@ def _declared(raw: RawC3d, markers: Markers | None) -> Array | None:
     if not re.fullmatch(r"[+-]?[XYZ]", text):
         return None
     i = _AXES.index(text[-1])
-    below = markers is not None and bool(markers.seen.any()) and float(np.nanmedian(markers.xyz[..., i])) < 0
+    below = markers is not None and bool(markers.seen.any()) and _middle(markers, i) < 0
     return np.eye(3)[i] * (-1.0 if below else 1.0)
 
 
@@ -113,5 +113,13 @@ def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
     if axis is None or markers is None or not markers.seen.any():
         return axis
     i = int(np.argmax(axis))
-    above = float(np.nanmedian(markers.xyz[..., i])) - float(plates[..., i].mean())
+    above = _middle(markers, i) - float(plates[..., i].mean())
     return axis * (1.0 if above >= 0 else -1.0)
+
+
+def _middle(markers: Markers, axis: int) -> float:
+    """Return the median coordinate of all markers along an axis, by frames spread over the recording, or by all where
+    these show none.
+    """
+    some = spread_frames(markers.xyz)[..., axis]
+    return float(np.nanmedian(some if np.isfinite(some).any() else markers.xyz[..., axis]))

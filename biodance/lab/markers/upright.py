@@ -2,6 +2,8 @@
 they say nothing, the only way up in which somebody stands.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.lab.markers.names import meanings, meanings_of
@@ -10,7 +12,7 @@ from biodance.lab.markers.set_file import LANDMARKS, segment_of
 from biodance.lab.markers.sets import landmark, recognise
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.still import median_places, quietest
-from biodance.records import Array, Markers
+from biodance.records import Array, Markers, spread_frames
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
 LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
@@ -26,15 +28,16 @@ _CLEAR = 2.0
 
 def axis_to_head(markers: Markers) -> Array | None:
     """Return the signed coordinate axis (3,) from the feet to the head or pelvis in most frames; None if the labels or
-    the posture do not tell it.
+    the posture do not tell it, in frames spread over the recording.
     """
     known = recognise(markers.names)
+    few = replace(markers, time=spread_frames(markers.time), xyz=spread_frames(markers.xyz))
     ends = [
-        [p for name in names if known and (p := landmark(markers, known, name)) is not None] for names in (UPPER, LOWER)
+        [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (UPPER, LOWER)
     ]
     if not all(ends):
         on = _segments(markers.names)
-        ends = [[markers[label] for label in on if on[label] in group] for group in (_HIGH, _DEEP)]
+        ends = [[few[label] for label in on if on[label] in group] for group in (_HIGH, _DEEP)]
     if not all(ends):
         return _only_way_to_stand(markers)
     top, bottom = (np.concatenate(points) for points in ends)

@@ -17,26 +17,21 @@ BESIDE = 0.15  # m beyond the edge
 _FRAMES = 200
 
 
-def distance_to_feet(cop: Array, time: Array, corners: Array, markers: Markers) -> float | None:
+def distance_to_feet(cop: Array, xyz: Array, corners: Array) -> float | None:
     """Return the median distance in m between the centre of pressure and the feet on the plate; None if no foot is seen
     on it.
 
-    ``cop`` (S, 2) m in the lab frame at ``time`` (S,) s, NaN while unloaded; ``corners`` (4, 3) m. The feet are all
-    markers within 0.15 m over the surface and 0.15 m around the plate; the distance is to the nearest straight line
-    between two of them, so it is near 0 between two feet.
+    ``cop`` (F, 2) m, NaN while unloaded, and markers ``xyz`` (F, K, 3) m in the same frames, lab; ``corners`` (4, 3) m.
+    The feet are all markers within 0.15 m over the surface and 0.15 m around the plate; the distance is to the nearest
+    straight line between two of them, so it is near 0 between two feet.
     """
-    if markers.time.size == 0 or not np.isfinite(cop).any():
-        return None
-    frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
-    at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
-    point, xyz = cop[at], markers.xyz[frames]
     centre, reach = corners.mean(axis=0), float(np.linalg.norm(half_sides(corners))) + BESIDE
     low = np.abs(xyz[:, :, 2] - centre[2]) <= LOW
     near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
-    told = np.isfinite(point).all(axis=1) & (near.sum(axis=1) >= 2)
-    if told.sum() < min(5, markers.time.size):
+    told = np.isfinite(cop).all(axis=1) & (near.sum(axis=1) >= 2)
+    if told.sum() < max(1, min(5, len(cop))):
         return None
-    point, near, feet = point[told], near[told], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[told]
+    point, near, feet = cop[told], near[told], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[told]
     first = np.argsort(~near, axis=1, kind="stable")[:, : near.sum(axis=1).max(), None]
     return float(np.median(_distances_between(point, np.take_along_axis(feet, first, axis=1))))
 
@@ -185,9 +180,17 @@ def _under_feet(
 
 
 def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:
-    """Return the median distance in m of the load to the feet if the plate's axes were ``axes``."""
-    point = centre_of_pressure(reading.at_surface(axes)[0])
-    return distance_to_feet(reading.corners.mean(axis=0)[:2] + point @ axes[:2, :2].T, time, reading.corners, markers)
+    """Return the median distance in m of the load to the feet if the plate's axes were ``axes``, by frames spread over
+    the trial.
+    """
+    if not markers.time.size:
+        return None
+    frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
+    at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
+    point = centre_of_pressure(replace(reading, sensor=reading.sensor[at]).at_surface(axes)[0])
+    return distance_to_feet(
+        reading.corners.mean(axis=0)[:2] + point @ axes[:2, :2].T, markers.xyz[frames], reading.corners
+    )
 
 
 def _quarter_turns(count: int) -> Array:

@@ -126,7 +126,7 @@ def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None
     stood on any.
     """
     axes = [plate_axes(r.corners) for r in readings]
-    signs = [gravity_sign(r.at_surface(a)[0], a, r.rate) for r, a in zip(readings, axes, strict=True)]
+    signs = [gravity_sign(r.sensor, a, r.rate) for r, a in zip(readings, axes, strict=True)]  # any point: forces alone
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign
     votes = [sign * np.sign(a[2, 2]) for sign, a in zip(signs, axes, strict=True)]
     plates, warnings, mended = [], [], []

@@ -78,12 +78,12 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     channels, known, gaps_said = _without_gaps(channels, plate)
     units = tuple(raw.analog_units[c] for c in plate.channels)
     factors, unit_said = unit_factors(plate, units, metres=metres)
-    vertical = (calibrated(plate, channels) * factors)[
-        :, [k for k, kind in enumerate(CONTENT[plate.type]) if kind == "F"]
-    ]
-    zero = find_baseline(_vertical(plate, vertical), zero=zero_window(raw), rate=raw.analog_rate)
+    forces = [k for k, kind in enumerate(CONTENT[plate.type]) if kind == "F"]
+    vertical = _vertical(plate, calibrated(plate, channels)[:, forces] * np.array(factors)[forces])
+    zero = find_baseline(vertical, zero=zero_window(raw), rate=raw.analog_rate)
     offsets = _offsets(plate, channels, zero.start, zero.stop)
-    signals = calibrated(plate, channels - offsets) * factors
+    channels -= offsets
+    signals = calibrated(plate, channels) * factors
     sensor, vector = sensor_wrench(plate, signals, origin), surface_vector(plate, origin)
     empty = sensor_wrench(plate, calibrated(plate, offsets[None]) * factors, origin)[0, :3]
     vector, turned = vector_under_load(plate, sensor, vector, corners, raw.analog_rate)
@@ -233,14 +233,15 @@ def _moments_in_sense(
     if not loaded.any():
         return sensor, (), ()
     factors = MOMENT_UNITS if "M" in CONTENT[plate.type] or plate.type == 1 else MOMENT_UNITS[:1]
-    share = {}
+    pressed, share = sensor[loaded], {}
     for factor in factors:
-        tried = sensor * np.array([1, 1, 1, factor, factor, factor])
-        point = centre_of_pressure(_at_surface(plate, tried, vector, axes)[0][loaded])
-        on_it = _share_on(point, half)
-        lives = float(np.percentile(np.abs(centre_of_pressure(tried[loaded])).max(axis=1), 90)) > STILLEST
+        tried = pressed * np.array([1, 1, 1, factor, factor, factor])
+        on_it = _share_on(centre_of_pressure(_at_surface(plate, tried, vector, axes)[0]), half)
+        lives = float(np.percentile(np.abs(centre_of_pressure(tried)).max(axis=1), 90)) > STILLEST
         share[factor] = (on_it, on_it >= INSIDE and lives)
-    good = [factor for factor in factors if share[factor][1]]
+        if share[1.0][1]:
+            break  # as declared it makes sense: no other unit is asked
+    good = [factor for factor in share if share[factor][1]]
     if not share[1.0][1] and len(good) == 1:
         said = (
             f"The moments put the load on the plate only when taken {good[0]:g} times as large as the file's "
