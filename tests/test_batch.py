@@ -18,10 +18,9 @@ import pytest
 
 import biodance
 from biodance.batch.engines import TRIES, _submitted
-from biodance.batch.rows import ROW_TYPES, rows_of
 from biodance.batch.run import LEDGER, Ledger, run_batch
 from biodance.batch.summary import outliers, summary_table
-from biodance.batch.work import Outcome, SessionStatus, SessionTask, process_session
+from biodance.batch.work import ROW_TYPES, Outcome, SessionStatus, SessionTask, process_session, rows_of
 from biodance.cli import run
 from biodance.errors import BiodanceError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.lab.c3d.read import read_c3d
-from biodance.lab.weight import standing_mass
+from biodance.lab.markers.still import standing_mass
 
 
 @pytest.mark.parametrize("subject", ["HC030A", "HC032A", "HC038A"])

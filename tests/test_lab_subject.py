@@ -5,9 +5,9 @@ import pytest
 from lab_sessions import MASS, STATURE, person, plate, roles, said, two_trials, write_trial
 
 from biodance.errors import SessionRefused
+from biodance.lab.markers.still import is_still, movement, standing_mass
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
-from biodance.lab.weight import is_still, movement, standing_mass
 from biodance.records import Source, Trial
 
 

@@ -8,9 +8,10 @@ import os
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from biodance.batch.engines import Work, run_here, run_on_dask
@@ -38,7 +39,7 @@ ON CONFLICT (name) DO UPDATE SET fingerprint = excluded.fingerprint, status = ex
 
 
 class Ledger:
-    """The book of one archive's results, open for one run; a context manager.
+    """The book of one archive's results, open for one run.
 
     Raises
     ------
@@ -65,15 +66,11 @@ class Ledger:
             ) from None
         self._book = sqlite3.connect(known)
         self._book.executescript(_TABLE)
-        self._belongs(folder, archive)
-
-    def _belongs(self, folder: Path, archive: Path) -> None:
+        place = str(archive.resolve())
         with self._book:
-            self._book.execute(
-                "INSERT INTO archive SELECT ? WHERE NOT EXISTS (SELECT 1 FROM archive)", (str(archive.resolve()),)
-            )
+            self._book.execute("INSERT INTO archive SELECT ? WHERE NOT EXISTS (SELECT 1 FROM archive)", (place,))
         (owner,) = self._book.execute("SELECT folder FROM archive").fetchone()
-        if owner != str(archive.resolve()):
+        if owner != place:
             self.close()
             raise BiodanceError(f"{folder}: holds the results of another archive ({owner}). Choose another --out.")
 
@@ -84,9 +81,9 @@ class Ledger:
 
     def write(self, outcome: Outcome) -> None:
         """Write down what became of a session; it is on disk when this returns."""
-        one = outcome
+        row = attrgetter("name", "fingerprint", "status", "reason", "seconds", "memory_mb")(outcome)
         with self._book:
-            self._book.execute(_WRITE, (one.name, one.fingerprint, one.status, one.reason, one.seconds, one.memory_mb))
+            self._book.execute(_WRITE, row)
 
     def told(self, task: SessionTask) -> Outcome | None:
         """Return what is written down of a session that has no folder of its own (its process died each time)."""
@@ -100,14 +97,6 @@ class Ledger:
         """Close the book and let others in."""
         self._book.close()
         self._lock.close()
-
-    def __enter__(self) -> "Ledger":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 @dataclass(frozen=True)
@@ -198,31 +187,23 @@ def run_batch(
         raise BiodanceError(f"--workers {workers}: at least one process is needed. Leave it out for one a core.")
     if not limit > 0:
         raise BiodanceError(f"--limit {limit:g}: legal is more than 0 s for one session.")
-    inside = folder.resolve()
-    tasks = [
-        SessionTask(
-            name,
-            str(path),
-            str(folder / SESSIONS / folder_name(name)),
-            fingerprint_of(path, chosen),
-            chosen,
-            pages,
-            limit,
-        )
-        for path in sessions
-        if inside not in (path.resolve(), *path.resolve().parents)
-        for name in [_name(path, archive)]
-    ]
+    results = folder.resolve()
+    tasks = []
+    for path in sessions:
+        if results not in (path.resolve(), *path.resolve().parents):
+            name, fingerprint = _name(path, archive), fingerprint_of(path, chosen)
+            place = str(folder / SESSIONS / folder_name(name))
+            tasks.append(SessionTask(name, str(path), place, fingerprint, chosen, pages, limit))
     if not tasks:
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
-    with Ledger(folder, archive) as ledger:
+    with closing(Ledger(folder, archive)) as ledger:
         fresh = _work_off(tasks, ledger, workers, work, tell)
         outcomes = tuple(found for task in tasks if (found := outcome_of(task) or ledger.told(task)))
-        run = BatchRun(archive, folder, outcomes, fresh, tuple(str(path.relative_to(archive)) for path in indices))
+        left_out = tuple(str(path.relative_to(archive)) for path in indices)
         tell("writing the summary", len(tasks), len(tasks))
-        write_summary(run.folder, run.archive.resolve().name, run.outcomes, run.left_out)
-    return run
+        write_summary(folder, archive.resolve().name, outcomes, left_out)
+    return BatchRun(archive, folder, outcomes, fresh, left_out)
 
 
 def _work_off(
@@ -233,11 +214,10 @@ def _work_off(
     tell: Callable[[str, int, int], None],
 ) -> int:
     """Go through all tasks that are open, write down each as it is finished, and return how many were open."""
+    for task in ledger.open_tasks(tasks):
+        if found := outcome_of(task):  # finished when the run was killed
+            ledger.write(found)
     open_tasks = ledger.open_tasks(tasks)
-    known = [found for task in open_tasks if (found := outcome_of(task))]  # finished when the run was killed
-    for outcome in known:
-        ledger.write(outcome)
-    open_tasks = ledger.open_tasks(open_tasks)
     done = len(tasks) - len(open_tasks)
     tell("beginning", done, len(tasks))
     if not open_tasks:

@@ -9,8 +9,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from biodance.batch.rows import ROW_TYPES
-from biodance.batch.work import Outcome
+from biodance.batch.work import ROW_TYPES, Outcome
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 from biodance.report.files import write_files
@@ -112,8 +111,8 @@ def left_in_archive(folder: Path, names: Iterable[str]) -> tuple[SessionLeft, ..
 
 def _links(folder: Path, outcomes: Sequence[Outcome]) -> dict[str, str]:
     """Return the address of every session's own page, where one was drawn."""
-    pages = {one.name: Path(SESSIONS, folder_name(one.name), _PAGE) for one in outcomes}
-    return {name: quote(page.as_posix()) for name, page in pages.items() if (folder / page).is_file()}
+    pages = {one.name: f"{SESSIONS}/{folder_name(one.name)}/{_PAGE}" for one in outcomes}
+    return {name: quote(page) for name, page in pages.items() if (folder / page).is_file()}
 
 
 def _figure(table: "pd.DataFrame") -> "Figure | None":

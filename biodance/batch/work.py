@@ -172,7 +172,6 @@ def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tu
 
 def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
     """Return status, reason and rows of a session that goes through."""
-    from biodance.batch.rows import rows_of
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.load import with_weighed_load
@@ -211,3 +210,73 @@ def _limited(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+_ANGLES = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+ROW_TYPES: dict[str, str] = {
+    **dict.fromkeys(("session", "trial", "role", "status", "reason", "session_status"), "string"),
+    **dict.fromkeys(("verdict", "findings", "first"), "string"),
+    **dict.fromkeys(("declared_mass_kg", "mass_on_plates_kg", "mass_difference_percent"), "float64"),
+    "frames": "Int64",
+    **dict.fromkeys(("rate_hz", "gaps_percent", "marker_rms_m", "marker_max_m"), "float64"),
+    **dict.fromkeys(("fz_rms_table_n", "fz_rms_identified_n"), "float64"),
+    **dict.fromkeys(("gait_cycles", "squats", "rises", "foot_events"), "Int64"),
+    "speed_m_per_s": "float64",
+    **dict.fromkeys((f"{angle}_max_deg" for angle in _ANGLES), "float64"),
+    "warnings": "Int64",
+    **dict.fromkeys(("seconds", "memory_mb"), "float64"),
+}
+"""Every column of summary.parquet and summary.csv, and its type."""
+_KINDS = {"gait": "gait_cycles", "squat": "squats", "sit_to_stand": "rises"}
+_OF_TRIAL = ("role", "status", "reason", "frames", "rate_hz", "gaps_percent", "marker_rms_m", "marker_max_m")
+
+
+def rows_of(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+    """Return one row for each trial of a session (results.json): what it is, how well it was followed, what its plates
+    say, what moved; trials that were refused have a row, too.
+    """
+    moved = {one["trial"]: one for one in (document["movement"] or {"trials": ()})["trials"]}
+    mass, diagnosis = document["mass_check"] or {}, document["diagnosis"] or {}
+    shared = {
+        "verdict": diagnosis.get("verdict") or "not judged",
+        "findings": "; ".join(f"{one['effect']} {one['target']}".strip() for one in diagnosis.get("findings", ())),
+        "first": document["attention"][0]["text"] if document["attention"] else "",
+        "declared_mass_kg": document["subject"]["mass_kg"],
+        "mass_on_plates_kg": mass.get("mass_on_plates_kg"),
+        "mass_difference_percent": mass.get("difference_percent"),
+    }
+    rows = [
+        {
+            "trial": trial["name"],
+            **{name: trial[name] for name in _OF_TRIAL},
+            **{f"fz_rms_{body}_n": _vertical(trial["wrench"], body) for body in ("table", "identified")},
+            **(_moved(moved[trial["name"]]) if trial["name"] in moved else {}),
+            "warnings": len(trial["warnings"]),
+            **shared,
+        }
+        for trial in document["trials"]
+    ]
+    refused = (
+        {"trial": name, "status": "refused", "reason": why, **shared} for name, why in document["refused"].items()
+    )
+    return (*rows, *refused)
+
+
+def _vertical(wrench: dict[str, Any] | None, body: str) -> float | None:
+    """Return the RMS of vertical force between plates and the simulation with one ``body``, N; None where unknown."""
+    found = wrench.get(body) if wrench else None
+    return float(found["rms"][2]) if found and found["rms"][2] is not None else None
+
+
+def _moved(one: dict[str, Any]) -> dict[str, Any]:
+    """Return what moved in a trial: how many repetitions and events, speed, and the largest angle of the mean curves of
+    both sides.
+    """
+    kinds = [cycle["kind"] for cycle in one["cycles"]]
+    speeds = [row["mean"] for row in one["spatiotemporal"] if (row["quantity"], row["side"]) == ("speed", "both")]
+    row: dict[str, Any] = {column: kinds.count(kind) for kind, column in _KINDS.items()}
+    row |= {"foot_events": len(one["events"]), "speed_m_per_s": speeds[0] if speeds else None}
+    for angle in _ANGLES:
+        most = [curve["max"] for curve in one["curves"] if curve["quantity"] == angle and "max" in curve]
+        row[f"{angle}_max_deg"] = max(most) if most else None
+    return row

@@ -14,11 +14,11 @@ from biodance.lab.markers.dress import said_of
 from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
+from biodance.lab.markers.still import standing_mass
 from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
 from biodance.lab.session.subject import declared_mass, declared_stature
-from biodance.lab.weight import standing_mass
 from biodance.records import Markers, Plate, Trial
 from biodance.settings import COP_FORCE
 
@@ -78,12 +78,8 @@ def _warned(record: dict[str, Any], warning: str) -> dict[str, Any]:
     """Return the record with one more warning."""
     if record["status"] == "refused":
         return record
-    return {
-        **record,
-        "status": "warning",
-        "reason": record["reason"] or warning,
-        "warnings": [*record["warnings"], warning],
-    }
+    warnings = [*record["warnings"], warning]
+    return {**record, "status": "warning", "reason": warnings[0], "warnings": warnings}
 
 
 def inspect_file(path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None) -> dict[str, Any]:
@@ -104,33 +100,31 @@ def inspect_file(path: str | Path, *, subject: str | None = None, markers: Marke
     except BiodanceError as error:
         return _refused(path, str(error))
     trial, guessed = _guessed(trial)
-    warnings = [*trial.warnings, *guessed, *_never_seen(trial)]
+    gaps = report_gaps(of_set) if (of_set := _of_the_set(trial)) is not None else ()
+    never = [gap.label for gap in gaps if gap.percent >= 100.0]
+    warnings = [*trial.warnings, *guessed]
+    if never:
+        warnings.append(f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}.")
     plates = [_plate(plate) for plate in trial.plates]
-    time = (
-        trial.markers.time
-        if trial.markers is not None
-        else trial.plates[0].wrench.time
-        if trial.plates
-        else np.empty(0)
-    )
-    vertical = [
-        plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates
-    ]  # as the plates read, their zero still in it
+    clock = trial.markers or next((plate.wrench for plate in trial.plates), None)
+    as_read = [plate["mean_vertical_n"] + plate["zero_n"][2] for plate in plates]
+    hidden = [gap.percent for gap in gaps if gap.percent < 100.0]
+    worn = trial.marker_set
     return {
         "file": str(path),
         "status": "warning" if warnings else "ok",
         "reason": warnings[0] if warnings else None,
         "format": trial.source.format,
-        "frames": int(time.size),
+        "frames": 0 if clock is None else int(clock.time.size),
         "rate_hz": _number(trial.source.rate),
         "analog_rate_hz": _number(trial.source.analog_rate),
         "markers": list(trial.markers.names) if trial.markers is not None else [],
         "marker_set": trial.worn or None,
-        "marker_map": _map_of(trial),
-        "gaps_percent": _gaps(trial),
+        "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
+        "gaps_percent": float(np.mean(hidden)) if hidden else None,
         "subjects": _subjects(path),
         "plates": plates,
-        "mean_vertical_n": float(sum(vertical)) if vertical else None,
+        "mean_vertical_n": float(sum(as_read)) if as_read else None,
         "mass_on_plates_kg": standing_mass(trial),
         "declared_mass_kg": _number(declared_mass(trial.measurements)),
         "declared_height_m": _number(declared_stature(trial.measurements)),
@@ -147,29 +141,14 @@ def _guessed(trial: Trial) -> tuple[Trial, list[str]]:
     return replace(trial, marker_set=guess.name), [said_of(guess, trial.name)]
 
 
-def _map_of(trial: Trial) -> dict[str, str] | None:
-    """Return the map of a guessed set."""
-    return dict(json.loads(trial.marker_set.removeprefix(GUESSED))) if trial.marker_set.startswith(GUESSED) else None
-
-
 def _refused(path: Path, reason: str) -> dict[str, Any]:
     """Return the record of a file that cannot be read, with all keys."""
-    nothing = dict.fromkeys(("format", "frames", "rate_hz", "analog_rate_hz"))
-    unknown = dict.fromkeys(("mean_vertical_n", "mass_on_plates_kg", "declared_mass_kg", "declared_height_m"))
     return {
-        "file": str(path),
-        "status": "refused",
-        "reason": reason,
-        **nothing,
-        "markers": [],
-        "marker_set": None,
-        "marker_map": None,
-        "gaps_percent": None,
-        "subjects": [],
-        "plates": [],
-        **unknown,
-        "history": [],
-        "warnings": [],
+        **{"file": str(path), "status": "refused", "reason": reason},
+        **dict.fromkeys(("format", "frames", "rate_hz", "analog_rate_hz")),
+        **{"markers": [], "marker_set": None, "marker_map": None, "gaps_percent": None, "subjects": [], "plates": []},
+        **dict.fromkeys(("mean_vertical_n", "mass_on_plates_kg", "declared_mass_kg", "declared_height_m")),
+        **{"history": [], "warnings": []},
     }
 
 
@@ -205,21 +184,6 @@ def _of_the_set(trial: Trial) -> Markers | None:
     if trial.markers is None or not trial.marker_set:
         return trial.markers
     return canonical(trial.markers, read_marker_set(trial.marker_set))
-
-
-def _gaps(trial: Trial) -> float | None:
-    """Return the percentage of marker positions that were not seen, of the markers that were seen at least once."""
-    markers = _of_the_set(trial)
-    if markers is None:
-        return None
-    hidden = [gap.percent for gap in report_gaps(markers) if gap.percent < 100.0]
-    return float(np.mean(hidden)) if hidden else None
-
-
-def _never_seen(trial: Trial) -> list[str]:
-    markers = _of_the_set(trial)
-    names = [gap.label for gap in report_gaps(markers) if gap.percent >= 100.0] if markers is not None else []
-    return [f"Never seen: {', '.join(names[:12])}{' ...' if len(names) > 12 else ''}."] if names else []
 
 
 def _number(value: float) -> float | None:

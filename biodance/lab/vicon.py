@@ -121,14 +121,9 @@ def read_enf(path: str | Path) -> EclipseNotes:
     kind = fields.pop("TYPE", "") or fields.pop("TRIAL_TYPE", "")
     if not kind and node_type.upper() not in ("TRIAL", "SESSION", "SUBJECT", "PROJECT", "PATIENT"):
         kind = node_type
-    return EclipseNotes(
-        trial=re.sub(r"(?:\.Trial\d*)?\.enf$", "", path.name, flags=re.IGNORECASE),
-        type=kind,
-        description=fields.pop("DESCRIPTION", ""),
-        notes=fields.pop("NOTES", ""),
-        plates=MappingProxyType(plates),
-        fields=MappingProxyType(fields),
-    )
+    trial = re.sub(r"(?:\.Trial\d*)?\.enf$", "", path.name, flags=re.IGNORECASE)
+    said = (fields.pop("DESCRIPTION", ""), fields.pop("NOTES", ""))
+    return EclipseNotes(trial, kind, *said, MappingProxyType(plates), MappingProxyType(fields))
 
 
 def _in_si(values: dict[str, float]) -> dict[str, float]:

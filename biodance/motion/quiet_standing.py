@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
-from biodance.lab.weight import movement
+from biodance.lab.markers.still import movement
 from biodance.motion.kinematics import centre_of_mass, in_blocks, poses
 from biodance.records import Array, Markers, Motion, Trial, longest_run
 from biodance.settings import StandingRules

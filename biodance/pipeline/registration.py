@@ -22,7 +22,7 @@ from biodance.records import Motion, Session, Trial
 from biodance.registration.alignment import Alignment, alignments
 from biodance.registration.pose import Forces, forces_of, registered_plates
 from biodance.registration.refinement import floor_of, refined, with_height
-from biodance.registration.registration import Limits, Registration, concluded, refused, rival_delays
+from biodance.registration.registration import Limits, Registration, concluded, rival_delays
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -109,7 +109,7 @@ def register(
         found = refine(hypotheses[0].pose)
         others = rival_delays(hypotheses, found, refine)
     except TrialRefused as why:
-        return refused(str(why))
+        return Registration("refused", str(why))
     registration = concluded(measured, hypotheses[0], found, others, limits=limits or Limits(), rough=rough)
     if folder is not None and registration.status != "refused":
         tell("writing the session")

@@ -106,15 +106,12 @@ def _scanned(
     if delays is None:
         first, last = forces.time[0] - motion.time[-1] + _LEAST, forces.time[-1] - motion.time[0] - _LEAST
         delays = np.arange(first, last, _STEP)
-    for delay in delays:
-        samples = _samples(motion, needed, forces, float(delay), height)
+    for delay in map(float, delays):
+        samples = _samples(motion, needed, forces, delay, height)
         if samples is not None:
-            yield _alignment(samples, float(delay), height, *samples.aligned())
-
-
-def _alignment(samples: _Samples, delay: float, height: float, turn: complex, shift: complex, loss: Array) -> Alignment:
-    pose = FramePose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
-    return Alignment(pose, float(_EVERY * np.sum(_OUTLIER - loss)), float(loss.mean()))
+            turn, shift, loss = samples.aligned()
+            pose = FramePose(delay, float(np.angle(turn)), np.array([shift.real, shift.imag, height]))
+            yield Alignment(pose, float(_EVERY * np.sum(_OUTLIER - loss)), float(loss.mean()))
 
 
 def _samples(motion: Motion, needed: Array, forces: Forces, delay: float, height: float) -> _Samples | None:

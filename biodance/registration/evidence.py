@@ -73,22 +73,19 @@ def plate_steps(
         recorded = plate.wrench
         for start, stop in runs(recorded.force[:, 2] > ONSET):
             time = recorded.time[start:stop] - pose.delay
-            ends = start == 0 or stop == len(recorded.time)
-            if ends or not _SHORTEST_STEP <= time[-1] - time[0] <= _LONGEST_STEP or not _covered(motion, time):
+            cut_off = start == 0 or stop == len(recorded.time)
+            covered = time[0] - 0.1 > motion.time[0] and time[-1] < motion.time[-1]
+            if cut_off or not covered or not _SHORTEST_STEP <= time[-1] - time[0] <= _LONGEST_STEP:
                 continue
             foot = _foot(trial, contact, soles, number, time)
             if foot is None:
                 continue
-            marks = [landmark(trial.markers, known, f"{SIDES[foot]}_{name}") for name in ("heel", "toe")]
-            if marks[0] is not None and marks[1] is not None:
+            heel, toe = (landmark(trial.markers, known, f"{SIDES[foot]}_{name}") for name in ("heel", "toe"))
+            if heel is not None and toe is not None:
                 part = Wrench(time, pose.wrench(recorded.value[start:stop]))
-                one = _step(number, foot, part, trial.plates[number].height, trial.markers.time, marks[0], marks[1])
+                one = _step(number, foot, part, trial.plates[number].height, trial.markers.time, heel, toe)
                 found += [one] if one is not None else []
     return tuple(found)
-
-
-def _covered(motion: Motion, time: Array) -> bool:
-    return bool(time[0] - 0.1 > motion.time[0] and time[-1] < motion.time[-1])
 
 
 def _foot(trial: Trial, contact: Contact, soles: Soles, number: int, time: Array) -> int | None:

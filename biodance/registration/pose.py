@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.filters import force_filter, low_pass
-from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench, freeze
+from biodance.records import Array, Markers, Mask, Motion, Plate, Trial, Wrench, freeze
 from biodance.settings import Settings
 from biodance.spatial import axis_rotation, wrench_about_origin
 
@@ -15,8 +15,10 @@ _UP = np.array([0.0, 0.0, 1.0])
 _RATE = 200.0
 """Hz at which low-passed forces are kept between two looks: ten times the default cut-off."""
 
-_UNSIZED = ("MOT",)
-"""Formats of recordings that do not say where a plate ends."""
+_LOADED = 50.0
+"""N: somebody stood on a plate that carried more."""
+_UNSIZED = "MOT"
+"""Format of recordings that does not say where a plate ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +79,15 @@ class Forces:
     sized: bool = True
 
     @property
+    def loaded(self) -> Mask:
+        """(P,) whether somebody ever stands on a plate."""
+        return np.asarray(self.value[:, :, 2].max(axis=1) > _LOADED)
+
+    @property
     def height(self) -> float:
         """Height m of the plates that are loaded (all of them where none is), the mean, in the file's frame."""
-        loaded = [
-            plate.height for plate, value in zip(self.plates, self.value, strict=True) if value[:, 2].max() > 50.0
-        ]
-        return float(np.mean(loaded or [plate.height for plate in self.plates]))
+        heights = np.array([plate.height for plate in self.plates])
+        return float(heights[self.loaded].mean() if self.loaded.any() else heights.mean())
 
     def during(self, time: Array) -> Array:
         """Return (P, T, 6) at the times ``time`` (T,) s of the file's clock; NaN where nothing was recorded."""
@@ -113,7 +118,7 @@ def forces_of(trial: Trial, settings: Settings) -> Forces:
     rate, step = trial.plates[0].wrench.rate, max(1, int(trial.plates[0].wrench.rate // _RATE))
     value = np.stack([low_pass(one, rate, force_filter(settings)) for one in raw])[:, ::step]
     spline = make_interp_spline(time[::step], value, k=3, axis=1)
-    return Forces(trial.plates, time[::step], value, spline, trial.source.format not in _UNSIZED)
+    return Forces(trial.plates, time[::step], value, spline, trial.source.format != _UNSIZED)
 
 
 def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Trial, Motion]:
@@ -135,15 +140,8 @@ def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose
         replace(plate, corners=pose.points(plate.corners), wrench=Wrench(motion.time[kept], value))
         for plate, value in zip(forces.plates, values, strict=True)
     )
-    cut = replace(
-        motion,
-        time=motion.time[kept],
-        q=motion.q[kept],
-        v=motion.v[kept],
-        a=motion.a[kept],
-        residual=motion.residual[kept],
-        determined=motion.determined[kept],
-    )
+    by_frame = ("time", "q", "v", "a", "residual", "determined")
+    cut = replace(motion, **{name: getattr(motion, name)[kept] for name in by_frame})
     markers = trial.markers
     seen = None if markers is None else Markers(markers.names, markers.time[kept], markers.xyz[kept])
     return replace(trial, plates=plates, markers=seen), cut

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
@@ -15,7 +14,7 @@ from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.footing import dilate, speeds
 from biodance.motion.contact.soles import Soles, soles_from_body
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Motion, Trial, runs
+from biodance.records import Array, Mask, Motion, Trial, runs
 from biodance.registration.evidence import PoseEvidence, feet_pull, plate_steps, together, wrench_pull
 from biodance.registration.pose import Forces, FramePose, with_forces_at
 from biodance.spatial import quaternion_matrix, zero_moment_point
@@ -72,16 +71,26 @@ def floor_of(soles: Soles) -> float:
     TrialRefused
         No foot is ever slow.
     """
-    slow = np.asarray((speeds(soles) < _SLOW).all(axis=2))
+    slow = _slow(soles)
     if not slow.any():
         raise TrialRefused("No foot ever stands still in these markers, so nobody can tell where a plate could be.")
-    return float(np.median(soles.outline[..., 2].min(axis=2)[slow]))
+    return float(np.median(_lowest(soles)[slow]))
+
+
+def _lowest(soles: Soles) -> Array:
+    """Return the height (T, 2) m of the lowest point of each foot."""
+    return np.asarray(soles.outline[..., 2].min(axis=2))
+
+
+def _slow(soles: Soles) -> Mask:
+    """Return (T, 2) where a whole foot is as slow as one that stands."""
+    return np.asarray((speeds(soles) < _SLOW).all(axis=2))
 
 
 def with_height(pose: FramePose, soles: Soles, forces: Forces) -> FramePose:
     """Return the pose with the height that the soles on loaded plates ask for."""
     gaps = []
-    low, slow = soles.outline[..., 2].min(axis=2), np.asarray((speeds(soles) < _SLOW).all(axis=2))
+    low, slow = _lowest(soles), _slow(soles)
     for plate, value in zip(forces.plates, forces.during(soles.time + pose.delay), strict=True):
         there = zero_moment_point(pose.wrench(np.nan_to_num(value)), height=plate.height + pose.shift[2])
         away = np.linalg.norm((soles.centre - there[:, None])[..., :2], axis=2)
@@ -110,6 +119,7 @@ def refined(
         Neither the wrench nor the feet tell anything: no fully measured contact, no step.
     """
     pose, why = start, ""
+    weak = PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
     for turn in range(_ROUNDS):
         look, soles, about = _look(body, trial, motion, forces, pose)
         steps = plate_steps(look.trial, look.motion, _contact(body, look, soles), soles, forces, pose)
@@ -123,7 +133,7 @@ def refined(
             raise TrialRefused(
                 f"Neither the body's wrench nor a step tells where the plates lie; are these files of one trial? {why}"
             )
-        change, covariance = together([*pulls, _weak()])
+        change, covariance = together([*pulls, weak])
         pose = pose.changed(change, about)
         if turn and (np.abs(change) < 0.1 * np.sqrt(np.diag(covariance))).all():
             break
@@ -132,10 +142,6 @@ def refined(
     covariance = covariance + np.diag(_INSTALLED**2)
     fit = (wrench.misfit, wrench.rows) if wrench else (float("nan"), 0)
     return Refined(pose, covariance, about, seconds, len(steps), feet.misfit if feet else np.nan, *fit, notes)
-
-
-def _weak() -> PoseEvidence:
-    return PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
 
 
 def _contact(body: Body, look: Look, soles: Soles) -> Contact:
@@ -155,7 +161,7 @@ def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FrameP
     return replace(look, use=use), soles, about
 
 
-def _carried(body: Body, look: Look) -> NDArray[np.bool_]:
+def _carried(body: Body, look: Look) -> Mask:
     """Return the frames (T,) in which plates of unknown size carry the whole body: the vertical force is the needed one
     within a tenth of the weight, for a while before and after.
     """

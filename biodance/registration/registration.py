@@ -158,6 +158,7 @@ class Registration:
         'plate1'
         """
         level, pose = "fail" if self.status == "refused" else "warn", self.pose
+        said = {"level": level, "text": self.reason, "trial": "", "about": "register"}
         return {
             "status": self.status,
             "reason": self.reason,
@@ -166,9 +167,7 @@ class Registration:
             "plates": [one.document() for one in self.plates],
             "file_frame": None if pose is None else {"shift_m": pose.shift.tolist(), "yaw_rad": _within(pose.yaw)},
             "notes": list(self.notes),
-            "attention": [{"level": level, "text": self.reason, "trial": "", "about": "register"}]
-            if self.reason
-            else [],
+            "attention": [said] if self.reason else [],
         }
 
     def table(self) -> "pd.DataFrame":
@@ -196,11 +195,6 @@ def _within(angle: float) -> float:
     return float(np.angle(np.exp(1j * angle)))
 
 
-def refused(reason: str) -> Registration:
-    """Return a registration that has not even a guess, and why."""
-    return Registration("refused", reason)
-
-
 def concluded(
     forces: Forces,
     best: Alignment,
@@ -213,24 +207,19 @@ def concluded(
     """Return the registration, refused where one of ``rivals`` is nearly as good, where the movement is not the one
     that the plates felt, or where it shows the pose less exactly than ``limits`` (unless ``rough`` is enough).
     """
-    doubt = _doubt(best, rivals, found)
-    wide = _too_wide(found.covariance, limits)
-    status: Literal["registered", "rough", "refused"] = "registered"
+    doubt, wide = _doubt(best, rivals, found), _too_wide(found.covariance, limits)
+    status: Literal["registered", "rough", "refused"] = "rough" if wide else "registered"
     if doubt or (wide and not rough):
         status = "refused"
-    elif wide:
-        status = "rough"
-    plates = tuple(_plate(plate, forces, k, found) for k, plate in enumerate(forces.plates))
-    rests = f"It rests on {found.seconds:.1f} s of fully measured contact and {found.steps} steps on plates."
-    idle = [plate.name for plate in plates if not plate.loaded]
-    notes = (rests, *found.notes, *_kept_together(plates), *([f"Never stepped on: {', '.join(idle)}."] if idle else []))
-    return Registration(status, doubt or wide, found.pose, float(np.sqrt(found.covariance[3, 3])), plates, notes)
-
-
-def _kept_together(plates: tuple[PlacedPlate, ...]) -> tuple[str, ...]:
-    if len(plates) < 2:
-        return ()
-    return (f"The {len(plates)} plates keep the places relative to one another that their file gives.",)
+    plates = tuple(_placed(plate, bool(on), found) for plate, on in zip(forces.plates, forces.loaded, strict=True))
+    notes = [f"It rests on {found.seconds:.1f} s of fully measured contact and {found.steps} steps on plates."]
+    notes += found.notes
+    if len(plates) > 1:
+        notes.append(f"The {len(plates)} plates keep the places relative to one another that their file gives.")
+    if idle := [plate.name for plate in plates if not plate.loaded]:
+        notes.append(f"Never stepped on: {', '.join(idle)}.")
+    delay_sd = float(np.sqrt(found.covariance[3, 3]))
+    return Registration(status, doubt or wide, found.pose, delay_sd, plates, tuple(notes))
 
 
 def _doubt(best: Alignment, rivals: tuple[Alignment, ...], found: Refined) -> str:
@@ -285,7 +274,7 @@ def _too_wide(covariance: Array, limits: Limits) -> str:
     )
 
 
-def _plate(plate: Plate, forces: Forces, number: int, found: Refined) -> PlacedPlate:
+def _placed(plate: Plate, loaded: bool, found: Refined) -> PlacedPlate:
     """Return one plate in the room with the intervals at its own centre."""
     centre = found.pose.points(plate.centre)
     x, y = (centre - found.about)[:2]
@@ -293,7 +282,6 @@ def _plate(plate: Plate, forces: Forces, number: int, found: Refined) -> PlacedP
     flat = np.sqrt(np.diag(slope @ found.covariance @ slope.T))
     right = found.pose.points(plate.corners)
     axis = right[[0, 3]].mean(axis=0) - right[[1, 2]].mean(axis=0)
-    loaded = bool(forces.value[number, :, 2].max() > 50.0)
     sd = np.array([*flat, HEIGHT_SD])
     yaw_sd = float(np.sqrt(found.covariance[2, 2]))
     return PlacedPlate(plate.name, centre, sd, float(np.arctan2(axis[1], axis[0])), yaw_sd, loaded)

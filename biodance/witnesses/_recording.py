@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.lab.markers.sets import FAMILY
-from biodance.lab.weight import is_still
+from biodance.lab.markers.still import is_still
 from biodance.motion.contact.footing import inside
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE

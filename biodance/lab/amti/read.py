@@ -25,18 +25,18 @@ OWN_ZERO = 5.0  # N: an unloaded reading up to here is what the maker's own zero
 def amti_plate(
     number: int,
     channels: Array,
-    *,
-    rate: float,
     size: tuple[float, float],
     centre: Array,
     vector: Array,
+    *,
+    rate: float,
     said: tuple[str, ...],
 ) -> tuple[Plate, tuple[str, ...]]:
     """Return the plate with the ground's wrench on the subject, and warnings.
 
-    ``channels`` (S, 6) N, N·m: the load ON the plate in plate axes (z down) about the sensor origin; ``rate`` Hz;
-    ``size`` (x, y) m; ``centre`` (3,) m of its surface in the lab frame; ``vector`` (3,) m from the sensor origin to
-    the surface centre in plate axes.
+    ``channels`` (S, 6) N, N·m: the load ON the plate in plate axes (z down) about the sensor origin; ``size`` (x, y) m;
+    ``centre`` (3,) m of its surface in the lab frame; ``vector`` (3,) m from the sensor origin to the surface centre in
+    plate axes; ``rate`` Hz.
     """
     channels, zeroed = _zeroed(channels, rate)
     below, placed = sensor_below(vector, PLATE_UPRIGHT)
@@ -94,31 +94,16 @@ def read_bsf(path: str | Path, *, role: Role = "fit") -> Trial:
         if number > 1:
             centre = centre + PLATE_UPRIGHT @ plate.distance
             warnings.append(_placed(plate, number))
-        done, said = amti_plate(
-            number,
-            plate.load,
-            rate=bsf.rate,
-            size=plate.size,
-            centre=centre,
-            vector=plate.offset,
-            said=(_unit_said(bsf, plate),),
-        )
+        place, said = (plate.size, centre, plate.offset), (_unit_said(bsf, plate),)
+        done, odd = amti_plate(number, plate.load, *place, rate=bsf.rate, said=said)
         plates.append(done)
-        warnings += said
+        warnings += odd
     history = [f"AMTI NetForce file, version {bsf.version}, {bsf.rate:g} Hz."]
     if bsf.other_channels:
         history.append(f"{bsf.other_channels} channels of other instruments were not read.")
     source = Source(path, sha256(content), f"AMTI .bsf {bsf.version}", analog_rate=bsf.rate)
-    return Trial(
-        path.stem,
-        role,
-        None,
-        tuple(plates),
-        source,
-        measurements=_measurements(bsf.main),
-        history=tuple(history),
-        warnings=tuple(warnings),
-    )
+    told = (_measurements(bsf.main), tuple(history), tuple(warnings))
+    return Trial(path.stem, role, None, tuple(plates), source, "", *told)
 
 
 def read_amti_ascii(path: str | Path, *, role: Role = "fit") -> Trial:
@@ -137,9 +122,7 @@ def read_amti_ascii(path: str | Path, *, role: Role = "fit") -> Trial:
     text = parse_amti_text(path)
     load = text.load if text.load_on_plate else -text.load
     vector = np.array([0.0, 0.0, -text.sensor_depth])
-    plate, warnings = amti_plate(
-        1, load, rate=text.rate, size=text.size, centre=np.zeros(3), vector=vector, said=text.said
-    )
+    plate, warnings = amti_plate(1, load, text.size, np.zeros(3), vector, rate=text.rate, said=text.said)
     source = Source(path, sha256(read_bytes(path)), "AMTI text", analog_rate=text.rate)
     history = (f"AMTI text export, {text.rate:g} Hz.",)
     return Trial(path.stem, role, None, (plate,), source, history=history, warnings=warnings)

@@ -52,38 +52,23 @@ def parse_amti_text(path: Path) -> AmtiText:
         raise FileRefused(
             f"{beside}: columns must name the columns, such as {list(CHANNELS)}; it is {columns!r}. Correct it."
         )
-    force_unit = given.get("force_unit", units.get("Fz"))
-    moment_unit = given.get("moment_unit", units.get("Mz"))
-    rate = given.get("rate_hz", _rate(values, columns))
-    size = given.get("plate_size_m")
-    found = {
-        "columns": columns or None,
-        "force_unit": force_unit,
-        "moment_unit": moment_unit,
-        "rate_hz": rate,
-        "plate_size_m": size,
-    }
+    size, rate = given.get("plate_size_m"), given.get("rate_hz", _rate(values, columns))
+    force_unit, moment_unit = given.get("force_unit", units.get("Fz")), given.get("moment_unit", units.get("Mz"))
+    said_units = {"force_unit": force_unit, "moment_unit": moment_unit}
+    found = {"columns": columns or None, **said_units, "rate_hz": rate, "plate_size_m": size}
     lacking = [key for key, value in found.items() if value is None]
     if lacking:
-        raise FileRefused(
-            f"{path}: does not say {', '.join(lacking)}. Write the file {beside.name} beside it and correct what is "
-            f"not "
-            f"so:\n{_example(values, found)}"
-        )
+        todo = f"Write the file {beside.name} beside it and correct what is not so:\n{_example(values, found)}"
+        raise FileRefused(f"{path}: does not say {', '.join(lacking)}. {todo}")
     _refuse_nonsense(found, given, values, beside if given else path)
     order = [columns.index(channel) for channel in CHANNELS]
-    factor = np.array([FORCE[plain_unit(str(force_unit))]] * 3 + [MOMENT[plain_unit(str(moment_unit))]] * 3)
+    force, moment = plain_unit(str(force_unit)), plain_unit(str(moment_unit))
+    load, rate = values[:, order] * ([FORCE[force]] * 3 + [MOMENT[moment]] * 3), float(rate or 0)
     told = f"Columns, units and size as in {beside.name}: " if given else "Columns and units as in the header line: "
-    said = (f"{told}{', '.join(columns)}; {force_unit}, {moment_unit}; {float(rate or 0):g} Hz.",)
+    said = (f"{told}{', '.join(columns)}; {force_unit}, {moment_unit}; {rate:g} Hz.",)
     assert size is not None
-    return AmtiText(
-        load=values[:, order] * factor,
-        rate=float(rate or 0),
-        size=(float(size[0]), float(size[1])),
-        sensor_depth=float(given.get("sensor_depth_m", 0.0)),
-        load_on_plate=given.get("acts_on", "plate") == "plate",
-        said=said,
-    )
+    depth, on_plate = float(given.get("sensor_depth_m", 0.0)), given.get("acts_on", "plate") == "plate"
+    return AmtiText(load, rate, (float(size[0]), float(size[1])), depth, on_plate, said)
 
 
 def _table(text: str, path: Path) -> tuple[list[str], Array]:

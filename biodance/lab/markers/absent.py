@@ -2,8 +2,8 @@
 other side's, or the hindmost and foremost of the foot. What is found so is said.
 """
 
-from collections.abc import Iterable, Mapping
-from functools import partial
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,13 +14,10 @@ from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.standing import Standing
 from biodance.records import SIDES
 
-_NEEDS = (
-    ("asis", ()),
-    ("knee_lateral", ()),
-    ("ankle_lateral", ()),
-    ("heel", ()),
-    ("toe", ("toe_lateral", "toe_medial")),
-)
+_NEEDS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("asis", "knee_lateral", "ankle_lateral", "heel"), ()),
+    "toe": ("toe_lateral", "toe_medial"),
+}
 """Landmarks that a body needs on each side, and what stands in for them."""
 _USEFUL = ("knee_medial", "ankle_medial", "acromion")
 """Landmarks that a body can do without, and that posture tells as well."""
@@ -39,12 +36,7 @@ _BEHIND, _BEFORE = -0.012, 0.045
 def absent_landmarks(places: Iterable[str]) -> list[str]:
     """Return the landmarks, in words, that a body needs and that are not among ``places``."""
     have = set(places)
-    absent = [
-        f"{side} {part.replace('_', ' ')}"
-        for side in SIDES
-        for part, others in _NEEDS
-        if not have & {f"{side}_{one}" for one in (part, *others)}
-    ]
+    absent = [_words(place) for place in _needed(have)]
     if "mid_psis" not in have and not {"left_psis", "right_psis"} <= have:
         absent.append("the posterior iliac spines or the sacrum")
     return absent
@@ -54,75 +46,105 @@ def fill_absent(places: dict[str, str], stand: Standing, said: Mapping[str, tupl
     """Take markers without a landmark for those that a body needs and that no label names; return what was taken, in
     sentences. ``places`` landmark -> label is added to.
     """
-    taken = _by_mirror_image(places, stand, said) + _by_posture(places, stand, said)
-    sides = _said_sides(stand)
-    for place in _lacking(places):
-        side, _, part = place.partition("_")
-        own = [label for label in _free(place, places, stand, said) if sides.get(label) == side]
-        found = _end_of_foot(place, places.get(f"{side}_ankle_lateral"), own, stand)
-        if found is not None:
-            places[place] = found
-            which = "hind" if part == "heel" else "fore"
-            taken.append(f"{found} is the {which}most of its foot: taken for the {_words(place)}.")
-    return taken
+    filling = _Filling(places, stand, said, _said_sides(stand))
+    return [*filling.by_mirror_image(), *filling.by_posture(), *filling.by_ends_of_feet()]
 
 
-def _lacking(places: Mapping[str, str]) -> list[str]:
-    """Return the needed landmarks of both sides that nothing is taken for."""
-    lacking = {
+def _needed(have: Collection[str]) -> list[str]:
+    """Return the needed landmarks of both sides, but the posterior iliac spines, that are not there."""
+    return [
         f"{side}_{part}"
         for side in SIDES
-        for part, others in _NEEDS
-        if not {f"{side}_{one}" for one in (part, *others)} & places.keys()
-    }
-    if "mid_psis" not in places:
-        lacking |= {f"{side}_psis" for side in SIDES} - places.keys()
-    return sorted(lacking)
-
-
-def _by_mirror_image(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
-    """Take the markers at the mirror images of those that are known on the other side; return them in sentences."""
-    taken = []
-    for place in _lacking(places):
-        side, _, part = place.partition("_")
-        other = places.get(f"{'left' if side == 'right' else 'right'}_{part}")
-        found = _at_mirror_image(place, other, _free(place, places, stand, said), stand) if other else None
-        if found is not None:
-            places[place] = found
-            taken.append(f"{found} lies where the mirror image of {other} is: taken for the {_words(place)}.")
-    return taken
-
-
-def _by_posture(places: dict[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
-    """Take pairs of markers for what nobody named, where no other markers of a standing person can be it: of those
-    whose labels say nothing, then of those that say no more than a segment; return what was taken, in sentences.
-    """
-    before = dict(places)
-    for mute in (True, False):
-        free = partial(_free_on_sides, places, stand, said, mute)
-        for joint in ("knee", "ankle"):
-            if not _have(places, f"{joint}_lateral", f"{joint}_medial"):
-                places.update(joint_by_posture(joint, free(f"{joint}_lateral"), places, stand))
-        for part in (*(part for part, _ in _NEEDS if part != "toe"), "psis", *(_USEFUL if mute else ())):
-            outer = part.replace("_medial", "_lateral")
-            if (part != "psis" or "mid_psis" not in places) and (outer == part or _have(places, outer)):
-                places.update(taken_by_posture(part, free(part), places, stand))
-        if not _have(places, "psis") and "mid_psis" not in places:
-            middle = middle_by_posture("mid_psis", _free("mid_psis", places, stand, said, mute=mute), places, stand)
-            places.update({"mid_psis": middle} if middle else {})
-        if not _have(places, "toe", "toe_lateral", "toe_medial"):
-            places.update(toes_by_posture(free("toe"), places, stand))
-    return [
-        f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
-        for place, label in places.items()
-        if place not in before
+        for part, others in _NEEDS.items()
+        if not any(f"{side}_{one}" in have for one in (part, *others))
     ]
 
 
-def _free_on_sides(
-    places: Mapping[str, str], stand: Standing, said: Mapping[str, tuple[Meaning, ...]], mute: bool, part: str
-) -> dict[str, list[str]]:
-    return {side: _free(f"{side}_{part}", places, stand, said, mute=mute) for side in SIDES}
+@dataclass(frozen=True, eq=False)
+class _Filling:
+    """A map that is being completed: ``places`` landmark -> label, added to; the standing person; what every label may
+    mean, and which side it says.
+    """
+
+    places: dict[str, str]
+    stand: Standing
+    said: Mapping[str, tuple[Meaning, ...]]
+    sides: Mapping[str, str]
+
+    def by_mirror_image(self) -> list[str]:
+        """Take the markers at the mirror images of those that are known on the other side."""
+        taken = []
+        for place in self._lacking():
+            side, _, part = place.partition("_")
+            other = self.places.get(f"{'left' if side == 'right' else 'right'}_{part}")
+            found = _at_mirror_image(place, other, self._free(place), self.stand) if other else None
+            if found is not None:
+                self.places[place] = found
+                taken.append(f"{found} lies where the mirror image of {other} is: taken for the {_words(place)}.")
+        return taken
+
+    def by_posture(self) -> list[str]:
+        """Take pairs of markers for what nobody named, where no other markers of a standing person can be it: of those
+        whose labels say nothing, then of those that say no more than a segment.
+        """
+        before = dict(self.places)
+        for mute in (True, False):
+            self._take_by_posture(mute)
+        return [
+            f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
+            for place, label in self.places.items()
+            if place not in before
+        ]
+
+    def _take_by_posture(self, mute: bool) -> None:
+        def free(part: str) -> dict[str, list[str]]:
+            return {side: self._free(f"{side}_{part}", mute=mute) for side in SIDES}
+
+        places, stand = self.places, self.stand
+        for joint in ("knee", "ankle"):
+            if not self._have(f"{joint}_lateral", f"{joint}_medial"):
+                places.update(joint_by_posture(joint, free(f"{joint}_lateral"), places, stand))
+        for part in (*(part for part in _NEEDS if part != "toe"), "psis", *(_USEFUL if mute else ())):
+            outer = part.replace("_medial", "_lateral")
+            if (part != "psis" or "mid_psis" not in places) and (outer == part or self._have(outer)):
+                places.update(taken_by_posture(part, free(part), places, stand))
+        if not self._have("psis") and "mid_psis" not in places:
+            middle = middle_by_posture("mid_psis", self._free("mid_psis", mute=mute), places, stand)
+            places.update({"mid_psis": middle} if middle else {})
+        if not self._have("toe", *_NEEDS["toe"]):
+            places.update(toes_by_posture(free("toe"), places, stand))
+
+    def by_ends_of_feet(self) -> list[str]:
+        """Take the hindmost and the foremost marker of a foot for its heel and its toe."""
+        taken = []
+        for place in self._lacking():
+            side = place.partition("_")[0]
+            own = [label for label in self._free(place) if self.sides.get(label) == side]
+            found = _end_of_foot(place, self.places.get(f"{side}_ankle_lateral"), own, self.stand)
+            if found is not None:
+                self.places[place] = found
+                which = "hind" if place.endswith("heel") else "fore"
+                taken.append(f"{found} is the {which}most of its foot: taken for the {_words(place)}.")
+        return taken
+
+    def _lacking(self) -> list[str]:
+        """Return the needed landmarks of both sides that nothing is taken for."""
+        spines = {f"{side}_psis" for side in SIDES} if "mid_psis" not in self.places else set()
+        return sorted({*_needed(self.places), *spines - self.places.keys()})
+
+    def _have(self, *parts: str) -> bool:
+        return any(f"{side}_{part}" in self.places for side in SIDES for part in parts)
+
+    def _free(self, place: str, *, mute: bool = False) -> list[str]:
+        """Return the labels without a landmark that say nothing (``mute``), or nothing else than this place; none that
+        says the other side.
+        """
+        side, taken = place.partition("_")[0], set(self.places.values())
+        own = [label for label in plain_labels(self.stand.at) if label not in taken]
+        own = [label for label in own if side not in SIDES or self.sides.get(label, side) == side]
+        return [
+            label for label in own if (not self.said.get(label) if mute else _may_be(place, self.said.get(label, ())))
+        ]
 
 
 def _said_sides(stand: Standing) -> dict[str, str]:
@@ -130,35 +152,8 @@ def _said_sides(stand: Standing) -> dict[str, str]:
     lie on the other side.
     """
     sides = sides_of(stand.at)
-    right = [
-        bool((stand.at[label] - stand.middle) @ stand.right > 0) == (side == SIDES[0]) for label, side in sides.items()
-    ]
+    right = [bool((stand.at[label] - stand.middle) @ stand.right > 0) == (sides[label] == SIDES[0]) for label in sides]
     return sides if right and np.mean(right) > _TRUE else {}
-
-
-def _have(places: Mapping[str, str], *parts: str) -> bool:
-    return any(f"{side}_{part}" in places for side in SIDES for part in parts)
-
-
-def _free(
-    place: str,
-    places: Mapping[str, str],
-    stand: Standing,
-    said: Mapping[str, tuple[Meaning, ...]],
-    *,
-    mute: bool = False,
-) -> list[str]:
-    """Return the labels without a landmark that say nothing (``mute``), or nothing else than this place; none that says
-    the other side.
-    """
-    side, sides = place.partition("_")[0], _said_sides(stand)
-    return [
-        label
-        for label in plain_labels(stand.at)
-        if label not in places.values()
-        and (side not in SIDES or sides.get(label, side) == side)
-        and (not said.get(label) if mute else _may_be(place, said.get(label, ())))
-    ]
 
 
 def _words(place: str) -> str:
@@ -190,14 +185,13 @@ def _end_of_foot(place: str, ankle: str | None, own: Iterable[str], stand: Stand
     """
     if ankle is None or not place.endswith(("heel", "toe")):
         return None
-    way = {label: (stand.at[label] - stand.at[ankle]) / stand.stature for label in own}
-    ahead = {
-        label: float(step @ stand.ahead)
-        for label, step in way.items()
-        if np.linalg.norm(step) < _LENGTH and step[2] < 0 and stand.believed(place, label)
-    }
+    ahead = {}
+    for label in own:
+        step = (stand.at[label] - stand.at[ankle]) / stand.stature
+        if np.linalg.norm(step) < _LENGTH and step[2] < 0 and stand.believed(place, label):
+            ahead[label] = float(step @ stand.ahead)
     if place.endswith("heel"):
-        found = min(ahead, key=lambda label: ahead[label], default=None)
+        found = min(ahead, key=ahead.__getitem__, default=None)
         return found if found is not None and ahead[found] < _BEHIND else None
-    found = max(ahead, key=lambda label: ahead[label], default=None)
+    found = max(ahead, key=ahead.__getitem__, default=None)
     return found if found is not None and ahead[found] > _BEFORE else None

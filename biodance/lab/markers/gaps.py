@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.records import Array, Markers, runs
+from biodance.records import Array, Markers, longest_run, runs
 from biodance.spatial import rigid_fit
 
 FLANK = 6
@@ -23,6 +23,8 @@ _CARRIERS = 5
 """At most so many neighbours carry a marker across a gap; at least three are needed."""
 RIGID = 0.01
 """m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
+_OFF_LINE = 0.01
+"""m: so far from one line the neighbours must lie to fix a rotation."""
 CLOSURE = 0.02
 """m: the neighbours must predict the marker across the gap to this, or it is left unseen."""
 
@@ -52,15 +54,12 @@ class Gap:
 
 def report_gaps(markers: Markers) -> tuple[MarkerGaps, ...]:
     """Return percentage and longest gap of every marker, in the order of ``markers``."""
-    return tuple(
-        MarkerGaps(
-            label,
-            100.0 * float(np.mean(hidden)) if hidden.size else 0.0,
-            max((stop - start for start, stop in runs(hidden)), default=0)
-            * (1 / markers.rate if markers.time.size > 1 else 0.0),
-        )
-        for label, hidden in zip(markers.names, ~markers.seen.T, strict=True)
-    )
+    step = 1 / markers.rate if markers.time.size > 1 else 0.0
+    found = []
+    for label, hidden in zip(markers.names, ~markers.seen.T, strict=True):
+        start, stop = longest_run(hidden)
+        found.append(MarkerGaps(label, 100.0 * float(np.mean(hidden)) if hidden.size else 0.0, (stop - start) * step))
+    return tuple(found)
 
 
 def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0.2) -> tuple[Markers, tuple[Gap, ...]]:
@@ -78,11 +77,8 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
     later: list[Gap] = []
     for column, (label, found) in enumerate(hidden.items()):
         for start, stop in found:
-            bridge = (
-                _bridge(markers.time, markers.xyz[:, column], start, stop)
-                if (stop - start) <= short * markers.rate + 1e-9
-                else None
-            )
+            is_short = stop - start <= short * markers.rate + 1e-9
+            bridge = _bridge(markers.time, markers.xyz[:, column], start, stop) if is_short else None
             if bridge is None:
                 later.append(Gap(label, start, stop))
             else:
@@ -107,9 +103,8 @@ def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:
     ends = []
     for side, edge in ((before, start - 1), (after, stop)):
         offset = time[side] - time[edge]
-        place, slope, _ = np.linalg.lstsq(np.stack([np.ones(FLANK), offset, offset**2], axis=1), xyz[side], rcond=None)[
-            0
-        ]
+        powers = np.stack([np.ones(FLANK), offset, offset**2], axis=1)
+        place, slope, _ = np.linalg.lstsq(powers, xyz[side], rcond=None)[0]
         ends.append((time[edge], place, slope))
     knots, places, slopes = zip(*ends, strict=True)
     return CubicHermiteSpline(knots, places, slopes)(time[start:stop])
@@ -130,10 +125,8 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
     forward, backward = (turn @ point + place for (turn, place), point in ways)
     closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
     if closure > CLOSURE:
-        return (
-            None,
-            f"left unseen: {', '.join(carriers)} predict it with an error of {1000 * closure:.0f} mm across the gap",
-        )
+        error = f"with an error of {1000 * closure:.0f} mm across the gap"
+        return None, f"left unseen: {', '.join(carriers)} predict it {error}"
     part = np.linspace(0.0, 1.0, len(own))[:, None]
     blend = (1 - part) * forward + part * backward
     return blend[1:-1], f"filled from {', '.join(carriers)} ({1000 * closure:.0f} mm off across the gap)"
@@ -151,13 +144,8 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
             distance = np.linalg.norm(markers[label] - own, axis=1)
             spread[label] = float(np.nanstd(distance))
     rigid = sorted((label for label, value in spread.items() if value < RIGID), key=spread.__getitem__)[:_CARRIERS]
-    return (
-        rigid
-        if len(rigid) >= 3 and _spans_a_plane(np.stack([markers[label][gap.start - 1] for label in rigid]))
-        else []
-    )
-
-
-def _spans_a_plane(points: Array) -> bool:
-    """Return whether points (K, 3) m are far enough from one line (10 mm) to fix a rotation."""
-    return float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1]) > 0.01
+    if len(rigid) < 3:
+        return []
+    points = np.stack([markers[label][gap.start - 1] for label in rigid])
+    from_a_line = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1]
+    return rigid if from_a_line > _OFF_LINE else []

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.lab.markers.absent import absent_landmarks, fill_absent
-from biodance.lab.markers.keypoints import FROM_VIDEO, joints_from_video
-from biodance.lab.markers.names import Meaning, meanings_of, sides_exchanged
+from biodance.lab.markers.names import Meaning, joints_from_video, meanings_of, sides_exchanged
 from biodance.lab.markers.person import mirror_images, person_of
 from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.spelling import plain_labels, side_words
 from biodance.lab.markers.standing import Standing, standing_person
-from biodance.lab.markers.still import posture_frames
+from biodance.lab.markers.still import median_places, posture_frames
 from biodance.records import SIDES, Array, Markers
 
 _BELIEVED = 0.85
@@ -38,6 +37,11 @@ _LEVEL = 0.5
 """Share of that width by which its two markers may differ in height and fore and aft."""
 _APART = 0.005
 """m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
+_FROM_VIDEO = (
+    "These labels are joints, as software estimates them from video, not markers on the skin: {named}. A body is "
+    "placed by markers on both iliac spines, at the side of knees and ankles, on heels and toes. Give positions of "
+    "markers, for example the augmented markers (.trc) of the same software."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +60,10 @@ def guess_set(markers: Markers) -> GuessedSet:
 
     Geometry needs z up; for a recording without anybody upright nothing is believed.
     """
-    at = _posture(markers)
+    at = median_places(markers, posture_frames(markers)[0])
     found = _guessed(at)
     joints = () if found.name else joints_from_video(at)
-    return replace(found, doubts=(FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
+    return replace(found, doubts=(_FROM_VIDEO.format(named=", ".join(joints)), *found.doubts)) if joints else found
 
 
 def _guessed(at: Mapping[str, Array]) -> GuessedSet:
@@ -114,60 +118,47 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
     map_ = _map(places, confirmed)
     reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
     if believed < _BELIEVED * total:
-        wrong = ", ".join(label for label in usual if not confirmed[label])
         reasons.append(
             f"Only {believed} of {total} landmarks that the labels name stand where a person has them; elsewhere: "
-            f"{wrong}."
+            f"{', '.join(label for label in usual if not confirmed[label])}."
         )
     if reasons:
         return GuessedSet(map_, (" ".join(reasons), *doubts))
-    return GuessedSet(map_, tuple(doubts), guessed_name(map_))
-
-
-def guessed_name(map_: Mapping[str, str]) -> str:
-    """Return the name under which `read_marker_set` finds a guessed map: the map itself."""
-    return GUESSED + json.dumps(dict(map_), separators=(",", ":"))
-
-
-def _posture(markers: Markers) -> dict[str, Array]:
-    """Return label -> (3,) m in the posture that geometry is judged by."""
-    chosen, _ = posture_frames(markers)
-    near = markers.xyz[chosen]
-    seen = np.asarray(np.isfinite(near).all(axis=2))
-    return {name: np.median(near[seen[:, k], k], axis=0) for k, name in enumerate(markers.names) if seen[:, k].any()}
+    return GuessedSet(map_, tuple(doubts), GUESSED + json.dumps(map_, separators=(",", ":")))
 
 
 def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, str], float]) -> dict[str, str]:
     """Return landmark -> label: of several labels for one landmark the one that is called and placed most usually, the
     others take what else they may mean.
     """
-    wishes = sorted(
-        (
-            (one.rank + _WEIGHT * max(misfit(one.place, label) - _AS_USUAL, 0.0), one.place, label)
-            for label, ways in said.items()
-            for one in ways
-        ),
-        key=lambda wish: (wish[0], wish[2]),
-    )
+    wishes = [
+        (one.rank + _WEIGHT * max(misfit(one.place, label) - _AS_USUAL, 0.0), label, one.place)
+        for label, ways in said.items()
+        for one in ways
+        if one.place in LANDMARKS
+    ]
     places: dict[str, str] = {}
-    used: set[str] = set()
-    for _, place, label in wishes:
-        free = place in LANDMARKS and place not in places
-        if free and label not in used:
+    for _, label, place in sorted(wishes, key=lambda wish: wish[:2]):
+        if place not in places and label not in places.values():
             places[place] = label
-            used.add(label)
     return places
+
+
+def _ends(joint: str) -> dict[str, tuple[str, str]]:
+    """Return side -> lateral and medial landmark of a joint."""
+    return {side: (f"{side}_{joint}_lateral", f"{side}_{joint}_medial") for side in SIDES}
 
 
 def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, tuple[Meaning, ...]]) -> None:
     """Of several labels for one end of a joint take the marker at that end: Knee half way between KneeLat and KneeMed
     is its middle, not its lateral marker; two that are called medial are the outer and the inner one.
     """
-    for side in SIDES:
-        out = stand.right if side == "right" else -stand.right
-        for joint in ("knee", "ankle", "elbow"):
-            lateral, medial = f"{side}_{joint}_lateral", f"{side}_{joint}_medial"
-            outer, inner = (_called(place, confirmed) for place in (lateral, medial))
+    for joint in ("knee", "ankle", "elbow"):
+        for side, (lateral, medial) in _ends(joint).items():
+            outer, inner = (
+                [label for label, said in confirmed.items() if said and said[0].place == place]
+                for place in (lateral, medial)
+            )
             if lateral in places and medial in places:
                 now, inside = stand.at[places[lateral]], stand.at[places[medial]]
                 for label in outer:
@@ -175,7 +166,7 @@ def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, 
                     if np.linalg.norm(now - inside - across / 2) < _HALFWAY * np.linalg.norm(across):
                         places[lateral] = label
             elif lateral not in places and len(inner) > 1 and places.get(medial) in inner:
-                outward = [float(stand.at[label] @ out) for label in inner]
+                outward = [float(stand.at[label] @ stand.outwards(side)) for label in inner]
                 places[medial], places[lateral] = inner[int(np.argmin(outward))], inner[int(np.argmax(outward))]
 
 
@@ -184,12 +175,11 @@ def _take_outer(places: dict[str, str], stand: Standing, doubts: list[str]) -> N
     the joint from it, outside: a body has nothing there but its lateral marker.
     """
     for joint in ("knee", "ankle"):
-        ends = {side: (f"{side}_{joint}_lateral", f"{side}_{joint}_medial") for side in SIDES}
-        alone = {side: [places[end] for end in both if end in places] for side, both in ends.items()}
+        alone = {side: [places[end] for end in both if end in places] for side, both in _ends(joint).items()}
         outer = {side: _across(one[0], side, places, stand) if len(one) == 1 else [] for side, one in alone.items()}
         if any(len(found) != 1 for found in outer.values()):
             continue
-        for side, (lateral, medial) in ends.items():
+        for side, (lateral, medial) in _ends(joint).items():
             (places[lateral],), (places[medial],) = outer[side], alone[side]
             doubts.append(
                 f"{places[lateral]} lies across the {side} {joint} from {places[medial]}, outside: it was taken for "
@@ -199,20 +189,15 @@ def _take_outer(places: dict[str, str], stand: Standing, doubts: list[str]) -> N
 
 def _across(label: str, side: str, places: Mapping[str, str], stand: Standing) -> list[str]:
     """Return the labels without a landmark that lie a joint's width outside a marker, as high as it."""
-    out = stand.right if side == "right" else -stand.right
-    apart = {other: at - stand.at[label] for other, at in stand.at.items() if other not in places.values()}
-    narrowest, widest = _JOINT_WIDTH
-    return [
-        other
-        for other, way in apart.items()
-        if narrowest * stand.stature < way @ out < widest * stand.stature
-        and np.linalg.norm(way - (way @ out) * out) < _LEVEL * (way @ out)
-    ]
-
-
-def _called(place: str, confirmed: Mapping[str, tuple[Meaning, ...]]) -> list[str]:
-    """Return the labels that say a landmark by a common word."""
-    return [label for label, said in confirmed.items() if said and said[0].place == place]
+    out, (narrowest, widest) = stand.outwards(side), _JOINT_WIDTH
+    found = []
+    for other in (other for other in stand.at if other not in places.values()):
+        way = stand.at[other] - stand.at[label]
+        wide = way @ out
+        level = np.linalg.norm(way - wide * out) < _LEVEL * wide
+        if level and narrowest * stand.stature < wide < widest * stand.stature:
+            found.append(other)
+    return found
 
 
 def _medial_alone(places: dict[str, str]) -> list[str]:
@@ -221,9 +206,9 @@ def _medial_alone(places: dict[str, str]) -> list[str]:
     """
     said = []
     for joint in ("knee", "ankle"):
-        ends = [(f"{side}_{joint}_medial", f"{side}_{joint}_lateral") for side in SIDES]
-        if all(medial in places and lateral not in places for medial, lateral in ends):
-            for medial, lateral in ends:
+        ends = _ends(joint).values()
+        if all(medial in places and lateral not in places for lateral, medial in ends):
+            for lateral, medial in ends:
                 places[lateral] = places.pop(medial)
                 words = lateral.replace("_", " ")
                 said.append(f"{places[lateral]} is the only marker there: taken for the {words}, against its name.")
@@ -231,13 +216,12 @@ def _medial_alone(places: dict[str, str]) -> list[str]:
 
 
 def _sort_pairs(places: dict[str, str], stand: Standing, doubts: list[str]) -> None:
-    """Drop both markers of a medial and lateral pair that lie the other way round: the names mean something else."""
+    """Exchange the markers of a medial and lateral pair that lie the other way round, against their names."""
     for side in SIDES:
-        out = stand.right if side == "right" else -stand.right
         for joint in ("knee", "ankle", "toe"):
-            lateral, medial = f"{side}_{joint}_lateral", f"{side}_{joint}_medial"
+            lateral, medial = _ends(joint)[side]
             if lateral in places and medial in places:
-                apart = (stand.at[places[lateral]] - stand.at[places[medial]]) @ out
+                apart = (stand.at[places[lateral]] - stand.at[places[medial]]) @ stand.outwards(side)
                 if apart < -_APART:
                     places[lateral], places[medial] = places[medial], places[lateral]
                     doubts.append(

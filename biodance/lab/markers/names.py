@@ -9,20 +9,26 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations, product
+from typing import TypeVar
 
 from biodance.lab.markers.set_file import LANDMARKS
-from biodance.lab.markers.spelling import Spelled, readings, readings_of
+from biodance.lab.markers.spelling import Spelled, plain_labels, readings, readings_of
 from biodance.library import locate, read_toml
+from biodance.records import SIDES
 
 _MIDLINE = frozenset(name for name in LANDMARKS if not name.startswith(("right_", "left_")))
 _WHOLE = {"head_front", "head_back"}
 """Landmarks of the midline that are the mean of a right and a left marker."""
-
-
+_JOINTS = ("hip", "knee", "ankle")
+"""Joints whose bare names stand on both sides in every skeleton of video: HALPE, COCO, OpenPose, BlazePose."""
+_SKIN = ("asis", "psis", "knee_medial", "ankle_medial")
+"""Ends of landmarks that only a marker has: a trochanter may be called hip beside them."""
 _PARTS = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
 """A number, as an ordinal or not, or a word, within a token."""
 _WAYS = 24
 """Ways to cut the tokens of a label into words, beyond which the label says nothing."""
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -48,37 +54,38 @@ class _Vocabulary:
 @cache
 def _vocabulary() -> _Vocabulary:
     table = read_toml(locate("anthropometry", "marker_names"))
-    spelled: dict[str, list[tuple[str, int]]] = {}
-    for landmark, spellings in table["landmarks"].items():
-        for rank, spelling in enumerate(spellings):
-            spelled.setdefault(spelling, []).append((landmark, rank))
-    segments = {word: segment for segment, words in table["segments"].items() for word in words}
-    pairs = tuple((right, left) for right, left in table["sides"]["pairs"])
-    landmarks = {word: tuple(found) for word, found in spelled.items()}
-    single: dict[str, tuple[str, ...]] = {}
-    for kind, spellings in (table["regions"] | table["qualities"]).items():
-        for word in spellings:
-            single[word] = (*single.get(word, ()), kind)
-    composed: dict[frozenset[str], tuple[str, ...]] = {}
-    for landmark, several in table["composed"].items():
-        for way in several:
-            composed[frozenset(way.split())] = (*composed.get(frozenset(way.split()), ()), landmark)
-    return _Vocabulary(pairs, frozenset(table["noise"]["words"]), landmarks, segments, single, composed)
+    kinds = table["regions"] | table["qualities"]
+    return _Vocabulary(
+        pairs=tuple((right, left) for right, left in table["sides"]["pairs"]),
+        noise=frozenset(table["noise"]["words"]),
+        landmarks=_gathered(
+            (word, (mark, rank)) for mark, some in table["landmarks"].items() for rank, word in enumerate(some)
+        ),
+        segments={word: segment for segment, some in table["segments"].items() for word in some},
+        words=_gathered((word, kind) for kind, some in kinds.items() for word in some),
+        composed=_gathered((frozenset(way.split()), mark) for mark, some in table["composed"].items() for way in some),
+    )
+
+
+def _gathered(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, tuple[_Value, ...]]:
+    """Return every key with all that stands beside it, in order."""
+    found: dict[_Key, tuple[_Value, ...]] = {}
+    for key, value in pairs:
+        found[key] = (*found.get(key, ()), value)
+    return found
 
 
 def meanings(label: str) -> tuple[Meaning, ...]:
     """Return what a label may mean, the most usual first; nothing where no spelling is known."""
     words = _vocabulary()
-    return _of(words, readings(label, words.pairs, words.noise))
+    return _meanings(readings(label, words.pairs, words.noise))
 
 
 def meanings_of(labels: Iterable[str], *, sides: Iterable[tuple[str, str]] = ()) -> dict[str, tuple[Meaning, ...]]:
     """Return label -> what it may mean, the most usual first, read as the whole set of labels is written; labels that
     mean nothing are left out. ``sides`` are words (right, left) that this set uses, beside those that are known.
     """
-    words = _vocabulary()
-    every = readings_of(labels, (*dict.fromkeys((*sides, *words.pairs)),), words.noise)
-    return {label: found for label, ways in every.items() if (found := _of(words, ways))}
+    return {label: found for label, ways in _read(labels, sides).items() if (found := _meanings(ways))}
 
 
 def sides_exchanged(sides: Iterable[tuple[str, str]]) -> bool:
@@ -88,41 +95,51 @@ def sides_exchanged(sides: Iterable[tuple[str, str]]) -> bool:
 
 def sides_of(labels: Iterable[str]) -> dict[str, str]:
     """Return label -> "right" or "left", for the labels that say one as the whole set of labels is written."""
-    words = _vocabulary()
-    every = readings_of(labels, words.pairs, words.noise)
-    sides = {label: {one.side for one in ways if one.side} for label, ways in every.items()}
+    sides = {label: {one.side for one in ways if one.side} for label, ways in _read(labels).items()}
     return {label: next(iter(found)) for label, found in sides.items() if len(found) == 1}
 
 
-def sided_words(labels: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return label -> its side and all else that it says, in one word ("right", "knee"), for the labels that say a side
-    as the whole set of labels is written.
+def joints_from_video(labels: Iterable[str]) -> tuple[str, ...]:
+    """Return the labels, without the subject's name, that name hips, knees and ankles by the bare name of the joint on
+    both sides, as software that estimates joints from video does; none where any of the six is missing, or where others
+    name a spine of the pelvis or a medial side.
     """
+    labels = tuple(labels)
+    if any(one.place.endswith(_SKIN) for ways in meanings_of(labels).values() for one in ways[:1]):
+        return ()
+    said = {label: (one.side, "".join(one.rest)) for label, ways in _read(labels).items() for one in ways if one.side}
+    plain, by_word = plain_labels(labels), {word: label for label, word in said.items()}
+    wanted = [(side, joint) for joint in _JOINTS for side in SIDES]
+    return tuple(plain[by_word[one]] for one in wanted) if by_word.keys() >= set(wanted) else ()
+
+
+def _read(labels: Iterable[str], sides: Iterable[tuple[str, str]] = ()) -> dict[str, tuple[Spelled, ...]]:
+    """Return label -> its readings as the whole set of labels is written."""
     words = _vocabulary()
-    every = readings_of(labels, words.pairs, words.noise)
-    return {label: (one.side, "".join(one.rest)) for label, ways in every.items() for one in ways if one.side}
+    return readings_of(labels, tuple(dict.fromkeys((*sides, *words.pairs))), words.noise)
 
 
-def _of(words: _Vocabulary, ways: Iterable[Spelled]) -> tuple[Meaning, ...]:
+def _meanings(ways: Iterable[Spelled]) -> tuple[Meaning, ...]:
     found: dict[str, int] = {}
     for way in ways:
-        for place, rank in _places(words, way.rest, way.side):
+        for place, rank in _places(way.rest, way.side):
             found[place] = min(found.get(place, 10**6), rank + way.cost)
     return tuple(sorted((Meaning(place, rank) for place, rank in found.items()), key=lambda one: one.rank))
 
 
-def _places(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
+def _places(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
     """Return the places of one reading: a landmark whose spelling the tokens make in some order, else a segment; a
     number behind a name may count its markers.
     """
-    found = _spelled(words, rest, side)
+    found = _spelled(rest, side)
     stem = (*rest[:-1], rest[-1].rstrip("0123456789"))
     if not found and stem != rest and any(stem):
-        found = [(place, rank + 70) for place, rank in _spelled(words, tuple(filter(None, stem)), side)]
+        found = [(place, rank + 70) for place, rank in _spelled(tuple(filter(None, stem)), side)]
     return found
 
 
-def _spelled(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
+def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
+    words = _vocabulary()
     joined = ["".join(order) for order in permutations(rest)] if len(rest) <= 3 else ["".join(rest)]
     found = []
     for spelling in joined:
@@ -142,32 +159,33 @@ def _spelled(words: _Vocabulary, rest: tuple[str, ...], side: str) -> list[tuple
     if part and side and not found:
         found.append((part if part in ("pelvis", "trunk_head") else f"{side}_{part}", 600))
     if side and not named:
-        found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(words, rest)]
+        found += [(f"{side}_{landmark}", rank) for landmark, rank in _composed(rest)]
     return found
 
 
-def _composed(words: _Vocabulary, rest: tuple[str, ...]) -> list[tuple[str, int]]:
+def _composed(rest: tuple[str, ...]) -> list[tuple[str, int]]:
     """Return landmark and rank for tokens that name a region and a quality of it, whole or in short: KneeLat, lat_kn,
     EpiFemInt. Words that say nothing may stand among them, but no remainder within a token.
     """
-    parted = [part for token in rest for part in ([token] if token in words.words else _PARTS.findall(token))]
-    known = [part for part in parted if part in words.words or part not in words.segments]  # a word is not cut
-    cuts = [cut for token in known if (cut := _cuts(words.words, token))]
+    words, kinds_of = _vocabulary(), _vocabulary().words
+    parted = [part for token in rest for part in ([token] if token in kinds_of else _PARTS.findall(token))]
+    known = [part for part in parted if part in kinds_of or part not in words.segments]  # a word is not cut
+    cuts = [cut for token in known if (cut := _cuts(token))]
     found = []
     for way in product(*cuts) if cuts and sum(map(len, cuts)) <= _WAYS else ():
         parts = [part for cut in way for part in cut]
         if sum(map(len, parts)) < 2:
             continue
-        for kinds in product(*(words.words[part] for part in parts)):
+        for kinds in product(*(kinds_of[part] for part in parts)):
             short = sum(len(part) < 3 for part in parts)
             for landmark in words.composed.get(frozenset(kinds), ()):
                 found.append((landmark, 100 + 30 * short + 10 * (len(parted) - len(cuts))))
     return found
 
 
-def _cuts(known: Mapping[str, tuple[str, ...]], token: str) -> list[tuple[str, ...]]:
+def _cuts(token: str) -> list[tuple[str, ...]]:
     """Return the ways to cut a token into known words."""
     if not token:
         return [()]
-    ends = [end for end in range(1, len(token) + 1) if token[:end] in known]
-    return [(token[:end], *rest) for end in ends for rest in _cuts(known, token[end:])]
+    ends = [end for end in range(1, len(token) + 1) if token[:end] in _vocabulary().words]
+    return [(token[:end], *rest) for end in ends for rest in _cuts(token[end:])]

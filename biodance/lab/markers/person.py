@@ -8,25 +8,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from biodance.lab.markers.standing import Standing
+from biodance.lab.markers.standing import OUTWARDS, Standing, usual_standing
 from biodance.records import Array
 
-USUAL_PLACES = {
-    "asis": ((0.073, 0.078, 0.553), (0.015, 0.028, 0.024)),
-    "psis": ((0.030, -0.020, 0.585), (0.012, 0.028, 0.028)),
-    "mid_psis": ((0.0, -0.020, 0.585), (0.010, 0.028, 0.028)),
-    "knee_lateral": ((0.096, 0.035, 0.283), (0.018, 0.035, 0.018)),
-    "knee_medial": ((0.032, 0.035, 0.281), (0.016, 0.035, 0.018)),
-    "ankle_lateral": ((0.098, 0.0, 0.042), (0.022, 0.018, 0.009)),
-    "ankle_medial": ((0.054, 0.017, 0.049), (0.020, 0.012, 0.008)),
-    "heel": ((0.070, -0.030, 0.016), (0.024, 0.012, 0.010)),
-    "toe": ((0.090, 0.084, 0.022), (0.030, 0.014, 0.010)),
-    "acromion": ((0.098, 0.023, 0.820), (0.018, 0.022, 0.018)),
-    "c7": ((0.0, 0.0, 0.836), (0.010, 0.022, 0.020)),
-}
-"""Where a standing person has a landmark, and how much people and laboratories differ (standard deviation): out from
-the middle of the body, ahead of the ankles, up from the floor; shares of the stature. Static trials of nine persons.
-"""
 _NEEDED = ("asis", "knee_lateral", "ankle_lateral", "heel", "toe")
 NEAR = 9.0
 """Squared distance, in standard deviations of the three axes, within which a marker may be a landmark."""
@@ -57,11 +41,11 @@ def person_of(at: Mapping[str, Array]) -> Standing | None:
     if plane is None:
         return None
     axis, offset = plane
-    ways = [fit for sign in (1.0, -1.0) if (fit := _fitted(at, xyz, sign * axis, sign * offset)) is not None]
-    ways.sort(key=lambda fit: fit[0])
-    if not ways or (len(ways) > 1 and ways[1][0] - ways[0][0] < _WAYS):
+    fits = [fit for sign in (1.0, -1.0) if (fit := _fitted(at, xyz, sign * axis, sign * offset)) is not None]
+    fits.sort(key=lambda fit: fit[0])
+    if not fits or (len(fits) > 1 and fits[1][0] - fits[0][0] < _WAYS):
         return None
-    return ways[0][1]
+    return fits[0][1]
 
 
 def mirror_images(stand: Standing) -> list[tuple[str, str]]:
@@ -89,13 +73,14 @@ def from_the_middle(labels: Iterable[str], stand: Standing) -> Array:
     return np.stack([(xyz - stand.middle) @ stand.right, xyz @ stand.ahead, xyz[:, 2]], axis=1)
 
 
-def from_usual(points: Array, part: str, sign: float, stand: Standing, origin: float | Array) -> Array:
-    """Return (N,) how far every point is from the usual place of a landmark, in squared standard deviations; ``sign``
-    -1 for the left one, ``origin`` m where the ankles are along the person's ahead ((O, 1): for each of them, (O, N)).
+def from_usual(points: Array, place: str, stand: Standing, origin: float | Array) -> Array:
+    """Return (N,) how far every point is from the usual place of a landmark, in squared standard deviations; ``origin``
+    m where the ankles are along the person's ahead ((O, 1): for each of them, (O, N)).
     """
-    place, spread = USUAL_PLACES[part]
-    here = (sign * points[:, 0], points[:, 1] - origin, points[:, 2] - stand.floor)
-    steps = [(one / stand.stature - usual) / by for one, usual, by in zip(here, place, spread, strict=True)]
+    side, _, part = place.partition("_")
+    usual = usual_standing()["places"][part if side in OUTWARDS else place]
+    here = (OUTWARDS.get(side, 1.0) * points[:, 0], points[:, 1] - origin, points[:, 2] - stand.floor)
+    steps = [(x / stand.stature - at) / sd for x, at, sd in zip(here, usual["at"], usual["sd"], strict=True)]
     found: Array = steps[0] ** 2 + steps[1] ** 2 + steps[2] ** 2
     return found
 
@@ -167,9 +152,9 @@ def _misfit(points: Array, stand: Standing, origin: Array) -> Array:
     squared standard deviations, each at most twice what is believed; more for a person with markers above the head.
     ``origin`` (O, 1) m where the ankles are.
     """
-    sides = [(part, sign) for part in _NEEDED for sign in (1.0, -1.0)]
-    near = [from_usual(points, part, sign, stand, origin).min(axis=1) for part, sign in sides]
-    behind = [from_usual(points, part, 1.0, stand, origin).min(axis=1) for part in ("psis", "mid_psis")]
+    places = [f"{side}_{part}" for part in _NEEDED for side in OUTWARDS]
+    near = [from_usual(points, place, stand, origin).min(axis=1) for place in places]
+    behind = [from_usual(points, place, stand, origin).min(axis=1) for place in ("right_psis", "mid_psis")]
     ill = np.minimum([*near, np.minimum(*behind)], 2 * NEAR).sum(axis=0)
     trunk = points[np.abs(points[:, 0]) < 0.12 * stand.stature]
     over = max(float((trunk[:, 2] - stand.floor).max(initial=0.0)) / stand.stature - 1.03, 0.0) / 0.02

@@ -6,16 +6,10 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from biodance.lab.markers.person import NEAR, PAIRED, USUAL_PLACES, from_the_middle, from_usual, mirror_image
-from biodance.lab.markers.standing import Standing
+from biodance.lab.markers.person import NEAR, PAIRED, from_the_middle, from_usual, mirror_image
+from biodance.lab.markers.standing import OUTWARDS, Standing, usual_standing
 from biodance.records import SIDES, Array
 
-_ACROSS = {
-    "knee": (np.array([-0.066, 0.001, -0.002]), np.array([0.014, 0.012, 0.012])),
-    "ankle": (np.array([-0.048, 0.017, 0.005]), np.array([0.010, 0.012, 0.010])),
-}
-"""Where the medial marker of a joint lies from the lateral one, and how much people differ: out, ahead, up; shares of
-the stature."""
 _APART = 12.0
 """By so much, in squared standard deviations, the next pair of markers must fit worse."""
 _BALL = 0.036
@@ -34,13 +28,11 @@ def taken_by_posture(
 
     ``free`` side -> labels that may be it; ``known`` landmark -> label of those that are certain.
     """
-    places = [f"{side}_{part}" for side in SIDES]
-    first, second = (
-        [known[place]] if place in known else list(free[side]) for side, place in zip(SIDES, places, strict=True)
-    )
-    pair = _only_pair(part, first, second, stand, _ankles(known, stand)) if first and second else None
-    found = dict(zip(places, pair, strict=True)) if pair else {}
-    return {place: label for place, label in found.items() if place not in known}
+    places = {side: f"{side}_{part}" for side in SIDES}
+    labels = [[known[place]] if place in known else list(free[side]) for side, place in places.items()]
+    pair = _only_pair(part, labels, stand, _ankles(known, stand)) if all(labels) else ()
+    found = zip(places.values(), pair, strict=bool(pair))
+    return {place: label for place, label in found if place not in known}
 
 
 def joint_by_posture(
@@ -53,23 +45,21 @@ def joint_by_posture(
     """
     origin = _ankles(known, stand)
     lateral, medial = (_pairs(f"{joint}_{end}", free, stand, origin) for end in ("lateral", "medial"))
-    found = []
-    for one, outer in lateral:
-        for other, inner in medial:
-            if not set(outer) & set(inner):
-                apart = _across(outer, inner, stand) - _ACROSS[joint][0]
-                found.append((one + other + float(((apart / _ACROSS[joint][1]) ** 2).sum()), outer, inner))
+    found = [
+        (one + other + _misfit_across(joint, outer, inner, stand), outer + inner)
+        for one, outer in lateral
+        for other, inner in medial
+        if not set(outer) & set(inner)
+    ]
     found.sort()
     if not found or found[0][0] > 4 * NEAR:
         return {}
-    ill, outer, inner = found[0]
-    if any(
-        one - ill < _APART and not all(_beside(stand, a, b) for a, b in zip(outer + inner, pair + last, strict=True))
-        for one, pair, last in found[1:]
-    ):
+    ill, best = found[0]
+    rivals = [labels for other, labels in found[1:] if other - ill < _APART]
+    if not all(_beside(stand, a, b) for labels in rivals for a, b in zip(best, labels, strict=True)):
         return {}
-    named = ((f"{joint}_lateral", outer), (f"{joint}_medial", inner))
-    return {f"{side}_{part}": label for part, pair in named for side, label in zip(SIDES, pair, strict=True)}
+    places = (f"{side}_{joint}_{end}" for end in ("lateral", "medial") for side in SIDES)
+    return dict(zip(places, best, strict=True))
 
 
 def toes_by_posture(free: Mapping[str, Iterable[str]], known: Mapping[str, str], stand: Standing) -> dict[str, str]:
@@ -78,24 +68,23 @@ def toes_by_posture(free: Mapping[str, Iterable[str]], known: Mapping[str, str],
 
     ``free`` side -> labels that may be there; ``known`` landmark -> label of those that are certain.
     """
-    origin, out = _ankles(known, stand), {}
+    origin, found = _ankles(known, stand), []
     for side in SIDES:
         labels = list(free[side])
-        points, sign = from_the_middle(labels, stand), 1.0 if side == "right" else -1.0
-        front = [k for k, ill in enumerate(from_usual(points, "toe", sign, stand, origin)) if ill < NEAR]
-        front.sort(key=lambda k: -sign * float(points[k, 0]))
-        if len(front) == 1:
-            out[f"{side}_toe"] = labels[front[0]]
-        elif front and _ball(points[front[0]], points[front[-1]]) > _BALL * stand.stature:
-            out |= {f"{side}_toe_lateral": labels[front[0]], f"{side}_toe_medial": labels[front[-1]]}
-    parts = [{place for place in out if place.startswith(side)} for side in SIDES]
-    return out if len(parts[0]) == len(parts[1]) else {}
+        points = from_the_middle(labels, stand)
+        front = np.flatnonzero(from_usual(points, f"{side}_toe", stand, origin) < NEAR)
+        front = front[np.argsort(-OUTWARDS[side] * points[front, 0], kind="stable")]
+        if front.size == 1:
+            found.append({f"{side}_toe": labels[front[0]]})
+        elif front.size and _ball(points[front[0]], points[front[-1]]) > _BALL * stand.stature:
+            found.append({f"{side}_toe_lateral": labels[front[0]], f"{side}_toe_medial": labels[front[-1]]})
+    return found[0] | found[1] if len(found) == 2 and len(found[0]) == len(found[1]) else {}
 
 
 def middle_by_posture(part: str, free: Iterable[str], known: Mapping[str, str], stand: Standing) -> str | None:
     """Return the only marker that can be a landmark of the middle of the body; None if there is none or several."""
     labels = [label for label in free if abs(from_the_middle([label], stand)[0, 0]) < _MIDDLE * stand.stature]
-    away = from_usual(from_the_middle(labels, stand), part, 1.0, stand, _ankles(known, stand))
+    away = from_usual(from_the_middle(labels, stand), part, stand, _ankles(known, stand))
     order = np.argsort(away)
     if not labels or away[order[0]] > NEAR:
         return None
@@ -111,7 +100,7 @@ def _pairs(
     near = []
     for side in SIDES:
         labels = list(free[side])
-        away = from_usual(from_the_middle(labels, stand), part, 1.0 if side == "right" else -1.0, stand, origin)
+        away = from_usual(from_the_middle(labels, stand), f"{side}_{part}", stand, origin)
         near.append([(float(ill), label) for ill, label in zip(away, labels, strict=True) if ill < NEAR])
     return [
         (one + two + (apart / PAIRED) ** 2, (first, second))
@@ -121,12 +110,12 @@ def _pairs(
     ]
 
 
-def _across(outer: tuple[str, str], inner: tuple[str, str], stand: Standing) -> Array:
-    """Return (2, 3) where the inner markers of both sides lie from the outer ones: out, ahead, up; shares of the
-    stature.
-    """
+def _misfit_across(joint: str, outer: tuple[str, str], inner: tuple[str, str], stand: Standing) -> float:
+    """Return how ill the inner markers of both sides lie to the outer ones, in squared standard deviations."""
+    usual = usual_standing()["across"][joint]
     step = (from_the_middle(inner, stand) - from_the_middle(outer, stand)) / stand.stature
-    return np.array([step[k] * [1.0 if side == "right" else -1.0, 1.0, 1.0] for k, side in enumerate(SIDES)])
+    step[:, 0] *= [OUTWARDS[side] for side in SIDES]
+    return float((((step - usual["at"]) / usual["sd"]) ** 2).sum())
 
 
 def _ball(outer: Array, inner: Array) -> float:
@@ -143,18 +132,17 @@ def _ankles(known: Mapping[str, str], stand: Standing) -> float:
         return float(np.mean(ankles))
     if not stand.named or len(spines) < 2:
         return float(stand.middle @ stand.ahead)
-    return float(np.mean(spines)) - USUAL_PLACES["asis"][0][1] * stand.stature
+    return float(np.mean(spines) - usual_standing()["places"]["asis"]["at"][1] * stand.stature)
 
 
-def _only_pair(
-    part: str, first: list[str], second: list[str], stand: Standing, origin: float
-) -> tuple[str, str] | None:
+def _only_pair(part: str, labels: list[list[str]], stand: Standing, origin: float) -> tuple[str, ...]:
     """Return the labels on both sides, as `SIDES`, that fit so much better than any others that nothing else can be
-    meant; None if there are none.
+    meant; () if there are none.
     """
+    first, second = labels
     one, two = (
-        from_usual(from_the_middle(labels, stand), part, 1.0 if side == "right" else -1.0, stand, origin)
-        for labels, side in zip((first, second), SIDES, strict=True)
+        from_usual(from_the_middle(own, stand), f"{side}_{part}", stand, origin)
+        for own, side in zip(labels, SIDES, strict=True)
     )
     image = np.array([mirror_image(stand.at[label], stand) for label in first])
     apart = np.linalg.norm(image[:, None] - np.array([stand.at[label] for label in second])[None], axis=2)
@@ -162,10 +150,10 @@ def _only_pair(
     ill[np.array([[label == other for other in second] for label in first])] = np.inf
     i, j = (int(k) for k in np.unravel_index(int(np.argmin(ill)), ill.shape))
     if not np.isfinite(ill[i, j]) or max(one[i], two[j]) > NEAR or apart[i, j] > 3 * PAIRED:
-        return None
+        return ()
     same = [np.array([_beside(stand, own[k], label) for label in own]) for own, k in ((first, i), (second, j))]
     rest = ill[~(same[0][:, None] & same[1][None])]
-    return (first[i], second[j]) if not rest.size or rest.min() - ill[i, j] > _APART else None
+    return (first[i], second[j]) if not rest.size or rest.min() - ill[i, j] > _APART else ()
 
 
 def _beside(stand: Standing, label: str, other: str) -> bool:

@@ -1,6 +1,6 @@
 """Read and check one marker-set file: every entry is legal or the file is refused with the entry's name."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,63 +17,68 @@ _SEGMENTS = (
 )
 """The 12 segments that a marker can sit on."""
 
-SIDED_LANDMARKS = (
-    *(
-        "asis",
-        "psis",
-        "hip_centre",
-        "knee_lateral",
-        "knee_medial",
-        "ankle_lateral",
-        "ankle_medial",
-        "thigh_wand",
-        "shank_wand",
-        "knee_axis",
-    ),
-    *("heel", "toe", "toe_lateral", "toe_medial"),
-    *("acromion", "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "hand"),
+_SIDED = (
+    "asis psis hip_centre knee_lateral knee_medial ankle_lateral ankle_medial thigh_wand shank_wand knee_axis heel toe "
+    "toe_lateral toe_medial acromion elbow_lateral elbow_medial wrist_radial wrist_ulnar hand"
 )
 LANDMARKS = (
-    *(f"{side}_{name}" for side in SIDES for name in SIDED_LANDMARKS),
+    *(f"{side}_{name}" for side in SIDES for name in _SIDED.split()),
     *("mid_psis", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"),
 )
 """The anatomical landmarks that joint centres, scaling and contact ask for."""
 MIDLINE = ("mid_psis", "head_front", "head_back")
 """Landmarks that may be the mean of several markers in a map."""
 
-SEGMENT_OF = {
-    **dict.fromkeys(("asis", "psis", "hip_centre", "mid_psis"), "pelvis"),
-    **dict.fromkeys(("knee_lateral", "knee_medial", "thigh_wand", "knee_axis"), "thigh"),
-    **dict.fromkeys(("ankle_lateral", "ankle_medial", "shank_wand"), "shank"),
-    **dict.fromkeys(("heel", "toe", "toe_lateral", "toe_medial"), "foot"),
-    **dict.fromkeys(("acromion", "c7", "t10", "jugular_notch", "xiphoid", "head_front", "head_back"), "trunk_head"),
-    **dict.fromkeys(("elbow_lateral", "elbow_medial"), "upper_arm"),
-    **dict.fromkeys(("wrist_radial", "wrist_ulnar", "hand"), "forearm_hand"),
+_MARKED = {
+    "pelvis": "asis psis hip_centre mid_psis",
+    "thigh": "knee_lateral knee_medial thigh_wand knee_axis",
+    "shank": "ankle_lateral ankle_medial shank_wand",
+    "foot": "heel toe toe_lateral toe_medial",
+    "trunk_head": "acromion c7 t10 jugular_notch xiphoid head_front head_back",
+    "upper_arm": "elbow_lateral elbow_medial",
+    "forearm_hand": "wrist_radial wrist_ulnar hand",
 }
+_SEGMENT_OF = {landmark: segment for segment, some in _MARKED.items() for landmark in some.split()}
 """The segment that a marker on a landmark sits on, without its side."""
 
-NORMALISERS = (
-    *("asis_width", "foot_length", "thigh_length", "shank_length", "upper_arm_length", "forearm_length"),
-    *("trunk_length", "stature"),
-)
+_NORMALISERS = "asis_width foot_length thigh_length shank_length upper_arm_length forearm_length trunk_length stature"
 """Body measures in m: joint centre to joint centre for the limbs, heel to toe tip for the foot, mid shoulder to mid
 hip for the trunk.
 """
+_ORIGINS = ("segment", "mid_shoulder")
+_MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
+_FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks", "map")
 
-ORIGINS = ("segment", "mid_shoulder")
-MARKER_KEYS = ("segment", "weight", "offset", "normaliser", "origin", "corner_of")
-FILE_KEYS = ("name", "description", "source", "required", "aliases", "markers", "landmarks", "map")
+
+@dataclass(frozen=True)
+class SetMarker:
+    """One marker of a set.
+
+    ``weight`` >= 0 multiplies its squared residual; ``offset`` (3,) times the body measure ``normaliser`` (m) is its
+    place in the segment frame (x anterior, y up, z right) relative to ``origin``: "segment" (the segment's own origin)
+    or "mid_shoulder" (the middle of the two shoulder joint centres). ``offset`` is None where no generic place is
+    known: such a marker exists only once a static trial places it. ``corner_of``: the three markers of a knee alignment
+    device that stands in for this one in the static trial.
+    """
+
+    label: str
+    segment: str
+    weight: float = 1.0
+    offset: tuple[float, float, float] | None = None
+    normaliser: str = ""
+    origin: str = "segment"
+    corner_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Contents:
-    """The checked contents of a file; ``markers`` label -> fields of ``SetMarker``."""
+    """The checked contents of a file; ``markers`` by label."""
 
     description: str
     source: str
     required: tuple[str, ...]
     aliases: dict[str, str]
-    markers: dict[str, dict[str, Any]]
+    markers: dict[str, SetMarker]
     landmarks: dict[str, tuple[tuple[str, ...], ...]]
 
 
@@ -88,7 +93,7 @@ def parse_marker_set(path: Path) -> Contents:
         without segment, an offset without normaliser, a negative weight.
     """
     table = read_toml(path)
-    _legal(path, "key", tuple(table), FILE_KEYS)
+    _legal(path, "key", tuple(table), _FILE_KEYS)
     for name in ("aliases", "markers", "landmarks", "map"):
         if not isinstance(table.get(name, {}), dict):
             raise BiodanceError(f"{path}: [{name}] must be a table. Write [{name}] and one line per entry below it.")
@@ -112,11 +117,10 @@ def parse_marker_set(path: Path) -> Contents:
         )
     landmarks = table.get("landmarks", {})
     _legal(path, "landmark", tuple(landmarks), LANDMARKS)
-    chosen = {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
-    chosen = {**(short.landmarks if short else {}), **chosen}
-    return Contents(
-        str(table.get("description", "")), str(table.get("source", "")), required, dict(aliases), markers, chosen
-    )
+    chosen = short.landmarks if short else {}
+    chosen |= {name: _alternatives(path, name, value, markers) for name, value in landmarks.items()}
+    description, source = (str(table.get(key, "")) for key in ("description", "source"))
+    return Contents(description, source, required, dict(aliases), markers, chosen)
 
 
 def read_map(path: Path) -> Contents:
@@ -148,7 +152,7 @@ def parse_map(given: Mapping[str, Any], path: str) -> Contents:
     BiodanceError
         It names a landmark or segment that does not exist.
     """
-    markers: dict[str, dict[str, Any]] = {}
+    markers: dict[str, SetMarker] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():
         if place not in (*LANDMARKS, *_SEGMENTS):
@@ -161,7 +165,7 @@ def parse_map(given: Mapping[str, Any], path: str) -> Contents:
             raise BiodanceError(
                 f"{path}: [markers] map gives {place} to {landmarks[place][0][0]} and to {label}. Keep one of the two."
             )
-        markers[label] = {"segment": place if place in _SEGMENTS else segment_of(place)}
+        markers[label] = SetMarker(label, place if place in _SEGMENTS else segment_of(place))
         if place in LANDMARKS:
             landmarks[place] = ((*landmarks.get(place, ((),))[0], label),)
     if "mid_psis" not in landmarks and {"left_psis", "right_psis"} <= landmarks.keys():
@@ -174,7 +178,7 @@ def parse_map(given: Mapping[str, Any], path: str) -> Contents:
 def segment_of(landmark: str) -> str:
     """Return the segment that a marker on a landmark sits on."""
     side, _, part = landmark.rpartition("_") if landmark.startswith("mid") else landmark.partition("_")
-    segment = SEGMENT_OF.get(landmark) or SEGMENT_OF[part]
+    segment = _SEGMENT_OF.get(landmark) or _SEGMENT_OF[part]
     return f"{side}_{segment}" if f"{side}_{segment}" in _SEGMENTS else segment
 
 
@@ -184,7 +188,7 @@ def _legal(path: Path, kind: str, found: tuple[str, ...], legal: tuple[str, ...]
         raise BiodanceError(f"{path}: {wrong[0]!r} is not a {kind} of a marker set. Legal: {', '.join(legal)}.")
 
 
-def _labels(path: Path, where: str, value: Any, markers: dict[str, dict[str, Any]]) -> list[str]:
+def _labels(path: Path, where: str, value: Any, markers: Collection[str]) -> list[str]:
     """Check that ``value`` is a list of labels of this set."""
     if not isinstance(value, list) or not all(isinstance(label, str) for label in value):
         raise BiodanceError(f"{path}: {where} is {value!r}, expected a list of marker labels.")
@@ -196,7 +200,7 @@ def _labels(path: Path, where: str, value: Any, markers: dict[str, dict[str, Any
     return value
 
 
-def _alternatives(path: Path, name: str, value: Any, markers: dict[str, dict[str, Any]]) -> tuple[tuple[str, ...], ...]:
+def _alternatives(path: Path, name: str, value: Any, markers: Collection[str]) -> tuple[tuple[str, ...], ...]:
     if not isinstance(value, list) or not value or not all(isinstance(labels, list) and labels for labels in value):
         raise BiodanceError(
             f'{path}: landmark {name} is {value!r}, expected lists of labels, for example [["LPSI", "RPSI"], ["SACR"]].'
@@ -204,17 +208,17 @@ def _alternatives(path: Path, name: str, value: Any, markers: dict[str, dict[str
     return tuple(tuple(_labels(path, f"landmark {name}", labels, markers)) for labels in value)
 
 
-def _marker(path: Path, label: str, fields: Any) -> dict[str, Any]:
-    """Check one marker's entry and return the fields of a ``SetMarker``."""
+def _marker(path: Path, label: str, fields: Any) -> SetMarker:
+    """Return one marker after checking its entry."""
     where = f"{path}: marker {label}"
     if not isinstance(fields, dict) or "segment" not in fields:
         raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(_SEGMENTS)}.")
-    for key, legal in (("segment", _SEGMENTS), ("normaliser", NORMALISERS), ("origin", ORIGINS)):
+    for key, legal in (("segment", _SEGMENTS), ("normaliser", _NORMALISERS.split()), ("origin", _ORIGINS)):
         if key in fields and fields[key] not in legal:
             raise BiodanceError(f"{where} has the {key} {fields[key]!r}. Legal: {', '.join(legal)}.")
-    unknown = [key for key in fields if key not in MARKER_KEYS]
+    unknown = [key for key in fields if key not in _MARKER_KEYS]
     if unknown:
-        raise BiodanceError(f"{where} has the unknown key {unknown[0]!r}. Legal: {', '.join(MARKER_KEYS)}.")
+        raise BiodanceError(f"{where} has the unknown key {unknown[0]!r}. Legal: {', '.join(_MARKER_KEYS)}.")
     weight = fields.get("weight", 1.0)
     if not _number(weight) or weight < 0:
         raise BiodanceError(f"{where} has the weight {weight!r}, expected a number >= 0.")
@@ -230,8 +234,9 @@ def _marker(path: Path, label: str, fields: Any) -> dict[str, Any]:
         raise BiodanceError(
             f"{where} has the offset {offset!r}, expected three numbers [x, y, z] (anterior, up, right)."
         )
-    places = {"corner_of": tuple(map(str, corner_of)), "weight": float(weight)}
-    return {**fields, **places, "offset": None if offset is None else tuple(float(x) for x in offset)}
+    place = None if offset is None else tuple(float(x) for x in offset)
+    said = {"offset": place, "corner_of": tuple(map(str, corner_of)), "weight": float(weight)}
+    return SetMarker(label, **{**fields, **said})
 
 
 def _number(value: Any) -> bool:

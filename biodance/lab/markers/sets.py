@@ -18,7 +18,7 @@ import numpy as np
 
 from biodance.discovery import DataFamily
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.markers.set_file import LANDMARKS, Contents, parse_map, parse_marker_set, read_map
+from biodance.lab.markers.set_file import LANDMARKS, Contents, SetMarker, parse_map, parse_marker_set, read_map
 from biodance.records import SIDES, Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
@@ -27,26 +27,6 @@ MAPS = ("session.toml", "subject.toml")
 """Files whose ``[markers] map`` is a marker set of its own."""
 GUESSED = "guessed "
 """How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
-
-
-@dataclass(frozen=True)
-class SetMarker:
-    """One marker of a set.
-
-    ``weight`` >= 0 multiplies its squared residual; ``offset`` (3,) times the body measure ``normaliser`` (m) is its
-    place in the segment frame (x anterior, y up, z right) relative to ``origin``: "segment" (the segment's own origin)
-    or "mid_shoulder" (the middle of the two shoulder joint centres). ``offset`` is None where no generic place is
-    known: such a marker exists only once a static trial places it. ``corner_of``: the three markers of a knee alignment
-    device that stands in for this one in the static trial.
-    """
-
-    label: str
-    segment: str
-    weight: float = 1.0
-    offset: tuple[float, float, float] | None = None
-    normaliser: str = ""
-    origin: str = "segment"
-    corner_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,15 +66,14 @@ class MarkerSet:
         The exact label wins over an alias, an alias over another letter case; a difference in case only counts where
         the file has one such label.
         """
-        given = tuple(labels)
+        known = set(given := tuple(labels))
         folded: dict[str, list[str]] = {}
         for label in given:
             folded.setdefault(label.casefold(), []).append(label)
-        found, known = {}, set(given)
+        found = {}
         for label, spellings in self._spellings.items():
-            alike = [spelling for spelling in spellings if spelling in known] or [
-                folded[s.casefold()][0] for s in spellings if len(folded.get(s.casefold(), ())) == 1
-            ]
+            alike = [spelling for spelling in spellings if spelling in known]
+            alike = alike or [one[0] for s in spellings if len(one := folded.get(s.casefold(), [])) == 1]
             if alike:
                 found[label] = alike[0]
         return found
@@ -155,25 +134,14 @@ def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
     """Return the marker set of a file's contents; where it is a map, markers on landmarks get the usual places and
     weights of these.
     """
-    markers = {label: SetMarker(label, **fields) for label, fields in contents.markers.items()}
-    if usual:
-        on = {labels[0][0]: place for place, labels in contents.landmarks.items() if len(labels[0]) == 1}
-        known = usual_places()
-        markers = {
-            label: replace(known[on[label]], label=label, corner_of=())
-            if on.get(label) in known and marker.offset is None
-            else marker
-            for label, marker in markers.items()
-        }
-    return MarkerSet(
-        name,
-        contents.description,
-        contents.source,
-        tuple(markers.values()),
-        MappingProxyType(contents.aliases),
-        MappingProxyType(contents.landmarks),
-        contents.required,
-    )
+    markers = dict(contents.markers)
+    for place, labels in contents.landmarks.items() if usual else ():
+        label, known = labels[0][0], usual_places().get(place)
+        if known and len(labels[0]) == 1 and markers[label].offset is None:
+            markers[label] = replace(known, label=label, corner_of=())
+    aliases, landmarks = MappingProxyType(contents.aliases), MappingProxyType(contents.landmarks)
+    said = (contents.description, contents.source)
+    return MarkerSet(name, *said, tuple(markers.values()), aliases, landmarks, contents.required)
 
 
 def recognise(labels: Iterable[str], *, candidates: Iterable[MarkerSet] | None = None) -> MarkerSet | None:
@@ -195,19 +163,14 @@ def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
     """
     if trial.markers is None or trial.marker_set == marker_set.name:
         return trial
-    match = marker_set.match(trial.markers.names)
+    match, title = marker_set.match(trial.markers.names), marker_set.title
     absent = [label for label in marker_set.required if label not in match]
-    if not absent:
-        said = (
-            f"The markers were read as the set {marker_set.title}: {len(match)} of its {len(marker_set.labels)} "
-            f"labels are there."
-        )
-        return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
-    warning = (
-        f"The markers are not of the chosen set {marker_set.title}: {', '.join(absent)} missing. Choose the set "
-        f"that was worn."
-    )
-    return replace(trial, warnings=(*trial.warnings, warning))
+    if absent:
+        lacking = f"{', '.join(absent)} missing. Choose the set that was worn."
+        return replace(trial, warnings=(*trial.warnings, f"The markers are not of the chosen set {title}: {lacking}"))
+    count = f"{len(match)} of its {len(marker_set.labels)} labels are there."
+    said = f"The markers were read as the set {title}: {count}"
+    return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
 
 
 def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:

@@ -66,14 +66,8 @@ def _beginning(names: Sequence[str]) -> str:
     counts = Counter(name[:end] for name in names for end in range(1, len(name)))
     often = [start for start, times in counts.items() if times >= max(_SHARED * len(names), 4)]
     capital = sum(name[1:2].isupper() for name in names) >= _SHARED * len(names)
-    ends = [
-        start
-        for start in often
-        if re.search(r".[\W_]$|\d\d$", start)
-        or re.fullmatch(r"\D{3,}", start)
-        or (re.fullmatch("[a-z]", start) and capital)
-    ]
-    return max(ends, key=len, default="")
+    end = re.compile(r".*(.[\W_]|\d\d)|\D{3,}" + ("|[a-z]" if capital else ""), re.DOTALL)
+    return max((start for start in often if end.fullmatch(start)), key=len, default="")
 
 
 def _ending(names: Sequence[str]) -> str:

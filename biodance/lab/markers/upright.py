@@ -11,7 +11,7 @@ from biodance.lab.markers.person import person_of
 from biodance.lab.markers.set_file import LANDMARKS, segment_of
 from biodance.lab.markers.sets import landmark, recognise
 from biodance.lab.markers.spelling import plain_labels
-from biodance.lab.markers.still import quietest
+from biodance.lab.markers.still import median_places, quietest
 from biodance.records import Array, Markers, spread_frames
 
 UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
@@ -48,12 +48,7 @@ def axis_to_head(markers: Markers) -> Array | None:
 
 def _only_way_to_stand(markers: Markers) -> Array | None:
     """Return the signed axis (3,) along which alone the points are a standing person; None if none or several are."""
-    near = markers.xyz[quietest(markers)]
-    points = {
-        label: np.median(path[seen], axis=0)
-        for label, path in zip(markers.names, near.swapaxes(0, 1), strict=True)
-        if (seen := np.isfinite(path).all(axis=1)).any()
-    }
+    points = median_places(markers, quietest(markers))
     at = {label: points[label] for label in plain_labels(points)}
     if len(at) < _CLOUD:
         return None

@@ -7,6 +7,7 @@ file.
 
 import re
 from collections.abc import Mapping
+from itertools import product
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -51,16 +52,9 @@ def external_loads(segments: tuple[str, ...], *, data_file: str) -> str:
     objects = SubElement(loads, "objects")
     for segment in segments:
         force = SubElement(objects, "ExternalForce", name=f"ground_on_{segment}")
-        _say(
-            force,
-            applied_to_body=segment,
-            force_expressed_in_body="ground",
-            point_expressed_in_body="ground",
-            force_identifier=f"{segment}_force_v",
-            point_identifier=f"{segment}_force_p",
-            torque_identifier=f"{segment}_torque_",
-            data_source_name="Unassigned",
-        )
+        _say(force, applied_to_body=segment, force_expressed_in_body="ground", point_expressed_in_body="ground")
+        _say(force, force_identifier=f"{segment}_force_v", point_identifier=f"{segment}_force_p")
+        _say(force, torque_identifier=f"{segment}_torque_", data_source_name="Unassigned")
     _say(loads, datafile=data_file)
     return _text(root)
 
@@ -73,17 +67,9 @@ def inverse_dynamics_setup(
     """
     root = Element("OpenSimDocument", Version=_VERSION)
     tool = SubElement(root, "InverseDynamicsTool", name=name)
-    _say(
-        tool,
-        results_directory=".",
-        model_file=model,
-        time_range=f"{between[0]:.10g} {between[1]:.10g}",
-        forces_to_exclude="Muscles",
-        external_loads_file=loads,
-        coordinates_file=coordinates,
-        lowpass_cutoff_frequency_for_coordinates="-1",
-        output_gen_force_file=out,
-    )
+    _say(tool, results_directory=".", model_file=model, time_range=f"{between[0]:.10g} {between[1]:.10g}")
+    _say(tool, forces_to_exclude="Muscles", external_loads_file=loads, coordinates_file=coordinates)
+    _say(tool, lowpass_cutoff_frequency_for_coordinates="-1", output_gen_force_file=out)
     return _text(root)
 
 
@@ -97,6 +83,10 @@ def _text(root: Element) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
 
 
+_NOT_PLACED = (
+    "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to "
+    "spare."
+)
 FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
 _FARTHEST = 50.0  # m
 _AXES = "xyz"
@@ -146,11 +136,7 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
                 f"say where it lies."
             )
             continue
-        corners = (
-            "The file does not say where the plate lies: its corners enclose the centres of pressure under "
-            "load with 0.15 m to spare."
-        )
-        said = (f"Columns of {name}.", *decided, corners)
+        said = (f"Columns of {name}.", *decided, _NOT_PLACED)
         plates.append(Plate(f"plate{number}", 0, _rectangle(cop), wrench, said, placed=False))
     return tuple(plates), tuple(history)
 
@@ -174,12 +160,9 @@ def _groups(columns: tuple[str, ...]) -> dict[str, dict[str, str]]:
 
 def _wrench(table: TimeTable, columns: dict[str, str], where: str) -> Array:
     """Return force and moment (T, 6) about the file's origin, in the file's axes."""
-    force, point, torque = (
-        np.stack(
-            [table[columns[part + a]] if part + a in columns else np.zeros(table.time.size) for a in _AXES], axis=1
-        )
-        for part in "vpm"
-    )
+    nothing = np.zeros(table.time.size)
+    rows = {key: table[columns[key]] if key in columns else nothing for key in map("".join, product("vpm", _AXES))}
+    force, point, torque = np.array(list(rows.values())).reshape(3, 3, -1).transpose(0, 2, 1)
     torque = np.where(np.isnan(torque) & (force == 0).all(axis=1)[:, None], 0.0, torque)
     if (bad := np.isnan(force) | np.isnan(torque)).any():
         raise FileRefused(
@@ -213,11 +196,8 @@ def _upright(mean_force: Array) -> tuple[Array, float, list[str]]:
     """Return the turn (3, 3) to z up, the sign that makes the ground push upwards, and the sentences that say so."""
     z_up = abs(mean_force[2]) > max(abs(mean_force[1]), COP_FORCE)
     turn = np.eye(3) if z_up else Y_UP_TO_Z_UP
-    said = (
-        ["The largest mean force is along z: taken as z up."]
-        if z_up
-        else ["y up as OpenSim writes it: turned by 90 degrees about x to z up."]
-    )
+    along_z, as_opensim = "The largest mean force is along z: taken as z up.", "y up as OpenSim writes it"
+    said = [along_z if z_up else f"{as_opensim}: turned by 90 degrees about x to z up."]
     if (turn @ mean_force)[2] >= 0:
         return turn, 1.0, said
     return turn, -1.0, [*said, "The mean force points down: the file holds the load on the plate; the sign was turned."]

@@ -75,13 +75,10 @@ def read_mot(path: str | Path) -> TimeTable:
         at = int(np.argmax(np.isnan(time))) if np.isnan(time).any() else int(np.argmax(np.diff(time) <= 0)) + 1
         raise FileRefused(f"{path}: the time does not increase at row {body[at][0]} ({time[at]:g} s). Export it again.")
     announced = header.get("nrows", header.get("datarows", ""))
-    warnings = (
-        [f"The header announces {announced} rows, the file holds {len(table)}."]
-        if _differs(announced, len(table))
-        else []
-    )
+    differs = announced.isdigit() and int(announced) != len(table)
+    warnings = (f"The header announces {announced} rows, the file holds {len(table)}.",) if differs else ()
     degrees = header.get("indegrees", "no").lower() in ("yes", "true", "1")
-    return TimeTable(header.get("", path.stem), tuple(labels[1:]), time, table[:, 1:], degrees, tuple(warnings))
+    return TimeTable(header.get("", path.stem), tuple(labels[1:]), time, table[:, 1:], degrees, warnings)
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
@@ -108,15 +105,10 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
             f"{path}: column {table.columns[column]} is {table.values[row, column]} at {table.time[row]:g} s, and the "
             "format allows finite numbers only. Fill the gap or leave the column out."
         )
-    header = [
-        table.name or path.stem,
-        "version=1",
-        f"nRows={table.time.size}",
-        f"nColumns={len(table.columns) + 1}",
-        f"inDegrees={'yes' if table.in_degrees else 'no'}",
-        "endheader",
-        "\t".join(["time", *table.columns]),
-    ]
+    counts = (f"nRows={table.time.size}", f"nColumns={len(table.columns) + 1}")
+    degrees = f"inDegrees={'yes' if table.in_degrees else 'no'}"
+    labels = "\t".join(["time", *table.columns])
+    header = [table.name or path.stem, "version=1", *counts, degrees, "endheader", labels]
     rows = ("\t".join(f"{v:.10g}" for v in (t, *values)) for t, values in zip(table.time, table.values, strict=True))
     return write_new(path, ("\n".join([*header, *rows]) + "\n").encode())
 
@@ -147,7 +139,3 @@ def _numbers(row: str, width: int, where: str) -> list[float]:
     if len(found) != width:
         raise FileRefused(f"{where}: holds {len(found)} cells, {width} are expected. Export the file again.")
     return [parse_number(cell, where) for cell in found]
-
-
-def _differs(announced: str, found: int) -> bool:
-    return announced.isdigit() and int(announced) != found

@@ -65,17 +65,10 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     else:
         xyz = xyz @ Y_UP_TO_Z_UP.T
         history.append("The file is y up (OpenSim): turned by 90 degrees about x to z up.")
-    known = recognise(names)
-    return Trial(
-        name=path.stem,
-        role=role,
-        markers=(markers := Markers(tuple(names), time, xyz)),
-        plates=(),
-        source=Source(path, sha256(content), "TRC", rate=markers.rate, first_frame=int(numbers[0])),
-        marker_set=known.name if known else "",
-        history=tuple(history),
-        warnings=tuple(warnings),
-    )
+    markers, known = Markers(tuple(names), time, xyz), recognise(names)
+    source = Source(path, sha256(content), "TRC", rate=markers.rate, first_frame=int(numbers[0]))
+    worn = known.name if known else ""
+    return Trial(path.stem, role, markers, (), source, worn, history=tuple(history), warnings=tuple(warnings))
 
 
 def write_trc(path: str | Path, markers: Markers) -> Path:
@@ -126,9 +119,7 @@ def _header(rows: list[str], path: Path) -> dict[str, str]:
         raise FileRefused(
             f"{path}: ends after {len(rows)} rows; a .trc file has five header rows and the frames. Export it again."
         )
-    names, values = (
-        [cell for cell in cells(row) if cell] for row in rows[1:3]
-    )  # some writers put two tabs between values
+    names, values = (list(filter(None, cells(row))) for row in rows[1:3])  # some writers put two tabs between values
     return dict(zip(names, values, strict=False))
 
 
@@ -222,9 +213,8 @@ def _equal_steps(
     duration = raw[-1] - raw[0]
     for place in (number_of - number_of[0], np.rint((raw - raw[0]) * declared).astype(int)):
         step = duration / place[-1] if place[-1] > 0 else np.inf
-        if np.all(np.diff(place) > 0) and np.all(
-            np.abs(raw - raw[0] - step * place) < 0.25 * step + TIME_COLUMN_ROUNDING
-        ):
+        near = np.abs(raw - raw[0] - step * place) < 0.25 * step + TIME_COLUMN_ROUNDING
+        if np.all(np.diff(place) > 0) and near.all():
             break
     else:
         raise FileRefused(

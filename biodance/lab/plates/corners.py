@@ -37,8 +37,7 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     lab = corners @ turn.T * unit
     _refuse_disorder(lab)
     _refuse_size(lab, corners)
-    gap = float(np.linalg.norm(lab[0] - lab[1] + lab[2] - lab[3]))
-    skew = _skew(lab)
+    gap, skew = _gap(lab), _skew(lab)
     if gap > NOT_CLOSED or skew > NOT_CLOSED:
         raise TrialRefused(
             f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by "
@@ -65,8 +64,7 @@ def is_rectangle(corners: Array) -> bool:
     lengths = np.linalg.norm(sides, axis=1)
     if not lengths.min() * LONGEST_SIDE > SHORTEST_SIDE * lengths.max() > 0 or sides[0] @ sides[2] >= 0:
         return False
-    gap = float(np.linalg.norm(corners[0] - corners[1] + corners[2] - corners[3]))
-    return max(gap, _skew(corners)) < _UNEVEN * float(lengths.min())
+    return max(_gap(corners), _skew(corners)) < _UNEVEN * float(lengths.min())
 
 
 def plate_axes(corners: Array) -> Array:
@@ -75,34 +73,28 @@ def plate_axes(corners: Array) -> Array:
     x and y are the mean directions of opposite sides, made orthogonal without preferring one; z = x × y (it points down
     on most plates).
     """
-    x = corners[0] + corners[3] - corners[1] - corners[2]
-    y = corners[0] + corners[1] - corners[2] - corners[3]
+    x, y = _along_sides(corners)
     u, _, v = np.linalg.svd(np.column_stack([x / np.linalg.norm(x), y / np.linalg.norm(y)]), full_matrices=False)
     x, y = (u @ v).T
     return np.column_stack([x, y, np.cross(x, y)])
 
 
+def _along_sides(corners: Array) -> Array:
+    """Return (2, 3) m twice the mean opposite sides, along the plate's x and y."""
+    a, b, c, d = corners
+    return np.array([a + d - b - c, a + b - c - d])
+
+
 def half_sides(corners: Array) -> Array:
     """Return half the side lengths (2,) m along the plate's x and y."""
-    return (
-        np.array(
-            [
-                np.linalg.norm(corners[0] + corners[3] - corners[1] - corners[2]),
-                np.linalg.norm(corners[0] + corners[1] - corners[2] - corners[3]),
-            ]
-        )
-        / 4
-    )
+    return np.linalg.norm(_along_sides(corners), axis=1) / 4
 
 
 def _unit(corners: Array, metres: float) -> tuple[float, list[str]]:
     """Return the metres per unit of the corners: the file's own, or m or mm where only that gives a legal size."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-    fits = [
-        name
-        for name, unit in _UNITS.items()
-        if unit * sides.min() >= SHORTEST_SIDE and unit * sides.max() <= LONGEST_SIDE
-    ]
+    spans = {name: (unit * sides.min(), unit * sides.max()) for name, unit in _UNITS.items()}
+    fits = [name for name, (least, most) in spans.items() if least >= SHORTEST_SIDE and most <= LONGEST_SIDE]
     if any(np.isclose(_UNITS[name], metres) for name in fits) or len(fits) != 1:
         return metres, []
     said = (
@@ -118,8 +110,7 @@ def _refuse_disorder(lab: Array) -> None:
     if sides[0] @ sides[2] < 0 and sides[1] @ sides[3] < 0:
         return
     for order, which in SWAPS.items():
-        fixed = lab[list(order)]
-        if np.linalg.norm(fixed[0] - fixed[1] + fixed[2] - fixed[3]) < NOT_CLOSED:
+        if _gap(lab[list(order)]) < NOT_CLOSED:
             raise TrialRefused(
                 f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "
                 "is +x+y, -x+y, -x-y, +x-y of the plate axes. Correct FORCE_PLATFORM:CORNERS."
@@ -140,10 +131,13 @@ def _refuse_size(lab: Array, corners: Array) -> None:
         )
 
 
+def _gap(corners: Array) -> float:
+    """Return by how much opposite sides differ."""
+    return float(np.linalg.norm(corners[0] - corners[1] + corners[2] - corners[3]))
+
+
 def _skew(lab: Array) -> float:
-    """Return by how many metres the end of a side misses its place because the angle at the corner is not a right
-    one (the worst).
-    """
+    """Return how far the end of a side is off at most, m, because the angle at its corner is not a right one."""
     sides = np.roll(lab, -1, axis=0) - lab
     lengths = np.linalg.norm(sides, axis=1)
     cosines = np.abs(np.sum(sides * np.roll(sides, -1, axis=0), axis=1)) / (lengths * np.roll(lengths, -1))

@@ -15,6 +15,8 @@ from biodance.records import Array, Markers, Plate, Wrench
 LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
 BESIDE = 0.15  # m beyond the edge
 _FRAMES = 200
+_QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0), (0, -1))]
+"""Rotations about z by 90, 180 and 270 degrees."""
 
 
 def distance_to_feet(cop: Array, xyz: Array, corners: Array) -> float | None:
@@ -134,16 +136,8 @@ def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Marker
         raise TrialRefused(
             f"{why}, and the foot markers do not tell which axis to turn. Correct FORCE_PLATFORM:CORNERS."
         )
-    return (
-        axes
-        * [
-            1,
-            1,
-            -1,
-        ],
-        f"{why}; x and y were kept as the corners have them. Check the corner order before joining this file with "
-        f"markers.",
-    )
+    kept = "x and y were kept as the corners have them. Check the corner order before joining this file with markers."
+    return axes * [1, 1, -1], f"{why}; {kept}"
 
 
 def _under_feet(
@@ -156,12 +150,9 @@ def _under_feet(
     if distance is None:
         return axes, (), ()
     if distance <= NOT_UNDER:
-        return (
-            axes,
-            (f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show.",),
-            (),
-        )
-    turns = {90 * k: axes @ _quarter_turns(k) for k in (1, 2, 3)}
+        near = f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show."
+        return axes, (near,), ()
+    turns = {90 * k: axes @ turn for k, turn in enumerate(_QUARTER_TURNS, start=1)}
     found = {angle: _distance(reading, time, turned, markers) for angle, turned in turns.items()}
     good = [angle for angle, d in found.items() if d is not None and d <= UNDER_THE_FOOT]
     number = reading.plate.number
@@ -172,11 +163,8 @@ def _under_feet(
         )
         return turns[good[0]], (said,), (f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS.",)
     said = f"The load lies {distance:.2f} m (median) from the feet that the markers show"
-    return (
-        axes,
-        (f"{said}.",),
-        (f"Plate {number}: {said}: check CORNERS, ORIGIN and whether a foot without markers stood there.",),
-    )
+    check = "check CORNERS, ORIGIN and whether a foot without markers stood there."
+    return axes, (f"{said}.",), (f"Plate {number}: {said}: {check}",)
 
 
 def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:
@@ -191,12 +179,6 @@ def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers)
     return distance_to_feet(
         reading.corners.mean(axis=0)[:2] + point @ axes[:2, :2].T, markers.xyz[frames], reading.corners
     )
-
-
-def _quarter_turns(count: int) -> Array:
-    """Return the rotation about z by ``count`` times 90 degrees."""
-    c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[count]
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
 
 
 def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
@@ -221,8 +203,5 @@ def _sign_said(sign: int, otherwise: int) -> str:
     if not sign:
         taken = "reaction" if otherwise > 0 else "load"
         return f"Never loaded, so gravity cannot tell the sign; taken as the {taken}."
-    return (
-        "Sign: the file holds the "
-        f"{'reaction on the subject; kept' if sign > 0 else 'load on the plate; turned round'} (the weight must point "
-        "up)."
-    )
+    held = "reaction on the subject; kept" if sign > 0 else "load on the plate; turned round"
+    return f"Sign: the file holds the {held} (the weight must point up)."

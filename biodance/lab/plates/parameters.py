@@ -16,12 +16,7 @@ from biodance.settings import STANDARD_GRAVITY
 
 CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
 MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
-NAMES_OF_TYPE = {
-    8: "not defined",
-    11: "a Kistler split-belt treadmill",
-    12: "a Kistler split-belt treadmill",
-    21: "AMTI stairs",
-}
+NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,15 +99,10 @@ def plate_parameters(raw: RawC3d, number: int) -> PlateParameters:
         raise TrialRefused(f"TYPE {kind}{what} cannot be computed; legal are {known}. Export the plate as TYPE 2.")
     rows = _numbers(group, "CHANNEL", keep=True).shape[:1]
     listed = _of_plate(group, "CHANNEL", rows or (0,), number)
-    return PlateParameters(
-        number=number,
-        type=kind,
-        channels=_channels(listed, kind, raw.analog.shape[1]),
-        corners=_of_plate(group, "CORNERS", (3, 4), number).T,
-        origin=_of_plate(group, "ORIGIN", (3,), number),
-        calibration=_calibration(group, kind, number),
-        polynomial=_polynomial(group, number),
-    )
+    channels = _channels(listed, kind, raw.analog.shape[1])
+    corners, origin = _of_plate(group, "CORNERS", (3, 4), number).T, _of_plate(group, "ORIGIN", (3,), number)
+    maker = (_calibration(group, kind, number), _polynomial(group, number))
+    return PlateParameters(number, kind, channels, corners, origin, *maker)
 
 
 def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
@@ -205,10 +195,11 @@ def _of_plate(group: Mapping[str, Any], name: str, shape: tuple[int, ...], numbe
 
 POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
 FORCE = {
-    "n": 1.0, "newton": 1.0, "newtons": 1.0, "nt": 1.0, "kn": 1000.0, "lbf": POUND, "lb": POUND, "lbs": POUND,
-    "pound": POUND,
-    "pounds": POUND, "kgf": KILOGRAM_FORCE, "kp": KILOGRAM_FORCE,
-}  # fmt: skip
+    **dict.fromkeys(("n", "newton", "newtons", "nt"), 1.0),
+    "kn": 1000.0,
+    **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), POUND),
+    **dict.fromkeys(("kgf", "kp"), KILOGRAM_FORCE),
+}
 _LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
 MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _LENGTH.items()} | {
     length + force: f * s for force, f in FORCE.items() for length, s in _LENGTH.items() if force != "n"

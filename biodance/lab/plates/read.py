@@ -8,12 +8,12 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
+from biodance.lab.markers.still import movement, steady_mass
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.plates.orientation import oriented
 from biodance.lab.plates.parameters import POUND, count_plates, plate_parameters
 from biodance.lab.plates.signals import PlateReading, read_plate_signals
 from biodance.lab.plates.wrench import gravity_sign
-from biodance.lab.weight import movement, steady_mass
 from biodance.records import Array, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 from biodance.spatial import wrench_about_origin, wrench_about_point

@@ -102,10 +102,8 @@ def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Arra
     wrench = wrench_about_point(sensor, below)
     if plate.polynomial is None:
         return wrench, (said,)
-    return polynomial_corrected(wrench, plate.polynomial), (
-        said,
-        "The maker's correction of the centre of pressure (FPCOPPOLY) was applied.",
-    )
+    applied = "The maker's correction of the centre of pressure (FPCOPPOLY) was applied."
+    return polynomial_corrected(wrench, plate.polynomial), (said, applied)
 
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
@@ -118,14 +116,10 @@ def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, 
         return plate.origin * metres, ()
     written = ", ".join(f"{c:.4g}" for c in plate.origin)
     if len(fits) == 1:
-        return plate.origin * fits[0], (
-            f"ORIGIN ({written}) makes no sense in the file's unit and was taken in units of {fits[0]:g} m.",
-        )
-    legal = (
-        "half distances of the sensors inside the plate, then the depth"
-        if plate.type in FOUR_SENSORS
-        else "sensor to surface centre"
-    )
+        said = f"ORIGIN ({written}) makes no sense in the file's unit and was taken in units of {fits[0]:g} m."
+        return plate.origin * fits[0], (said,)
+    four = plate.type in FOUR_SENSORS
+    legal = "half distances of the sensors inside the plate, then the depth" if four else "sensor to surface centre"
     raise TrialRefused(
         f"ORIGIN is ({written}) in units of {metres:g} m, which no plate of {2 * half[0]:.2f} x {2 * half[1]:.2f} m "
         f"has (legal: {legal}, depth up to {DEEPEST:g} m). Enter the values of the maker's sheet."
@@ -256,8 +250,5 @@ def _moments_in_sense(
         raise TrialRefused(
             f"{said.lower()} and the file does not say the units. Write ANALOG:UNITS (N, Nmm) and export again."
         )
-    return (
-        sensor,
-        (f"{said}.",),
-        (f"Plate {plate.number}: {said}: check its CORNERS, ORIGIN, units and whether somebody pushed it sideways.",),
-    )
+    check = "check its CORNERS, ORIGIN, units and whether somebody pushed it sideways."
+    return sensor, (f"{said}.",), (f"Plate {plate.number}: {said}: {check}",)

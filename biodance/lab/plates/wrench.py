@@ -35,13 +35,10 @@ def sensor_wrench(plate: PlateParameters, signals: Array, origin: Array) -> Arra
     """
     if plate.type in FOUR_SENSORS:
         a, b = np.abs(origin[:2])
-        x, y, z = _sums(signals) if plate.type in EIGHT_CHANNELS else _corner_sums(signals)
-        moment = [
-            b * (z[0] + z[1] - z[2] - z[3]),
-            a * (-z[0] + z[1] + z[2] - z[3]),
-            b * (x[1] - x[0]) + a * (y[0] - y[1]),
-        ]
-        return np.stack([x[0] + x[1], y[0] + y[1], z[0] + z[1] + z[2] + z[3], *moment], axis=1)
+        x12, x34, y14, y23, z1, z2, z3, z4 = _eight_sums(plate, signals)
+        about_x, about_y = b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4)
+        about_z = b * (x34 - x12) + a * (y14 - y23)
+        return np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4, about_x, about_y, about_z], axis=1)
     if plate.type == 1:
         force = signals[:, :3]
         far = np.abs(signals[:, 3:5]).max(axis=1, keepdims=True) > _FARTHEST
@@ -97,15 +94,14 @@ def _in_surface(point: Array) -> Array:
     return np.column_stack([point, np.zeros(len(point))])
 
 
-def _sums(c: Array) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:
-    """Return (x12, x34), (y14, y23), (z1 z2 z3 z4) of an eight-channel plate."""
-    return (c[:, 0], c[:, 1]), (c[:, 2], c[:, 3]), tuple(c[:, 4:8].T)
-
-
-def _corner_sums(c: Array) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:
-    """Return the same sums of a twelve-channel plate (x, y, z of corner 1, then 2, 3, 4)."""
-    x, y, z = c[:, 0::3].T, c[:, 1::3].T, c[:, 2::3].T
-    return (x[0] + x[1], x[2] + x[3]), (y[0] + y[3], y[1] + y[2]), tuple(z)
+def _eight_sums(plate: PlateParameters, signals: Array) -> tuple[Array, ...]:
+    """Return x12, x34, y14, y23, z1, z2, z3, z4: the channels of an eight-channel plate, or the sums of those of a
+    twelve-channel one (x, y, z of corner 1, then 2, 3, 4).
+    """
+    if plate.type in EIGHT_CHANNELS:
+        return tuple(signals[:, :8].T)
+    x, y, z = signals.T.reshape(4, 3, -1).swapaxes(0, 1)
+    return (x[0] + x[1], x[2] + x[3], y[0] + y[3], y[1] + y[2], *z)
 
 
 DEEPEST = 0.3  # m, no sensor lies farther below the surface
@@ -114,10 +110,8 @@ SWAY_BAND = (0.5, 5.0)  # Hz
 SWAY_TIME = 2.5  # s of standing that the sway test needs
 SWAY_STEADY = 0.05  # share of the weight by which the vertical force may vary
 SWAY_CORRELATION = 0.4
-SWAY_SLOPE = (
-    0.25,
-    3.0,
-)  # 1/m, shear over weight per metre of centre of pressure; about 1 / height of the centre of mass
+SWAY_SLOPE = (0.25, 3.0)
+"""1/m, shear over weight per metre of centre of pressure; about 1 / height of the centre of mass."""
 
 
 def sensor_below(vector: Array, axes: Array) -> tuple[Array, str]:
@@ -133,15 +127,11 @@ def sensor_below(vector: Array, axes: Array) -> tuple[Array, str]:
         return vector, f"ORIGIN z is 0: the moments are about the surface{beside}."
     if z * axes[2, 2] > 0:
         return vector, f"ORIGIN puts the sensor {1000 * abs(z):.4g} mm below the surface, as it must be."
+    said = f"ORIGIN z of {1000 * z:.4g} mm would put the sensor above the surface: its sign was turned"
     unsure = 2000 * float(np.hypot(x, y))
-    doubt = (
-        f" (if x, y were meant the other way round too, the centre of pressure moves by {unsure:.2g} mm)"
-        if unsure >= 0.05
-        else ""
-    )
-    return np.array(
-        [x, y, -z]
-    ), f"ORIGIN z of {1000 * z:.4g} mm would put the sensor above the surface: its sign was turned{doubt}."
+    if unsure >= 0.05:
+        said += f" (if x, y were meant the other way round too, the centre of pressure moves by {unsure:.2g} mm)"
+    return np.array([x, y, -z]), f"{said}."
 
 
 def loaded_samples(wrench: Array, rate: float) -> NDArray[np.bool_]:
@@ -201,9 +191,8 @@ def _standing(vertical: Array, rate: float) -> slice | None:
     if size < 4 or abs(middle) < 5 * TOUCH_FORCE:
         return None
     blocks = vertical[: vertical.size // size * size].reshape(-1, size)
-    steady = (np.abs(blocks.mean(axis=1) - middle) <= SWAY_STEADY * abs(middle)) & (
-        blocks.std(axis=1) <= SWAY_STEADY * abs(middle)
-    )
+    most = SWAY_STEADY * abs(middle)
+    steady = (np.abs(blocks.mean(axis=1) - middle) <= most) & (blocks.std(axis=1) <= most)
     start, stop = longest_run(steady)
     return slice(start * size, stop * size) if (stop - start) * size >= SWAY_TIME * rate else None
 

@@ -12,10 +12,8 @@ _SMALL = 30.0  # N, an offset that needs no further proof
 _FLAT = 5.0  # N, spread of the block means up to which a plate counts as quiet
 SHARE = 1 / 3  # an offset of the sign of a load must stay below this share of the trial's range
 _SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
-DEAD, LONG = (
-    1.5,
-    0.5,
-)  # N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer
+DEAD, LONG = 1.5, 0.5
+"""N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer."""
 FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
@@ -52,11 +50,8 @@ def find_baseline(vertical: Array, *, zero: tuple[int, int] | None, rate: float)
     if written:
         return written
     low, high = _range(vertical)
-    return Baseline(
-        0,
-        0,
-        f"Zero: {why} The plate is never seen unloaded (vertical {low:.0f} to {high:.0f} N): nothing was subtracted.",
-    )
+    never = f"The plate is never seen unloaded (vertical {low:.0f} to {high:.0f} N): nothing was subtracted."
+    return Baseline(0, 0, f"Zero: {why} {never}")
 
 
 def is_unloaded(level: float, vertical: Array) -> bool:

@@ -68,13 +68,10 @@ def _with_forces(trial: Trial, path: Path) -> Trial:
     except FileRefused as error:
         return replace(trial, warnings=(*trial.warnings, f"The forces beside the markers were left out. {error}"))
     digest = sha256((trial.source.sha256 + sha256(read_bytes(path))).encode())
-    return replace(
-        trial,
-        plates=plates,
-        source=replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=plates_rate(plates)),
-        history=(*trial.history, f"Forces were read from {path.name} beside it.", *said),
-        warnings=(*trial.warnings, *table.warnings, *_out_of_step(trial, table)),
-    )
+    source = replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=plates_rate(plates))
+    history = (*trial.history, f"Forces were read from {path.name} beside it.", *said)
+    warnings = (*trial.warnings, *table.warnings, *_out_of_step(trial, table))
+    return replace(trial, plates=plates, source=source, history=history, warnings=warnings)
 
 
 def _out_of_step(trial: Trial, table: TimeTable) -> list[str]:

@@ -131,13 +131,10 @@ def for_joints(
             f"columns as the joints, or give recording.toml [joints] fixed = {{{missing[0]} = 0.0}} (rad) for a joint "
             f'that did not move, rename = {{"column" = "joint"}} for another name.'
         )
-    angle = np.stack(
-        [
-            found.angle[:, found.joints.index(name)] if name in found.joints else np.full(found.time.size, fixed[name])
-            for name in joints
-        ],
-        axis=1,
-    )
+    angle = np.empty((found.time.size, len(joints)))
+    for column, name in enumerate(joints):
+        read = name in found.joints
+        angle[:, column] = found.angle[:, found.joints.index(name)] if read else fixed[name]
     low, high = limits
     beyond = np.maximum(low - angle.min(axis=0), angle.max(axis=0) - high)
     worst = int(np.argmax(beyond))

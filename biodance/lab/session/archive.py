@@ -3,7 +3,7 @@
 import csv
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from pathlib import Path
 
@@ -15,15 +15,18 @@ from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.readers import extensions
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_in
-from biodance.records import CHANNELS, Array, Plate, Source, Trial, Wrench
+from biodance.records import CHANNELS, Plate, Source, Trial, Wrench
 
 NAMES = ("trials.csv", "recordings.csv", "index.csv")
 """Files that are looked for."""
-_TRIAL = ("trial", "recording", "file", "filename")
-_PERSON = ("person", "subject", "participant", "patient", "subject_id", "id")
-_DATE = ("date", "datetime", "day", "recorded")
-_MASS = ("mass_kg", "weight_kg", "body_mass_kg", "mass", "weight")
-_VISIT = ("visit", "session")
+_COLUMNS = {
+    "trial": ("trial", "recording", "file", "filename"),
+    "person": ("person", "subject", "participant", "patient", "subject_id", "id"),
+    "date": ("date", "datetime", "day", "recorded"),
+    "mass": ("mass_kg", "weight_kg", "body_mass_kg", "mass", "weight"),
+    "visit": ("visit", "session"),
+}
+"""What a table may call its columns."""
 _KINDS = 6
 """Different values up to which a column names conditions."""
 _CHANNEL = re.compile(r"\s*\"?(time|t|[FM][xyz])\s*[\[(]?\s*([\w·.]*)\s*[\])]?", flags=re.IGNORECASE)
@@ -49,7 +52,7 @@ def index_of(folder: Path) -> Path | None:
         path = folder / name
         if path.is_file():
             header = {cell.strip().lower() for cell in _rows(path)[0]}
-            if header & set(_TRIAL) and header & set(_PERSON):
+            if header & {*_COLUMNS["trial"]} and header & {*_COLUMNS["person"]}:
                 return path
     return None
 
@@ -64,34 +67,25 @@ def read_index(path: Path) -> tuple[IndexedTrial, ...]:
     """
     header, *rows = _rows(path)
     names = [cell.strip().lower() for cell in header]
-    table = [dict(zip(names, (cell.strip() for cell in row), strict=False)) for row in rows if any(row)]
-    found = {kind: next((n for n in some if n in names), "") for kind, some in _COLUMNS.items()}
+    column = {kind: next((name for name in some if name in names), "") for kind, some in _COLUMNS.items()}
     trials = []
-    for row in table:
-        recording = _recording(path.parent, row.get(found["trial"], ""))
-        if recording is None:
-            continue
-        person, said = row.get(found["person"], ""), row.get(found["date"], "")
-        visit = row.get(found["visit"], "") or " ".join(filter(None, (person, said[:16])))
-        mass = row.get(found["mass"], "")
-        trials.append((IndexedTrial(recording, person, visit, said, _number(mass)), row))
+    for cells_of_row in filter(any, rows):
+        row = dict(zip(names, (cell.strip() for cell in cells_of_row), strict=False))
+        trial, person, said, mass, visit = (row.get(column[kind], "") for kind in _COLUMNS)
+        recording = _recording(path.parent, trial)
+        if recording is not None:
+            visit = visit or " ".join(filter(None, (person, said[:16])))
+            trials.append((IndexedTrial(recording, person, visit, said, _number(mass)), row))
     if not trials:
         raise FileRefused(
-            f"{path}: names no recording that lies beside it. Check the column {found['trial'] or 'trial'}."
+            f"{path}: names no recording that lies beside it. Check the column {column['trial'] or 'trial'}."
         )
-    differing = _conditions(trials, [name for name in names if name not in found.values()])
-    return tuple(
-        IndexedTrial(one.path, one.person, one.visit, one.date, one.mass, {name: row[name] for name in differing})
-        for one, row in trials
-    )
-
-
-_COLUMNS = {"trial": _TRIAL, "person": _PERSON, "date": _DATE, "mass": _MASS, "visit": _VISIT}
+    differing = _conditions(trials, [name for name in names if name not in column.values()])
+    return tuple(replace(one, conditions={name: row[name] for name in differing}) for one, row in trials)
 
 
 def _rows(path: Path) -> list[list[str]]:
-    rows = list(csv.reader(read_text(path).splitlines()))
-    return rows or [[]]
+    return list(csv.reader(read_text(path).splitlines())) or [[]]
 
 
 def _number(text: str) -> float:
@@ -144,17 +138,13 @@ def read_plate_text(path: Path) -> Trial:
         )
     raw = np.array([_values(line, path, number) for number, line in enumerate(lines[1:], start=2)])
     time, *value = (raw[:, i] * factor for i, factor in (columns[name] for name in ("time", *CHANNELS)))
-    plate = _plate(np.asarray(time), np.column_stack(value))
-    return Trial(
-        path.stem, "fit", None, (plate,), Source(path, sha256(read_bytes(path)), "text"), history=plate.decisions
-    )
-
-
-def _plate(time: Array, value: Array) -> Plate:
-    sign = -1.0 if value[:, 2].mean() < 0 else 1.0
+    wrench = np.column_stack(value)
+    sign = -1.0 if wrench[:, 2].mean() < 0 else 1.0
     said = "Signs as written" if sign > 0 else "All signs turned, so that a load pushes the person up"
     how = f"{said}; the table does not tell where the plate lies: axes and origin are the plate's own."
-    return Plate("plate1", 0, np.full((4, 3), np.nan), Wrench(time, sign * value), (how,))
+    plate = Plate("plate1", 0, np.full((4, 3), np.nan), Wrench(np.asarray(time), sign * wrench), (how,))
+    source = Source(path, sha256(read_bytes(path)), "text")
+    return Trial(path.stem, "fit", None, (plate,), source, history=(how,))
 
 
 def _cells(line: str) -> list[str]:

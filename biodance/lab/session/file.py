@@ -116,8 +116,7 @@ class _Contents(_Entry):
 class SessionFile:
     """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
     ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or
-    file of the set that was
-    worn, "" where none is said (see `marker_sets.read_marker_set`).
+    file of the set that was worn, "" where none is said (see `read_marker_set`).
     """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
@@ -167,14 +166,8 @@ def read_session_file(folder: Path) -> SessionFile:
         visit |= content.session.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
     worn = [name for path, content in zip(paths, contents, strict=True) if (name := _marker_set(path, content.markers))]
-    return SessionFile(
-        SubjectEntry(**said),
-        trials,
-        tuple(paths),
-        _settings(paths, contents),
-        worn[-1] if worn else "",
-        VisitEntry(**visit),
-    )
+    settings, marker_set = _settings(paths, contents), (worn or [""])[-1]
+    return SessionFile(SubjectEntry(**said), trials, tuple(paths), settings, marker_set, VisitEntry(**visit))
 
 
 def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
@@ -235,7 +228,7 @@ def _sentence(path: Path, fault: Any) -> str:
     *table, key = (str(part) for part in fault["loc"]) if fault["loc"] else ("",)
     where = f"[{'.'.join(table)}]" if table else "the top level"
     if fault["type"] == "extra_forbidden":
-        legal = _legal_keys(table)
+        legal = list(_TABLES.get(table[0] if table else "", _Contents).model_fields)
         close = get_close_matches(key, legal, n=1, cutoff=0.3)
         hint = f" Did you mean {close[0]!r}?" if close else ""
         return f"{path}: {where} has the unknown key {key!r}.{hint} Legal: {', '.join(legal)}."
@@ -243,16 +236,9 @@ def _sentence(path: Path, fault: Any) -> str:
     return f"{wrong} {_HELP.get(key, '')}".rstrip()
 
 
-def _legal_keys(table: list[str]) -> list[str]:
-    models: dict[str, type[BaseModel]] = {
-        "session": VisitEntry,
-        "subject": SubjectEntry,
-        "trials": TrialEntry,
-        "markers": MarkersEntry,
-    }
-    return list(models.get(table[0] if table else "", _Contents).model_fields)
-
-
+_TABLES: dict[str, type[BaseModel]] = {
+    **{"session": VisitEntry, "subject": SubjectEntry, "trials": TrialEntry, "markers": MarkersEntry},
+}
 _HELP = {
     "mass_kg": "Give the body mass in kg.",
     "height_m": "Give the stature in m.",

@@ -2,33 +2,33 @@
 refused or guessed.
 """
 
-import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from statistics import median
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.markers.dress import dress
 from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.markers.still import is_still, movement
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.archive import visit_date
 from biodance.lab.session.file import SessionFile, VisitEntry, read_session_file
 from biodance.lab.session.recordings import (
+    each_once,
     find_recordings,
     guess_static,
+    of_one_person,
     recordings_below,
+    refuse_several_people,
     role_by_eclipse,
     role_by_name,
     vicon_notes,
 )
-from biodance.lab.session.strangers import PEOPLE, each_once, of_one_person
 from biodance.lab.session.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
-from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
 
@@ -149,7 +149,7 @@ def read_session(
         reasons[trials[-1].name] = reason
     if not trials:
         raise SessionRefused(_nothing_left(folder, files, refused, readers))
-    _refuse_several_people(folder, trials)
+    refuse_several_people(folder, trials)
     trials = _settle_static(each_once(trials, notes), file_says, reasons, notes)
     trials, strangers = of_one_person(trials, file_says.subject)
     refused |= strangers
@@ -177,21 +177,6 @@ def session_folder(folder: str | Path) -> Path:
     return folder.resolve() if folder.name in ("", "..") else folder
 
 
-def _refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:
-    """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people."""
-    for said, of, unit, alike in PEOPLE:
-        parts: dict[Path, list[float]] = {}
-        for trial in trials:
-            if math.isfinite(value := said(trial.measurements)):
-                parts.setdefault(trial.source.path.parent, []).append(value)
-        known = sorted((median(values), part.name) for part, values in parts.items())
-        if known and known[-1][0] > alike * known[0][0]:
-            raise SessionRefused(
-                f"{folder}: its folders hold several people: {of} {known[0][0]:.4g} {unit} in {known[0][1]}, "
-                f"{known[-1][0]:.4g} {unit} in {known[-1][1]}. Point at one of them; `biodance batch` goes through all."
-            )
-
-
 def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNotes | None) -> tuple[Role, str]:
     """Return the role of a recording and why it has it."""
     if role := settings.role(file.stem):
@@ -208,11 +193,8 @@ def _role(file: Path, folder: Path, settings: SessionFile, operator: EclipseNote
 def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
     """Return the trial with a warning for every plate that the operator marked as invalid in Eclipse."""
     invalid = [plate for plate, state in (operator.plates if operator else {}).items() if state.lower() == "invalid"]
-    said = tuple(
-        f"The operator marked {plate} as invalid in Eclipse: the foot may not have struck that plate cleanly."
-        for plate in invalid
-    )
-    return replace(trial, warnings=(*trial.warnings, *said)) if said else trial
+    why = "as invalid in Eclipse: the foot may not have struck that plate cleanly."
+    return replace(trial, warnings=(*trial.warnings, *(f"The operator marked {plate} {why}" for plate in invalid)))
 
 
 def _settle_static(

@@ -1,17 +1,24 @@
-"""Find the recordings in a folder, what belongs to them, and which role each trial plays."""
+"""Find the recordings in a folder, what belongs to them, and which role each trial plays; leave out the same recording
+twice, and those of another person.
+"""
 
 import filecmp
+import math
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from statistics import median
 
 from biodance.discovery import Chosen
-from biodance.errors import BiodanceError
+from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.markers.still import is_still, movement
 from biodance.lab.read import read_head, sniffed
 from biodance.lab.readers import Reader, extensions
+from biodance.lab.session.file import SubjectEntry
+from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
-from biodance.lab.weight import is_still, movement
 from biodance.records import Role, Trial
+from biodance.records.attention import WARNING
 
 STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")
 VALIDATE_WORDS = ("squat", "squats")
@@ -180,3 +187,67 @@ def _beside(file: Path, readers: Chosen[Reader]) -> Path | None:
         return beside(file) if beside else None
     except BiodanceError:
         return None
+
+
+_PEOPLE = ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m", 1.04))
+"""What files declare of a person: reader, name, unit, and from which ratio on it is somebody else's."""
+
+
+def each_once(trials: Sequence[Trial], notes: list[str]) -> list[Trial]:
+    """Return the trials without second copies of a file, which would count twice; ``notes`` says which were left aside.
+
+    Of two copies the static trial stays, else the one of the shorter name. A reader of one's own need not say what
+    bytes it read.
+    """
+    first: dict[str, Trial] = {}
+    for trial in sorted(trials, key=lambda one: (one.role != "static", len(one.name), one.name)):
+        kept = first.setdefault(_bytes_of(trial), trial)
+        if kept is not trial:
+            notes.append(
+                f"{WARNING}{trial.source.path.name} holds the same bytes as {kept.source.path.name} and was left "
+                f"aside, or it would count twice. Move one of the two away."
+            )
+    return [trial for trial in trials if first[_bytes_of(trial)] is trial]
+
+
+def _bytes_of(trial: Trial) -> str:
+    return trial.source.sha256 or f"{trial.source.path} {trial.name}"
+
+
+def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Trial], dict[str, str]]:
+    """Return the trials of the person of the static trial, and by file why others are refused: they declare another
+    mass or stature. What was ``typed`` in session.toml is believed of all of them.
+    """
+    static = next((trial for trial in trials if trial.role == "static"), None)
+    if static is None:
+        return list(trials), {}
+    strangers: dict[str, str] = {}
+    for (said, of, unit, alike), known in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
+        right = said(static.measurements)
+        if known is not None or not math.isfinite(right):
+            continue
+        for trial in trials:
+            value = said(trial.measurements)
+            if max(value / right, right / value) > alike:
+                strangers.setdefault(
+                    trial.source.path.name,
+                    f"declares another person: {of} {value:.4g} {unit}, but {right:.4g} {unit} in the static trial "
+                    f"{static.name}. Move it to that person's session; if it is the same one, write "
+                    f"{'mass_kg' if unit == 'kg' else 'height_m'} in session.toml.",
+                )
+    return [trial for trial in trials if trial.source.path.name not in strangers], strangers
+
+
+def refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:
+    """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people."""
+    for said, of, unit, alike in _PEOPLE:
+        parts: dict[Path, list[float]] = {}
+        for trial in trials:
+            if math.isfinite(value := said(trial.measurements)):
+                parts.setdefault(trial.source.path.parent, []).append(value)
+        known = sorted((median(values), part.name) for part, values in parts.items())
+        if known and known[-1][0] > alike * known[0][0]:
+            raise SessionRefused(
+                f"{folder}: its folders hold several people: {of} {known[0][0]:.4g} {unit} in {known[0][1]}, "
+                f"{known[-1][0]:.4g} {unit} in {known[-1][1]}. Point at one of them; `biodance batch` goes through all."
+            )

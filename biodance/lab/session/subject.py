@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from biodance.lab.markers.sets import landmark, read_marker_set
+from biodance.lab.markers.still import standing_mass
 from biodance.lab.session.file import SubjectEntry
-from biodance.lab.weight import standing_mass
 from biodance.records import Subject, Trial
 from biodance.settings import CheckLimits
 
@@ -61,10 +61,9 @@ def identify_subject(
     ordered = sorted(trials, key=lambda trial: trial.role != "static")
     sources = {**files, **{trial.source.path.name: trial.measurements for trial in ordered}}
     notes: list[str] = []
-    mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *_declared(sources, MASS_NAMES, LEGAL_MASS)], notes)
-    stature = _choose(
-        "stature", "m", [*_typed(typed.height_m), *_declared(sources, STATURE_NAMES, LEGAL_STATURE)], notes
-    )
+    masses, statures = _declared(sources, MASS_NAMES, LEGAL_MASS), _declared(sources, STATURE_NAMES, LEGAL_STATURE)
+    mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes)
+    stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
     sex = typed.sex or _declared_sex(sources)
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
     on_plates = [Declared(found, trial.name) for trial in ordered if (found := standing_mass(trial)) is not None]
@@ -78,22 +77,10 @@ def identify_subject(
             "deviations, as for a child). Set age in session.toml."
         )
     sex = sex or _likely_sex(stature, notes)
-    measures: dict[str, float] = {}
-    for values in sources.values():
-        measures = {**values, **measures}
-    return Subject(
-        mass,
-        stature,
-        sex,
-        age,
-        typed.name or name,
-        measures,
-        tuple(what for what in known if not known[what]),
-        typed.girths,
-        typed.scan or "",
-        typed.scan_up or "z",
-        typed.outlines,
-    ), tuple(notes)
+    measures = {name: value for values in reversed(sources.values()) for name, value in values.items()}
+    guessed = tuple(what for what in known if not known[what])
+    shape = (typed.girths, typed.scan or "", typed.scan_up or "z", typed.outlines)
+    return Subject(mass, stature, sex, age, typed.name or name, measures, guessed, *shape), tuple(notes)
 
 
 def declared_mass(measurements: Mapping[str, float]) -> float:
@@ -212,11 +199,8 @@ def _height(trial: Trial, *landmarks: str) -> float:
     marker_set = read_marker_set(trial.marker_set)
     found = [landmark(trial.markers, marker_set, name) for name in landmarks]
     heights = [points[:, 2][np.isfinite(points[:, 2])] for points in found if points is not None]
-    return (
-        float(np.mean([np.median(h) for h in heights]))
-        if len(heights) == len(found) and all(map(np.size, heights))
-        else math.nan
-    )
+    whole = len(heights) == len(found) and all(map(np.size, heights))
+    return float(np.mean([np.median(h) for h in heights])) if whole else math.nan
 
 
 def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:
@@ -230,11 +214,7 @@ def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M
 def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:
     """Return "M" from 1.70 m on and "F" below, which is right for most adults, and say so."""
     sex: Literal["F", "M"] = "M" if stature >= TALLER_IS_MALE else "F"
-    basis = (
-        f"a stature of {stature:.2f} m is more frequent among"
-        if math.isfinite(stature)
-        else "without a stature taken as"
-    )
-    people = "men" if sex == "M" else "women"
+    known = f"a stature of {stature:.2f} m is more frequent among"
+    basis, people = known if math.isfinite(stature) else "without a stature taken as", "men" if sex == "M" else "women"
     notes.append(f"The sex is not given: {basis} {people}, so tables for {sex} are used. Set sex in session.toml.")
     return sex

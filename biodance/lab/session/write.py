@@ -80,18 +80,16 @@ def _refuse_existing(target: Path) -> None:
 def _found(session: Session, target: Path) -> dict[str, Any]:
     """Return what the file will say, as plain values."""
     worn = next((trial.marker_set for trial in _statics_first(session) if trial.marker_set), "")
-    plates = [
-        {"trial": trial.name, "name": plate.name, "type": plate.type, "decisions": list(plate.decisions)}
-        for trial in session.trials
-        for plate in trial.plates
-    ]
+    trials, plates = [], []
+    for trial in session.trials:
+        trials.append({"name": trial.source.path.stem, "role": trial.role, "why": _why(session, trial)})
+        for plate in trial.plates:
+            said = {"name": plate.name, "type": plate.type, "decisions": list(plate.decisions)}
+            plates.append({"trial": trial.name, **said})
     return {
         "file": str(target),
         "subject": _subject(session.subject),
-        "trials": [
-            {"name": trial.source.path.stem, "role": trial.role, "why": _why(session, trial)}
-            for trial in session.trials
-        ],
+        "trials": trials,
         "markers": any(trial.markers is not None for trial in session.trials),
         "marker_set": worn.partition(" {")[0] or None,
         "marker_map": json.loads(worn.removeprefix(GUESSED)) if worn.startswith(GUESSED) else None,
@@ -212,14 +210,8 @@ def write_registered(
     _emptied(made_folder(folder))
     path = folder / f"{trial.source.path.stem}.c3d"
     first = trial.source.first_frame + int(np.searchsorted(trial.markers.time, markers.time[0]))
-    write_c3d(
-        path,
-        markers=markers,
-        plates=recordings,
-        analog_rate=rate,
-        parameters={"PROCESSING": as_written(trial.measurements)} if trial.measurements else None,
-        first_frame=first,
-    )
+    said_of = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
+    write_c3d(path, markers=markers, plates=recordings, analog_rate=rate, parameters=said_of, first_frame=first)
     own = trial.source.path.parent
     for static in session.of_role("static"):
         if static.source.path != trial.source.path:
