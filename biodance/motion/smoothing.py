@@ -142,8 +142,7 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
     if len(time) < need:
         raise TrialRefused(
             f"{len(time)} frames at {rate_of(time):g} Hz are too few for velocities behind a low-pass at "
-            f"{settings.cutoff:g} Hz: "
-            f"at least {need} are needed. Record longer, or use one frame as a static pose."
+            f"{settings.cutoff:g} Hz: at least {need} are needed. Record longer, or use one frame as a static pose."
         )
 
 

@@ -94,11 +94,7 @@ def measure_static(subject: Subject, static: Trial) -> Scaling:
     posture = with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
     sizes = measures(posture, static, subject)
     centres = static_centres(
-        posture.landmarks,
-        sizes,
-        hip=hip,
-        trunk_fraction=lengths["pelvis"] / lengths["trunk_head"],
-        flat=posture.still,
+        posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"], flat=posture.still
     )
     notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)

@@ -154,9 +154,8 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
         return centre, ""
     return usual, (
         f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of "
-        f"march, "
-        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee "
-        "marker."
+        "march, so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial "
+        "knee marker."
     )
 
 

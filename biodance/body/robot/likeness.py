@@ -43,9 +43,8 @@ def standing_frames(body: Body) -> Body:
         if not up[1] > LEANS:
             away = np.degrees(np.arccos(np.clip(up[1], -1, 1)))
             raise BiodanceError(
-                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; "
-                f"the feet must be flat "
-                "within 30 degrees. Give the joints zeros at which the robot stands."
+                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; the "
+                "feet must be flat within 30 degrees. Give the joints zeros at which the robot stands."
             )
         ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
         ahead /= np.linalg.norm(ahead)

@@ -203,8 +203,7 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     if axis == 0 or below[axis] > 0:
         raise FileRefused(
             f"{file.path}: at zero joint angles the feet are at {np.round(below, 3)} m from the root; the root must "
-            f"have x forwards and "
-            "y or z up, and the robot must stand upright at zero angles."
+            "have x forwards and y or z up, and the robot must stand upright at zero angles."
         )
     up, ahead = np.eye(3)[axis], np.eye(3)[0]
     if _backwards(feet, place, np.cross(ahead, up)):

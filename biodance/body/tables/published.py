@@ -146,9 +146,8 @@ def zatsiorsky(subject: Subject) -> Reference:
     """
     if subject.sex == "F":
         raise UnknownName(
-            "Table zatsiorsky_2002 holds the regressions for men only: the coefficients found for women give a foot "
-            "of negative mass. "
-            "Choose de_leva_1996 (the same women, without regression) or dumas_2018."
+            "Table zatsiorsky_2002 holds the regressions for men only: the coefficients found for women give a foot of "
+            "negative mass. Choose de_leva_1996 (the same women, without regression) or dumas_2018."
         )
     scale = subject.stature / de_leva.de_leva_stature("M")
     lumps = {}
@@ -160,8 +159,7 @@ def zatsiorsky(subject: Subject) -> Reference:
         if mass <= 0 or 2 * max(moments) > sum(moments) or min(moments) <= 0:
             raise UnknownName(
                 f"Table zatsiorsky_2002 gives no possible {part} for {subject.mass:.1f} kg and {subject.stature:.2f} "
-                f"m: "
-                "its regressions hold for men of 50 to 90 kg. Choose de_leva_1996."
+                "m: its regressions hold for men of 50 to 90 kg. Choose de_leva_1996."
             )
     return de_leva.joined("zatsiorsky_2002", subject.stature, "M", lumps)
 

@@ -192,8 +192,7 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     if "seated" in names and len(names) > 1:
         raise BiodanceError(
             f"Plan {plan.name}: blocks {', '.join(names)} mix sitting and standing, and nobody can be planned onto a "
-            f"stool; "
-            "make two plans, one seated and one standing."
+            "stool; make two plans, one seated and one standing."
         )
     doubles = [name for name in names if name in ("parallel", "right_forward")] or ["parallel"]
     feet, out = _double(body, plan, doubles[0]), list[Stance]()

@@ -121,8 +121,7 @@ def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit
                 what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), limit)
                 raise BiodanceError(
                     f"No posture {stance_words(stance)} keeps all limits; there would be one without the limit on "
-                    f"{what}. "
-                    "Widen that limit, or leave this stance out of the protocol."
+                    f"{what}. Widen that limit, or leave this stance out of the protocol."
                 )
     raise BiodanceError(
         f"No posture {stance_words(stance)} keeps all limits, whichever of them is left out. Leave this stance out of "

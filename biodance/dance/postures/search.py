@@ -13,16 +13,7 @@ import numpy as np
 
 from biodance.dance.limits import Limit
 from biodance.dance.postures.exchange import criterion, exchange, image_feet, mirror_posture, mirror_vectors, symmetric
-from biodance.dance.postures.posture import (
-    ATTEMPTS,
-    KEPT,
-    Exciting,
-    Posture,
-    initial_guess,
-    posture_at,
-    refuse,
-    solve,
-)
+from biodance.dance.postures.posture import ATTEMPTS, KEPT, Exciting, Posture, initial_guess, posture_at, refuse, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, static_grams
 from biodance.dance.problem.nlp import anyhow

@@ -176,12 +176,7 @@ _RADIUS, _SETTLED = 0.3, 1e-3
 """The first step's largest change of a variable; a gain that counts as none."""
 
 
-def minimise(
-    evaluate: Callable[[Array], Point],
-    start: Array,
-    *,
-    iterations: int = 30,
-) -> Solution:
+def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: int = 30) -> Solution:
     """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
     y, n = start.copy(), start.size
     point, hessian = evaluate(y), np.eye(n)

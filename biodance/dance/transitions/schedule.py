@@ -222,8 +222,6 @@ def _impossible(course: Course, k: int, way: Way) -> str:
     first, second = course.stances[k], course.stances[k + 1]
     return (
         f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({first.name} to {second.name}) cannot be "
-        f"made: "
-        f"{way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
-        f"postures at its ends. "
-        "Leave these feet out of the protocol, or widen that limit."
+        f"made: {way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
+        "postures at its ends. Leave these feet out of the protocol, or widen that limit."
     )

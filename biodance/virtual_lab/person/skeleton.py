@@ -63,13 +63,7 @@ def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd
 
 
 ARM_AND_LEG = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-TRUE_SEGMENTS = (
-    "pelvis",
-    "lumbar",
-    "thorax",
-    "head",
-    *(f"{side}_{part}" for side in SIDES for part in ARM_AND_LEG),
-)
+TRUE_SEGMENTS = ("pelvis", "lumbar", "thorax", "head", *(f"{side}_{part}" for side in SIDES for part in ARM_AND_LEG))
 _X, _Y, _Z = np.eye(3)
 
 LIMITS_DEGREES = {
