@@ -20,8 +20,7 @@ from biodance.dance.transitions import context, planner
 from biodance.dance.transitions import schedule as schedule_module
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext
 from biodance.dance.transitions.move import Move, Task
-from biodance.dance.transitions.planner import Way
-from biodance.dance.transitions.schedule import replan
+from biodance.dance.transitions.schedule import Way, replan
 from biodance.dance.verify import Margin
 from biodance.errors import BiodanceError
 from biodance.records import Subject

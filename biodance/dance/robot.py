@@ -26,7 +26,7 @@ from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import FOLLOWABLE_SHARE, Plan
 from biodance.dance.problem.stance import Stance
 from biodance.dance.transitions.move import Task
-from biodance.dance.transitions.planner import find_way
+from biodance.dance.transitions.schedule import find_way
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold

@@ -114,7 +114,7 @@ def _exchanged(walk: Walk, course: Walked, q: int) -> Iterator[Walked]:
     """Yield courses with another posture in place ``q``, the best first."""
     steps, moves = course.steps, course.moves
     before, after = [*steps[:q]], steps[q + 1] if q + 1 < len(steps) else None
-    stances, belief = tuple(step.catalogue.stance for step in steps), np.eye(walk.factor.shape[1])
+    stances, belief = tuple(step.catalogue.stance for step in steps), walk.information.beforehand
     for number, step in enumerate(before):
         belief = walk.belief_after(belief, before[:number], step)
     taken = {step.key for step in steps}

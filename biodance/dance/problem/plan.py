@@ -51,6 +51,7 @@ import numpy as np
 
 from biodance.body.human.limits import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
+from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
@@ -59,6 +60,9 @@ _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated"
 """Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
 on a stool.
 """
+
+_BRIEF = 1.0
+"""s that postures in between are held at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +151,10 @@ class Plan:
     def share(self) -> float:
         """Share of every half width of the base of support that all limits leave: for it the feet are set."""
         return min((limit.support_share for limit in self.limits), default=1.0)
+
+    def hold_on(self, stance: Stance) -> float:
+        """Return for how long a posture is held on these feet, s: postures in between only shortly."""
+        return self.hold if stance.over is None else min(_BRIEF, self.hold)
 
     def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
         """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its

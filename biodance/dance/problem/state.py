@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.feet import foot_forces
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import Stance, foot_forces
 from biodance.records import Array
 from biodance.spatial import spatial_cross, wrench_of_force
 
