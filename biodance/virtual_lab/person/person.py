@@ -11,14 +11,14 @@ from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Array, Sip, Subject, freeze
 from biodance.virtual_lab.person.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
-from biodance.virtual_lab.person.placement import glue_markers
 from biodance.virtual_lab.person.skeleton import (
-    LIMITS_DEGREES,
     TRUE_SEGMENTS,
     Proportions,
     build_joints,
     draw_proportions,
+    glue_markers,
     on_side,
+    virtual_people,
 )
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
@@ -122,7 +122,8 @@ def make_person(
     size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(size, subject, seed, tolerances=t, population=population)
     joints = build_joints(size)
-    lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
+    ranges = virtual_people()["range_deg"]
+    lower, upper = np.radians([ranges[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
     limits = JointLimits(
         lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0)
     )

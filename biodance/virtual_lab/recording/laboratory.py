@@ -13,8 +13,7 @@ from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.person.placement import MARKER_RADIUS
-from biodance.virtual_lab.person.skeleton import small_rotation
+from biodance.virtual_lab.person.skeleton import MARKER_RADIUS, small_rotation
 from biodance.virtual_lab.recording.cameras import TISSUES, SoftTissue, draw_soft_tissue, film
 from biodance.virtual_lab.recording.plates import HALF_BELT, HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
