@@ -142,9 +142,7 @@ class Dance(Sendable):
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """False for postures in between, (P,) bool: weight over one foot of two, and stops that are not held as
-        long.
-        """
+        """(P,) bool, False for postures in between: weight over one foot of two, and stops not held as long."""
         return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property

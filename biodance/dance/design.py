@@ -131,9 +131,7 @@ def _postures(work: DesignContext) -> Course:
 
 
 def _joined(work: DesignContext, course: Course, ways: list[Way], notes: tuple[str, ...]) -> Dance:
-    """Return the dance of the postures of a course and the ways between them, stops on the way included, which are not
-    held.
-    """
+    """Return the dance of the postures of a course and the ways between them, stops on the way not held."""
     plan, (x, stances) = work.plan, (course.x, course.stances)
     rows, feet, hold, under_ = [x[0]], [stances[0]], [plan.hold], list[Stance]()
     for k, way in enumerate(ways):

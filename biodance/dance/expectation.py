@@ -68,9 +68,7 @@ def expect(dance: Dance, *, steps: int = 10) -> Expectation:
 
 
 def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
-    """Return what is expected when a ``motion`` at ``RATE`` or a multiple stops at each of the instants ``ends`` (D,)
-    s, increasing.
-    """
+    """Return what is expected when a ``motion`` at a multiple of ``RATE`` stops at each instant ``ends`` (D,) s."""
     wrench = predict_wrench(body, motion)
     noise = typical_noise(wrench)
     size = 10 * len(body.segments)
@@ -135,9 +133,7 @@ def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
 
 
 def parameter_deviations(belief: Posterior) -> Array:
-    """Return the standard deviations (N, 3) of mass kg, CoM m (per axis) and moments of inertia kg·m² of every
-    segment.
-    """
+    """Return the deviations (N, 3) of mass kg, CoM m per axis and moments of inertia kg·m² of every segment."""
     out = []
     for first in range(0, belief.prior.phi.size, 10):
         cut = slice(first, first + 10)

@@ -135,9 +135,7 @@ class PlannedDance:
         return x
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
-        """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands if it does (T, 2, 3)
-        m.
-        """
+        """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
         way = ((when - self.start[rows]) / np.maximum(self.end[rows] - self.start[rows], 1e-9))[:, None]
         before, during, after = np.moveaxis(self.down[rows], 1, 0)
         rise = np.where(before, _eased(way / _LIFT), 1.0) * np.where(after, _eased((1 - way) / _LIFT), 1.0)
@@ -145,9 +143,7 @@ class PlannedDance:
         return np.where(during, 0.0, rise), ankle
 
     def _tops(self, x: Array, up: Array, ankle: Array) -> Array:
-        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a foot that is up gives
-        way.
-        """
+        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a raised foot yields."""
         tops = self.chain.root_heights(x, ankle, _STRAIGHT) + up.T
         return np.asarray(-np.log(np.exp(-_SOFT * tops).sum(axis=0)) / _SOFT)
 

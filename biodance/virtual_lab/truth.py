@@ -1,6 +1,4 @@
-"""The truth of a virtual session as one JSON document: in the 16 true segments, and merged to the 12 segments of the
-reading model.
-"""
+"""The truth of a virtual session as one JSON document: in the 16 true segments, and in the 12 of the reading model."""
 
 from dataclasses import asdict
 from typing import Any
@@ -94,9 +92,7 @@ def _plate(corners: Array, plate: Any) -> dict[str, Any]:
 
 
 def _static_pose(person: Person, instruments: Instruments, performances: list[Performance]) -> dict[str, Any] | None:
-    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time); None
-    without such a trial.
-    """
+    """Return where the 12 true frames were in the middle of the static trial (cameras' axes, marker time), if any."""
     static = next((p for p in performances if p.plan.role == "static"), None)
     if static is None:
         return None

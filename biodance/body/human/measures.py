@@ -1,6 +1,4 @@
-"""The subject's measures that joint centres need: typed ones from the file, otherwise from the markers or from
-proportions.
-"""
+"""The subject's measures that joint centres need: typed ones from the file, else from markers or proportions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -92,9 +90,7 @@ def elbow(shoulder_centre: Array, lateral: Array, mid_wrist: Array, distance: fl
 
 
 def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, side: float) -> Array:
-    """Return the wrist centre (3,) m under a wrist bar on the back of the wrist: square to the bar and to the
-    forearm (plug-in gait).
-    """
+    """Return the wrist centre (3,) m under a bar on its back: square to the bar and to the forearm (plug-in gait)."""
     middle = (radial + ulnar) / 2
     back = side * np.cross(radial - ulnar, elbow_centre - middle)
     return np.asarray(middle - distance * unit(back))

@@ -55,9 +55,7 @@ class Scaling:
     gravity: float = STANDARD_GRAVITY
 
     def body(self) -> tuple[Body, Array]:
-        """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are
-        met exactly.
-        """
+        """Return the scaled body and its posture q (30,) in the static trial, meeting all markers exactly."""
         frames = segment_frames(self.centres)
         skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
         doubts = _doubts(skeleton, self.subject)

@@ -77,9 +77,7 @@ def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
 
 
 def _ankle(body: Body, segment: int) -> Array:
-    """Return the point (3,) m, in the segment's frame, on the axis of its joint that is nearest to the axis before
-    it.
-    """
+    """Return the point (3,) m, in the segment's frame, on its joint's axis that is nearest to the axis before it."""
     last = body.joints[body.segment_joint[segment]]
     if last.parent < 0:
         return np.zeros(3)
@@ -104,9 +102,7 @@ class Likeness:
 
 
 def likeness(body: Body, to: Likeness) -> Body:
-    """Return the body of the same shape and angles, with all lengths, masses, strengths and speeds changed by the
-    factors of ``to``.
-    """
+    """Return the body of the same shape with lengths, masses, strengths and speeds changed by the factors of ``to``."""
     length, mass, limits = to.length, to.mass, body.limits
     units: Array = mass * np.tile([1.0, *[length] * 3, *[length**2] * 6], len(body.segments))
     return replace(

@@ -59,9 +59,7 @@ def mended_dance(walk: Walk, steps: list[DanceStep], moves: list[Move], workers:
 
 
 def _mended_at(walk: Walk, course: Walked, p: int, found: Rehearsed, workers: Executor) -> Walked:
-    """Return the course with another way to posture ``p`` or another posture there, if that is safe; else what is
-    nearest to it.
-    """
+    """Return the course with another way to posture ``p`` or another posture there that is safe or nearest to it."""
     best, least = course, _room(walk, course, (p,), found.failed, workers)
     for other, only in _others(walk, course, p, found):
         room = _room(walk, other, only, found.failed, workers)

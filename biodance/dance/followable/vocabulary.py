@@ -186,9 +186,7 @@ def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
 
 
 def own_joint(part: str, joint: str) -> str:
-    """Return the name of the body's joint of a word's angle: ``right_arm``, ``shoulder_flexion`` ->
-    ``right_shoulder_flexion``.
-    """
+    """Return the joint of a word's angle: ``right_arm``, ``shoulder_flexion`` -> ``right_shoulder_flexion``."""
     side = part.partition("_")[0]
     return f"{side}_{joint}" if side in SIDES else joint
 

@@ -58,9 +58,7 @@ def choose(chain: Chain, x: Array, stances: tuple[str, ...], plan: Plan) -> Choi
 
 
 def _cost(plan: Plan, stance: str, last: dict[str, int]) -> float:
-    """Return the seconds of one more posture; feet that were not used yet cost two moves through postures in
-    between.
-    """
+    """Return the seconds of one more posture; feet not used yet cost two moves through postures in between."""
     return plan.move + plan.hold + (2 * plan.move if stance not in last else 0.0)
 
 
@@ -89,9 +87,7 @@ METRE = 3.0
 
 
 def order_postures(x: Array, groups: list[list[int]]) -> list[int]:
-    """Return the rows of ``x`` (P, n) coordinates in an order in which neighbours are near; groups stay together, one
-    after the other.
-    """
+    """Return the rows of ``x`` (P, n) in an order in which neighbours are near; groups stay together, in turn."""
     scaled = x.copy()
     scaled[:, :3] *= METRE
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
@@ -182,9 +178,7 @@ def _over(feet: Stance, side: int) -> Stance:
 
 
 def weight_shifts(last: Stance, goal: Stance) -> list[Stance]:
-    """Return the postures in between that lead from one stance to another: set down, shift, step with the right foot,
-    shift.
-    """
+    """Return the postures in between from one stance to another: set down, shift, step with the right foot, shift."""
     over = last.planted[0] if len(last.planted) == 1 else None
     out = [_over(last, over)] if over is not None and goal.planted != last.planted else []
     if not np.array_equal(last.ankle, goal.ankle):

@@ -1,6 +1,4 @@
-"""One static posture on given feet: found within all limits, near its neighbours, or refused by the name of the limit
-that forbids it.
-"""
+"""One static posture on given feet: found within all limits, or refused by the name of the limit that forbids it."""
 
 import math
 from dataclasses import dataclass
@@ -50,9 +48,7 @@ ATTEMPTS = 8
 
 
 def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
-    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints
-    anywhere.
-    """
+    """Return the coordinates (n,) of a squat of any depth over the support, arms anywhere; seated: all anywhere."""
     low, high, x = chain.body.limits.lower, chain.body.limits.upper, np.zeros(chain.size)
     x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
     if stance.seat:
@@ -105,9 +101,7 @@ def intermediate_posture(
 
 
 def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit, ...]) -> NoReturn:
-    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there
-    would be one.
-    """
+    """Raise the BiodanceError that names the limit without which there would be a posture on these feet."""
     kept = [limit for limit in limits if limit.at_rest]
     for limit in sorted(kept, key=lambda limit: limit.suspicion):
         others = tuple(other for other in kept if other is not limit)
@@ -127,9 +121,7 @@ def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit
 
 @dataclass(frozen=True, eq=False)
 class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the
-    performer's ease.
-    """
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and its ease."""
 
     blocks: Blocks
     others: Array

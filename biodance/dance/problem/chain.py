@@ -40,9 +40,7 @@ class Chain(Sendable):
             )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to
-        make.
-        """
+        """Return what goes to other processes: all but what pinocchio computes in, which is made faster than sent."""
         return {name: value for name, value in super().__getstate__().items() if name != "_own"}
 
     @property

@@ -20,9 +20,7 @@ from biodance.dance.problem.state import Closure, State, close_legs
 from biodance.records import Array
 
 Objective = Callable[[State], tuple[float, Array]]
-"""Returns f and its slopes (3, T, n) by x, v, a; f may be judged without the slopes only at the price of computing
-them.
-"""
+"""Returns f and its slopes (3, T, n) by x, v, a, which are always computed together."""
 
 
 def anyhow(state: State) -> tuple[float, Array]:
@@ -130,9 +128,7 @@ class Evaluation:
         return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
 
     def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
-        """Return slopes (R, K * free) by the points of slopes (R, n) by coordinates, rates and accelerations at
-        instants ``time`` (R,).
-        """
+        """Return slopes (R, K * free) by the points, of slopes (R, n) by x, v, a at the instants ``time`` (R,)."""
         free, basis = self.problem.free, self.problem.basis
         by = [closure.followed(slopes[0], time)]
         if len(slopes) > 1 and basis[1].any():
@@ -212,9 +208,7 @@ def worst(margins: Array) -> float:
 def quadratic_step(
     hessian: Array, gradient: Array, jacobian: Array, margins: Array, radius: float
 ) -> tuple[Array, Array]:
-    """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d|
-    <= radius.
-    """
+    """Return the step d (n,) and the prices (m,): min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d| <= radius."""
     from scipy.optimize import nnls
 
     n, box, price = gradient.size, np.eye(gradient.size), np.zeros(len(jacobian))
@@ -239,9 +233,7 @@ def quadratic_step(
 
 
 def update(hessian: Array, step: Array, change: Array) -> Array:
-    """Return the BFGS update, damped after Powell so that it stays positive definite; the identity where it would
-    not.
-    """
+    """Return the BFGS update, damped after Powell to stay positive definite; the identity where it would not."""
     curved = hessian @ step
     bend = float(step @ curved)
     if bend < 1e-14:

@@ -57,9 +57,7 @@ from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
 _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
-"""Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
-on a stool.
-"""
+"""Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
 
 _BRIEF = 1.0
 """s that postures in between are held at most."""
@@ -157,9 +155,7 @@ class Plan:
         return self.hold if stance.over is None else min(_BRIEF, self.hold)
 
     def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
-        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its
-        place.
-        """
+        """Return the plan with ``more`` limits, objects or classes; one of a name that is there takes its place."""
         return replace(self, limits=join_limits(self.limits, more))
 
     def emphasis(self, segments: tuple[str, ...]) -> Array:

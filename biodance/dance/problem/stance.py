@@ -13,22 +13,16 @@ from biodance.threads import Sendable
 _WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
 STRIP, _CLEAR = 0.1, 1.25
-"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half:
-room between feet.
-"""
+"""Of a sole's width: least overlap of the reduced supports of both feet and of one; room between the feet."""
 _FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}
 STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
-"""(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to
-their middle.
-"""
+"""(4, 2) m, the legs of a stool from below the hips: a seat of 0.4 m by 0.4 m bears the thighs to their middle."""
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
 _GRIP = (0.18, 0.28, 0.50)
-"""Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as
-they are set).
-"""
+"""Grips of a walking frame: m ahead of the heels, m to the side, height over stature (crease of the wrist)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +62,7 @@ class Stance(Sendable):
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both
-        bases.
-        """
+        """(2,) m middle of the base of support: of its bounding box; weight over one foot: deepest in both bases."""
         if self.over is not None:
             from scipy.optimize import linprog
 
@@ -178,9 +170,7 @@ def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
 
 
 def hip_width(body: Body) -> float:
-    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where
-    legs are straight.
-    """
+    """Return the distance (m) sideways between the ankles of the upright body: its hips' with straight legs."""
     from biodance.motion.kinematics import poses
 
     place = poses(body, body.neutral[None]).position[0]
@@ -222,9 +212,7 @@ def stance_words(stance: Stance) -> str:
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
-    to.
-    """
+    """A stretch of a dance from ``start`` to ``end`` s on the same feet; ``posture`` is held, or moved to."""
 
     start: float
     end: float

@@ -81,9 +81,7 @@ def _doubted(task: Task, way: Way) -> str:
 
 
 def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
-    """Return the two moves by way of ``stop`` (n,), slow ones since the direct way was impossible even so, none if one
-    is not possible.
-    """
+    """Return the two moves by way of ``stop`` (n,), slow ones as the direct way was impossible; none if one fails."""
     parts: list[Move] = []
     for ends in ((task.ends[0], stop), (stop, task.ends[1])):
         slow = replace(task, ends=np.array(ends), duration=task.duration * SLOWER[-1])
@@ -101,9 +99,7 @@ def _way(moves: list[Move], stops: Array) -> Way:
 
 
 _ENDS = (1, 0, 1)
-"""Which end of a move that cannot be made is exchanged: where it goes to, where it comes from, the new one where it
-goes to again.
-"""
+"""Which end of a move that cannot be made is exchanged: where it goes to, comes from, the new one where it goes to."""
 REST = (0.0, 0.6, 0.15)
 """Share of their neighbours' joint angles that postures in between keep in these attempts."""
 STARTS, _SHARPNESS, _ITERATIONS = 6, 8, 20
@@ -231,9 +227,7 @@ def _exchanged(work: DesignContext, course: Course, places: list[int], attempt: 
 
 
 def _another(work: DesignContext, course: Course, place: int, rng: np.random.Generator) -> Array:
-    """Return the most exciting posture (n,) beside all others from a few fresh starts; the old one where none is
-    feasible.
-    """
+    """Return the most exciting posture (n,) beside all others from a few fresh starts, or the old one."""
     chain, blocks, stance = work.chain, work.blocks, course.stances[place]
     places = [k for k, one in enumerate(course.stances) if one.over is None and k != place]
     others = [posture_at(chain, course.stances[k], course.x[k]) for k in places]

@@ -1,6 +1,4 @@
-"""All causes that can be hidden in a session, by name: in the files, in the person, around the person; asked for in
-words.
-"""
+"""All causes that can be hidden in a session, by name: in the files, in and around the person; asked for in words."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,9 +22,7 @@ from biodance.virtual_lab.recording.merge import load_on
 
 @dataclass(frozen=True)
 class Hidden:
-    """One cause to hide: its ``name``, where (``target``) and how large (``values`` by parameter, SI units; a place
-    has three numbers).
-    """
+    """One cause to hide: its ``name``, where (``target``), how large (``values`` by parameter, SI units)."""
 
     name: str
     target: str
@@ -53,9 +49,7 @@ class Hidden:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a cause may change: the ``visit``, and the ``loads`` that the ``person`` carries through the trials of
-    ``protocol``.
-    """
+    """What a cause may change: the ``visit``, and the ``loads`` of the ``person`` in the trials of ``protocol``."""
 
     person: Person
     protocol: Protocol
@@ -154,9 +148,7 @@ def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidde
 
 
 def _longer(cause: Hidden, scene: Scene) -> Scene:
-    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower, with all that
-    hangs on it.
-    """
+    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower."""
     ends = {
         f"{side}_{upper}": f"{side}_{joint}"
         for side in SIDES

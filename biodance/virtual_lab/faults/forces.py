@@ -73,9 +73,7 @@ def acting(act: Callable[..., Array]) -> Callable[..., AppliedForce]:
 
 @acting
 def external_contact(performance: Performance, time: Array, target: str, force: float) -> Array:
-    """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part of the body; one
-    in every 4 s.
-    """
+    """Touch a rail or be held: touches of ``force`` (N), mostly from below, at a part of the body; one in every 4 s."""
     rng = stream(performance.person.seed, "touch", target, performance.plan.name)
     direction = np.array([0.35 * rng.normal(), 0.35 * rng.normal(), 1.0])
     strength = force * touches(time, rng, every=4.0) * (performance.plan.role != "static")
@@ -104,9 +102,7 @@ def body_weight_support(performance: Performance, time: Array, target: str, forc
 
 @acting
 def slack_harness(performance: Performance, time: Array, target: str, stiffness: float) -> Array:
-    """Hang a safety rope that is loose until the hips are 5 cm down, then pulls with the square of its stretch (N =
-    stiffness m²).
-    """
+    """Hang a safety rope, loose until the hips are 5 cm down, that pulls with its stretch squared (N/m²)."""
     point = grip("trunk_head", true_poses(performance, time))
     away, length = _rope(performance, point)
     stretch = np.maximum(length - length[0] - 0.05, 0.0)
@@ -115,9 +111,7 @@ def slack_harness(performance: Performance, time: Array, target: str, stiffness:
 
 @acting
 def table_edge(performance: Performance, time: Array, target: str, force: float) -> Array:
-    """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in every 2 s, of
-    either sign.
-    """
+    """Let the right thigh run against furniture: horizontal pushes of ``force`` (N), one in 2 s, of either sign."""
     rng = stream(performance.person.seed, "table", performance.plan.name)
     strength = np.zeros_like(time)
     for start in np.arange(time[0], time[-1] - 2.0, 2.0):
@@ -129,18 +123,14 @@ def table_edge(performance: Performance, time: Array, target: str, force: float)
 
 @acting
 def spinning_wheel(performance: Performance, time: Array, target: str, momentum: float) -> Array:
-    """Carry a wheel that spins in a rucksack about the right-left axis of the chest: its angular ``momentum``
-    (N·m·s) resists turning.
-    """
+    """Carry a spinning wheel about the right-left axis of the chest: its ``momentum`` (N·m·s) resists turning."""
     turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
     return np.concatenate([np.zeros((time.size, 3)), -np.gradient(momentum * turn[:, :, 2], time, axis=0)], axis=1)
 
 
 @dataclass(frozen=True)
 class Spring:
-    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 or 0 = it can move along
-    lab x, y, z.
-    """
+    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 = moves along x, y, z."""
 
     frequency: float
     damping: float
@@ -170,9 +160,7 @@ def swing(acceleration: Array, step: float, spring: Spring) -> tuple[Array, Arra
 
 
 def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedForce:
-    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but hanging there on a
-    spring.
-    """
+    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but on a spring there."""
 
     def act(performance: Performance, time: Array) -> Array:
         from scipy.interpolate import make_interp_spline
@@ -195,9 +183,7 @@ def wobbling_mass(person: Person, target: str, mass: float) -> AppliedForce:
 
 
 def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> tuple[AddedLoad, AppliedForce]:
-    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, and what
-    sloshing adds.
-    """
+    """Carry ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, what sloshing adds."""
     segment = _carrier(target)
     place = person.body.sip.com[TRUE_SEGMENTS.index(segment)] + np.array([-0.16, 0.0, 0.0])
     return AddedLoad(segment, mass, place, np.full(3, 0.05)), loose(segment, place, sloshing, LIQUID)

@@ -90,9 +90,7 @@ def on_recording(change: Callable[..., Recording]) -> Builder:
 
 
 def _in_wrench(target: str, change: Callable[[Array, Recording], Array]) -> Fault:
-    """Return the fault that changes the wrench (S, 6) of the plate that the target names (``plate2:Fz``), or of the
-    first one.
-    """
+    """Return the fault that changes the wrench (S, 6) of the plate in the target (``plate2:Fz``), or of the first."""
 
     def fault(recording: Recording) -> Recording:
         plate = recording.plates[_plate_index(target, recording)]

@@ -126,9 +126,7 @@ def copy_dance(
     performer: Performer = Performer(),
     tolerances: LabTolerances = REALISTIC,
 ) -> Performance:
-    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; the same arguments give the
-    same motion.
-    """
+    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; reproducible."""
     rng = stream(person.seed, "copy", str(session), shown.name)
     duration, *clock = performer.clock(
         stream(person.seed, "tempo", str(session), shown.name), float(np.ptp(shown.motion.time))

@@ -70,9 +70,7 @@ class Pose:
 def upper_body(
     person: Person, curves: Curves, stance: FootStance, tolerances: LabTolerances, rng: np.random.Generator
 ) -> Pose:
-    """Return the pose above the legs: the posture's angles, shared out over the true joints, with what no
-    instruction asks for.
-    """
+    """Return the pose above the legs: the posture's angles over the true joints, with what no instruction asks for."""
     body, t, time = person.body, tolerances, curves.time
     angle = np.zeros((time.size, len(body.joints)))
     unasked = dict(zip(_UNASKED, smooth_noise(rng, time, columns=len(_UNASKED), cutoff=0.8).T, strict=True))
@@ -134,9 +132,7 @@ def _pelvis_turn(angle: Array, heading: float) -> Array:
 
 
 def turn_about(axis: Array, angle: Array) -> Array:
-    """Return rotations (T, 3, 3) about one unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not those of
-    `biodance.spatial`.
-    """
+    """Return rotations (T, 3, 3) about a unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not `spatial`'s."""
     return Rotation.from_rotvec(np.multiply.outer(angle, axis)).as_matrix()
 
 
@@ -149,9 +145,7 @@ def _quaternion(turn: Array) -> Array:
 
 
 def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
-    """Return the height (T,) m of the pelvis origin over ``xy`` (T, 2): as high as the planted legs allow, minus the
-    posture's depth.
-    """
+    """Return the height (T,) m of the pelvis over ``xy`` (T, 2): as high as planted legs allow, less the depth."""
     tops, lengths = [], []
     for side in SIDES:
         leg = Leg.of(person.body, side)

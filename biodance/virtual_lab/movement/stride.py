@@ -31,8 +31,7 @@ _AIM = {False: 0.57, True: 0.75}
 """Of stature, height at which the ground forces aim: the centre of mass in walking, above it in running (Maus et al.
 2010, doi:10.1038/ncomms1073)."""
 _SPIN, _PLACE = 1e-3, 1e-6
-"""N·m·s and m: a stride is settled when angular momentum and centre of mass are everywhere this close to what the
-forces make of them."""
+"""N·m·s and m: a stride is settled when angular momentum and centre of mass are this close to the forces' own."""
 _SHORT = 1e-3
 """m by which the longest distance from hip to ankle may miss that of a nearly straight leg."""
 _PAD = 12

@@ -18,9 +18,7 @@ tables differ among themselves (de Leva 1996, Dumas 2018, Zatsiorsky)."""
 
 
 def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
-    """Return J (4, 4) of a body of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes
-    at the CoM.
-    """
+    """Return J (4, 4) of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes at the CoM."""
     gyration = np.asarray(radii, float) ** 2
     second = np.diag(0.5 * gyration.sum() - gyration)
     out = np.empty((4, 4))
@@ -31,9 +29,7 @@ def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
 
 
 def parameters_of_inertia(J: Array) -> Array:
-    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of a pseudo-inertia, about the frame's origin (kg,
-    kg·m, kg·m²).
-    """
+    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the frame's origin (kg, kg·m, kg·m²)."""
     second = J[:3, :3]
     inertia = np.trace(second) * np.eye(3) - second
     rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
@@ -59,9 +55,7 @@ def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
 
 
 def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
-    """Return J after a random linear map of the body about its CoM and a random shift, both relative to the body's
-    own size.
-    """
+    """Return J after a random linear map of the body about its CoM and a random shift, relative to its own size."""
     com = J[:3, 3] / J[3, 3]
     centred = place_inertia(J, np.eye(3), -com)
     size = np.sqrt(np.diag(centred)[:3] / J[3, 3])

@@ -83,9 +83,7 @@ class Person:
         return float(self.loaded_body.sip.mass.sum())
 
     def with_markers_moved(self, shifts: Mapping[str, Array]) -> "Person":
-        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames; UnknownName
-        lists the labels.
-        """
+        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames."""
         markers = self.body.markers
         position = np.array(markers.position)
         for label, shift in shifts.items():
@@ -163,9 +161,7 @@ def _box(phi: Array) -> Array:
 
 
 def _sole(size: Proportions, side: str) -> Foot:
-    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al.
-    2017).
-    """
+    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (Millard et al. 2017)."""
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
     corners = [
         (back, 0.6 * half),

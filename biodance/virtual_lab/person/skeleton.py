@@ -97,9 +97,7 @@ class _Builder:
         self.joints: list[Joint] = []
 
     def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
-        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its
-        last index.
-        """
+        """Append one anatomical joint (rotations in turn) at ``place`` (3,) m in the parent's; return its index."""
         rotations = ROTATIONS[joint]
         row = TRUE_SEGMENTS.index(segment) if segment else -1
         for k, (motion, axis) in enumerate(rotations):
@@ -141,9 +139,7 @@ def build_joints(size: Proportions) -> tuple[Joint, ...]:
 MARKER_RADIUS = 0.007
 """m; 14 mm markers, the plug-in-gait default."""
 SKIN_PLANE = np.array([1.0, 1.0, 0.35])
-"""Placement errors are along the skin; through it (z for the lateral markers of the limbs) the bone holds the
-marker.
-"""
+"""Placement errors are along the skin; through it (z of the limbs' lateral markers) bone holds the marker."""
 
 Place = tuple[str, tuple[float, float, float]]
 

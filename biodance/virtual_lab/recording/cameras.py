@@ -1,6 +1,4 @@
-"""What the cameras record: marker trajectories with skin and fat between bone and marker, noise, gaps, in the lab's
-own axes.
-"""
+"""What the cameras record: markers with skin and fat between them and the bone, noise, gaps, in the lab's axes."""
 
 from dataclasses import dataclass
 
@@ -92,9 +90,7 @@ def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
 
 
 def reference_angles(person: Person) -> Array:
-    """Return the true joint angles (39,) rad of the posture in which the markers were glued: upright, arms slightly
-    away.
-    """
+    """Return the true joint angles (39,) rad in which the markers were glued: upright, arms slightly away."""
     angles = dict(person.habits.angles)
     for side in SIDES:
         flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
@@ -136,9 +132,7 @@ LONGEST_GAP, SHORTEST_GAP = 0.30, 0.05
 
 
 def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng: np.random.Generator) -> Array:
-    """Return the true marker positions (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what the skin adds;
-    true vertical.
-    """
+    """Return the true markers (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what skin adds; true vertical."""
     from scipy.interpolate import make_interp_spline
 
     person = performance.person

@@ -25,18 +25,14 @@ MERGED: dict[str, tuple[str, tuple[str, ...]]] = {
     "left_upper_arm": ("left_shoulder_rotation", ("left_upper_arm",)),
     "left_forearm_hand": ("left_elbow_flexion", ("left_forearm", "left_hand")),
 }
-"""Each of the 12 segments: the true joint whose frame it is written in ("" = the root), and the true segments it
-consists of.
-"""
+"""Each of the 12 segments: the true joint in whose frame it is written ("" = the root), and its true segments."""
 CARRIERS = {"trunk_head": "thorax", "right_forearm_hand": "right_forearm", "left_forearm_hand": "left_forearm"}
 """The true segment that carries a load on a merged one."""
 TrueFrames = dict[str, tuple[Array, Array]]
 
 
 def _frames(person: Person, body: Body, q: Array | None = None) -> tuple[TrueFrames, TrueFrames]:
-    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as the
-    markers were glued.
-    """
+    """Return the poses (3, 3), (3,) m of the 12 frames and of the 16 segments at ``q`` (46,), by default as glued."""
     if q is None:
         q = body.neutral
         q[7:] = reference_angles(person)
