@@ -17,8 +17,8 @@ from biodance.virtual_lab.person.flesh import (
 from biodance.virtual_lab.person.person import AddedLoad, make_person
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN, virtual_people
 from biodance.virtual_lab.recording.cameras import reference_angles
-from biodance.virtual_lab.recording.merge import MERGED, load_on, merged_sip, place_in_12
 from biodance.virtual_lab.tolerances import PERFECT
+from biodance.virtual_lab.truth import MERGED, load_on, merged_sip, place_in_12
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]
 

@@ -155,12 +155,11 @@ class Point(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """``y`` (n,), ``value`` f, ``violation`` = largest -c (negative: room left), ``iterations``."""
+    """``y`` (n,), ``value`` f, ``violation`` = largest -c (negative: room left)."""
 
     y: Array
     value: float
     violation: float
-    iterations: int
 
 
 WEIGHT = 100.0
@@ -176,8 +175,8 @@ def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: in
     """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
     y, n = start.copy(), start.size
     point, hessian = evaluate(y), np.eye(n)
-    count, radius = 0, _RADIUS
-    for count in range(1, iterations + 1):  # noqa: B007
+    radius = _RADIUS
+    for _ in range(iterations):
         rows = np.flatnonzero(point.margins < _NEAR)
         gradient, jacobian = point.slopes(rows)
         step, price = quadratic_step(hessian, gradient, jacobian, point.margins[rows], radius)
@@ -197,7 +196,7 @@ def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: in
         y, point = y + step, trial
         if gained < _SETTLED and worst(point.margins) < 1e-4:
             break
-    return Solution(y, point.value, float(-point.margins.min(initial=np.inf)), count)
+    return Solution(y, point.value, float(-point.margins.min(initial=np.inf)))
 
 
 def worst(margins: Array) -> float:

@@ -17,7 +17,7 @@ from biodance.virtual_lab.movement.performance import AppliedForce
 from biodance.virtual_lab.movement.protocol import Protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, Fault, LabVisit
-from biodance.virtual_lab.recording.merge import load_on
+from biodance.virtual_lab.truth import load_on
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.person.person import AddedLoad, Person
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.merge import CARRIERS, MERGED
 from biodance.virtual_lab.tolerances import stream
+from biodance.virtual_lab.truth import CARRIERS, MERGED
 
 GRIPS = {
     "right_forearm_hand": ("right_hand", (0.0, -0.08, 0.0)),
