@@ -28,7 +28,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import _SHORT, design
 from biodance.dance.metrics import criterion_of
 from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import KEPT, Near, initial_guess, intermediate_posture, solve
+from biodance.dance.postures.posture import KEPT, distance_from, initial_guess, intermediate_posture, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import under
@@ -111,7 +111,7 @@ def random_dance(like: Dance, plan: Plan, subject: Subject = SHOWN_TO) -> Dance:
     for k, stance in enumerate(stances):
         while stance.over is None and np.isnan(x[k, 0]):
             begin = initial_guess(chain, stance, rng)
-            found = solve(chain, stance, begin, Near(begin), plan.limits, iterations=40)
+            found = solve(chain, stance, begin, distance_from(begin), plan.limits, iterations=40)
             if found.violation <= KEPT:
                 x[k] = found.x
     for k in np.flatnonzero(np.isnan(x[:, 0])):

@@ -24,7 +24,7 @@ from biodance.body.human.limits import joint_limits
 from biodance.dance.cues import dance_instructions
 from biodance.dance.design import design
 from biodance.dance.expectation import expect
-from biodance.dance.followable.price import freer_dance
+from biodance.dance.followable.walk import freer_dance
 from biodance.dance.performers import OF_PERFORMERS, for_imprecise, rehearse_imprecisely
 from biodance.dance.problem.person import fit_to_person
 from biodance.dance.problem.plan import read_plan

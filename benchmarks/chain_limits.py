@@ -21,7 +21,7 @@ from bench_chain import FIRST_SEED, covered, errors, identified, rms
 from virtual_visits import subjects
 
 from biodance.dance.dance import Dance
-from biodance.dance.followable.price import freer_dance
+from biodance.dance.followable.walk import freer_dance
 from biodance.dance.problem.plan import read_plan
 from biodance.pipeline.dance import dancer
 from biodance.pipeline.simulate_dance import simulate_dance

@@ -19,7 +19,7 @@ from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion
 from biodance.uncertainty.caution import widened
-from biodance.virtual_lab.recording.merge import MERGED
+from biodance.virtual_lab.truth import MERGED
 
 
 def loads_table(reference: Identification, later: Gathered) -> list[Load]:

@@ -9,7 +9,7 @@ import numpy as np
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.records import Array
-from biodance.virtual_lab.recording.merge import MERGED
+from biodance.virtual_lab.truth import MERGED
 
 SCALES = np.array([0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0])
 LOADS = (0.5, 1.0, 2.4)

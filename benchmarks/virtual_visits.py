@@ -30,8 +30,8 @@ from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.person.flesh import of_parameters, parameters_of_inertia, place_inertia
 from biodance.virtual_lab.person.person import Person, make_person
 from biodance.virtual_lab.recording.laboratory import LabVisit
-from biodance.virtual_lab.recording.merge import MERGED, load_on, merged_sip
 from biodance.virtual_lab.simulate import simulate_session
+from biodance.virtual_lab.truth import MERGED, load_on, merged_sip
 
 CACHE = Path(os.environ.get("BIODANCE_CACHE", Path(tempfile.gettempdir()) / "biodance_visits"))
 
@@ -158,7 +158,7 @@ def _orthogonal(mean: Array) -> Array:
 
 
 def _load_place(person: Person, segment: str, frames: Array) -> Array:
-    from biodance.virtual_lab.recording.merge import place_in_12
+    from biodance.virtual_lab.truth import place_in_12
 
     own = place_in_12(person, person.loads[0])[1]
     f = frames[list(MERGED).index(segment)]

@@ -1,6 +1,4 @@
-"""Meshes of segments: what a closed mesh weighs is what its formula says; they reach GLB and OpenSim whole; hulls
-hold their points.
-"""
+"""Meshes of segments: solids fill their boxes, files are read in metres; they reach GLB and OpenSim whole."""
 
 import io
 import json
@@ -11,69 +9,12 @@ import trimesh
 
 from biodance.body.export import write_model
 from biodance.body.human.human import human
-from biodance.body.inertia import RigidInertia
-from biodance.body.solids import box_solid, mesh_lump, read_mesh, segment_solids
+from biodance.body.solids import box_solid, read_mesh, segment_solids
 from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 
 MAN = human(Subject(70.0, 1.75, "M", 30.0))
-DENSITY = 1040.0
-
-
-def turned(mesh, place=(0.3, -0.2, 0.5)):
-    """Return the mesh turned and moved, and the rotation."""
-    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, -1], None)
-    turn[:3, 3] = place
-    mesh.apply_transform(turn)
-    return mesh, turn[:3, :3]
-
-
-def test_a_box_weighs_what_its_formula_says():
-    x, y, z = 0.1, 0.4, 0.25
-    mesh, turn = turned(trimesh.creation.box(extents=[x, y, z]))
-    lump, mass = mesh_lump(mesh, density=DENSITY), DENSITY * x * y * z
-    inertia = mass / 12 * np.diag([y * y + z * z, x * x + z * z, x * x + y * y])
-    assert lump.mass == pytest.approx(mass, rel=1e-12)
-    np.testing.assert_allclose(lump.com, [0.3, -0.2, 0.5], atol=1e-12)
-    np.testing.assert_allclose(lump.inertia, turn @ inertia @ turn.T, atol=1e-12)
-
-
-def test_a_tetrahedron_weighs_what_its_formula_says():
-    """Corners at the origin and at a on each axis: volume a³/6, centre a/4, inertia about the origin m a²/5 and
-    product m a²/20.
-    """
-    a = 0.3
-    corners = np.vstack([np.zeros(3), a * np.eye(3)])
-    mesh = trimesh.Trimesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    lump, mass = mesh_lump(mesh, density=DENSITY), DENSITY * a**3 / 6
-    centre = np.full(3, a / 4)
-    about_origin = mass * a**2 / 20 * (5 * np.eye(3) - np.ones((3, 3)))
-    expected = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    assert lump.mass == pytest.approx(mass)
-    np.testing.assert_allclose(lump.com, centre)
-    np.testing.assert_allclose(lump.inertia, expected, atol=1e-12)
-
-
-def test_a_mesh_inside_out_is_the_same_solid():
-    mesh, _ = turned(trimesh.creation.box(extents=[0.1, 0.2, 0.3]))
-    right = mesh_lump(mesh, density=DENSITY)
-    mesh.invert()
-    wrong: RigidInertia = mesh_lump(mesh, density=DENSITY)
-    assert wrong.mass == pytest.approx(right.mass)
-    np.testing.assert_allclose(wrong.inertia, right.inertia, atol=1e-12)
-
-
-def test_what_encloses_nothing_weighs_nothing():
-    mesh = trimesh.creation.box()
-    with pytest.raises(BiodanceError, match="density of -1"):
-        mesh_lump(mesh, density=-1.0)
-    with pytest.raises(BiodanceError, match="not closed"):
-        mesh_lump(trimesh.Trimesh(mesh.vertices, mesh.faces[:-1]), density=DENSITY)
-    faces = np.array(mesh.faces)
-    faces[0] = faces[0][::-1]
-    with pytest.raises(BiodanceError, match="different ways"):
-        mesh_lump(trimesh.Trimesh(mesh.vertices, faces), density=DENSITY)
 
 
 def test_the_solid_of_a_box_touches_its_six_faces_and_is_closed():
@@ -92,7 +33,7 @@ def test_meshes_are_read_in_metres(kind, tmp_path):
     mesh.export(tmp_path / f"a.{kind}")
     read = read_mesh(tmp_path / f"a.{kind}", scale=0.001)
     np.testing.assert_allclose(read.extents, [0.1, 0.2, 0.3], rtol=1e-6)
-    assert mesh_lump(read, density=1000.0).mass == pytest.approx(6.0, rel=1e-5)
+    assert read.volume == pytest.approx(0.006, rel=1e-5)
 
 
 def test_what_is_no_mesh_is_refused(tmp_path):

@@ -7,7 +7,7 @@ from small_dances import BODY
 
 from biodance.dance.cues import dance_instructions
 from biodance.dance.expectation import Expectation
-from biodance.dance.followable.price import freer_dance
+from biodance.dance.followable.walk import freer_dance
 from biodance.dance.metrics import DanceMetrics
 from biodance.dance.problem.plan import Plan
 from biodance.pipeline.dance_result import DanceResult

@@ -15,7 +15,7 @@ from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.reach import Reach
 from biodance.dance.followable.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
 from biodance.dance.followable.walk import NoWay, Walk, walked_dance
-from biodance.dance.imprecision import Imprecision, PlannedDance, mass_centre
+from biodance.dance.imprecision import Imprecision, PlannedDance
 from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
 from biodance.dance.performers import Rehearsed, Room, perform_with, rehearse_imprecisely
@@ -122,7 +122,7 @@ def test_a_catalogue_stands_balanced_on_its_feet() -> None:
     found = Catalogue.of(
         CHAIN, stance, {part: group if part == "trunk" else group[:2] for part, group in words.items()}
     )
-    middle = mass_centre(CHAIN, found.x)[:, :2] - stance.centre
+    middle = CHAIN.mass_centre(found.x)[:, :2] - stance.centre
     np.testing.assert_allclose(middle[:, 1], 0.0, atol=2e-3)
     assert np.ptp(middle[:, 0]) < 4e-3
     knees = found.x[:, 6 + BODY.joint_index("right_knee_flexion")]

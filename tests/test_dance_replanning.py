@@ -16,12 +16,11 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.nlp import anyhow
 from biodance.dance.problem.plan import Plan
-from biodance.dance.transitions import context, planner
+from biodance.dance.transitions import context
 from biodance.dance.transitions import schedule as schedule_module
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext
 from biodance.dance.transitions.move import Move, Task
-from biodance.dance.transitions.planner import Way
-from biodance.dance.transitions.schedule import replan
+from biodance.dance.transitions.schedule import Way, replan
 from biodance.dance.verify import Margin
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -126,10 +125,10 @@ def test_a_way_leaves_half_of_what_a_lifting_sole_may_press(course, monkeypatch,
         tried.append(task.duration)
         return Move(task.straight(), task.duration, np.zeros((12, 6, 6)), 0.0, "")
 
-    monkeypatch.setattr(planner, "find_move", found)
-    monkeypatch.setattr(planner, "verify", lambda *_: (Margin("ground_clearance", left, 0.01, "m"),))
+    monkeypatch.setattr(schedule_module, "find_move", found)
+    monkeypatch.setattr(schedule_module, "verify", lambda *_: (Margin("ground_clearance", left, 0.01, "m"),))
     task = Task(CHAIN, excitation_blocks(BODY), course.stances[0], course.x[:2], 2.0, family())
-    way = planner.find_way(task, np.zeros((12, 6, 6)), [1, 3, 0])
+    way = schedule_module.find_way(task, np.zeros((12, 6, 6)), [1, 3, 0])
     assert (way.limit == "") is taken
     assert (tried == [2.0]) is taken
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.postures.ordering import SAMPLE_ERROR, SAMPLE_RATE, choose, learned
+from biodance.dance.postures.ordering import choose
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.information import SAMPLE_ERROR, SAMPLE_RATE, learned
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.identification.posterior import prior_factor

@@ -8,10 +8,10 @@ import numpy as np
 from small_dances import BODY
 
 from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.centres import CENTRES, told_of_centres
 from biodance.dance.followable.vocabulary import Vocabulary, read_vocabulary, words_for
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.information import CENTRES, rows_of_centres
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.motion.kinematics import poses
 
@@ -43,7 +43,7 @@ def test_on_one_leg_the_trunk_stays_within_45_degrees() -> None:
 def test_a_turned_joint_tells_of_its_centre_across_the_axis_only() -> None:
     x = np.zeros((2, CHAIN.size))
     x[1, ROOT + BODY.joint_index("right_hip_flexion")] = 0.5 * np.pi
-    rows = np.concatenate([told_of_centres(CHAIN, one, CENTRES + 4) for one in x])
+    rows = np.concatenate([rows_of_centres(CHAIN, one, CENTRES + 4) for one in x])
     assert not rows[:, :4].any()
 
     def told(centre: tuple[float, float, float]) -> float:

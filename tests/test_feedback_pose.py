@@ -10,9 +10,8 @@ from PIL import Image
 from small_dances import small_dance
 
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import expect
-from biodance.dance.telling import planned_shares, telling_of
-from biodance.records import Motion
+from biodance.dance.expectation import Telling, expect, telling_of
+from biodance.records import Array, Motion
 from biodance.report.feedback import write
 from biodance.report.feedback.write import follow_scene
 
@@ -24,6 +23,15 @@ SUMS = Path(__file__).parents[1] / "web" / "bundle.sha256"
 @pytest.fixture(scope="module")
 def dance() -> Dance:
     return small_dance()
+
+
+def planned_shares(dance: Dance, told: Telling) -> Array:
+    """Return the share (N,) of the table's variance that the whole dance removes as planned."""
+    plan, total = dance.motion(told.rate), np.zeros_like(told.root)
+    for phase in dance.phases:
+        inside = (plan.time >= phase.start - 1e-9) & (plan.time <= phase.end + 1e-9)
+        total += told.information(dance.body, plan.at(inside), held=phase.kind == "hold")
+    return told.shares(total)
 
 
 def test_what_the_parts_tell_adds_up_to_what_is_expected_of_the_dance(dance: Dance) -> None:

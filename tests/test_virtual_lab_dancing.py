@@ -16,7 +16,7 @@ from biodance.body.human.limits import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import KEPT, Near, initial_guess, solve
+from biodance.dance.postures.posture import KEPT, distance_from, initial_guess, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import seat, under
@@ -45,7 +45,7 @@ def dance() -> Dance:
         for _ in range(40):
             begin = initial_guess(chain, stance, rng)
             begin[3:] *= 0.3
-            found = solve(chain, stance, begin, Near(begin), family(), iterations=40)
+            found = solve(chain, stance, begin, distance_from(begin), family(), iterations=40)
             if found.violation <= KEPT:
                 break
         rows.append(found.x)

@@ -9,17 +9,16 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 from biodance.virtual_lab.person.flesh import (
-    _FEMALE,
     of_parameters,
     parameters_of_inertia,
     place_inertia,
     true_pseudo_inertia,
 )
 from biodance.virtual_lab.person.person import AddedLoad, make_person
-from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN
+from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN, virtual_people
 from biodance.virtual_lab.recording.cameras import reference_angles
-from biodance.virtual_lab.recording.merge import MERGED, load_on, merged_sip, place_in_12
 from biodance.virtual_lab.tolerances import PERFECT
+from biodance.virtual_lab.truth import MERGED, load_on, merged_sip, place_in_12
 
 SUBJECTS = [Subject(45, 1.50, "F"), Subject(65, 1.75, "F"), Subject(80, 1.70, "M"), Subject(110, 1.95, "M")]
 
@@ -37,8 +36,9 @@ def test_a_person_is_physically_possible_and_adds_up(subject):
 
 def test_masses_scatter_around_the_mean_by_the_stated_tolerance():
     thighs = [make_person(SUBJECTS[1], seed).body.sip.of("right_thigh")[0] for seed in range(60)]
-    mean = _FEMALE["thigh"][0] / sum(
-        row[0] * (1 if kind in ("pelvis", "lumbar", "thorax", "head") else 2) for kind, row in _FEMALE.items()
+    table = virtual_people()["segments"]["F"]
+    mean = table["thigh"][0] / sum(
+        row[0] * (1 if kind in ("pelvis", "lumbar", "thorax", "head") else 2) for kind, row in table.items()
     )
     assert np.mean(thighs) == pytest.approx(65 * mean, rel=0.05)
     assert 0.07 < np.std(thighs) / np.mean(thighs) < 0.16

@@ -63,9 +63,7 @@ def neutral_turn(body: Body, joint: int) -> Array:
 _RANGE, _SPEED, TORQUE = 1.2, 10.0, 100.0
 """rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
 SPLIT = 0.2
-"""Relative standard deviation of the lighter part: how well is known what a cut leaves on which side (assumed; a
-vertebra up or down).
-"""
+"""Relative standard deviation of the lighter part: what a cut leaves on which side (assumed; a vertebra up or down)."""
 GRAM, GYRATION = 1e-3, 0.03
 """kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
 _FLAT, _MOST = 1e-9, 0.95

@@ -16,9 +16,7 @@ TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 @dataclass(frozen=True, eq=False)
 class RigidInertia:
-    """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM, axes of that
-    frame.
-    """
+    """A rigid lump: ``mass`` kg, ``com`` (3,) m in some frame, ``inertia`` (3, 3) kg·m² about the CoM in its axes."""
 
     mass: float
     com: Array
@@ -91,16 +89,12 @@ def shift_matter(shift: Array, turn: Array | None = None) -> Array:
 
 
 def pseudo_inertia(phi: Array) -> Array:
-    """Return the pseudo-inertia matrices (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass
-    kg.
-    """
+    """Return the pseudo-inertias (N, 4, 4) of ``phi`` (10N,): second moments kg·m², first moments kg·m, mass kg."""
     return (phi.reshape(-1, 10) @ PSEUDO_INERTIA.T).reshape(-1, 4, 4)
 
 
 def smallest_eigenvalues(phi: Array) -> Array:
-    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative means that no such body can
-    exist.
-    """
+    """Return the smallest eigenvalue (N,) of every segment's pseudo-inertia; negative: no such body can exist."""
     return np.asarray(np.linalg.eigvalsh(pseudo_inertia(phi))[:, 0])
 
 

@@ -119,9 +119,7 @@ class JointLimits:
 
 @dataclass(frozen=True, eq=False)
 class Foot:
-    """The sole: ``segment`` index of the foot, ``outline`` (P, 3) m corners in the foot's segment frame,
-    counter-clockwise from above.
-    """
+    """The sole: ``segment`` index of the foot, ``outline`` (P, 3) m in its frame, counter-clockwise from above."""
 
     segment: int
     outline: Array

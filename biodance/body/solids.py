@@ -1,4 +1,4 @@
-"""Closed meshes of segments: made of their boxes, of their markers, or read from a file; and the mass of a mesh.
+"""Closed meshes of segments: made of their boxes, of their markers, or read from a file.
 
 All meshes are `trimesh.Trimesh` in m, in the axes of their segment (x anterior, y up, z right; origin at the proximal
 joint).
@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.inertia import RigidInertia
-from biodance.errors import BiodanceError, FileRefused
+from biodance.errors import FileRefused
 from biodance.records import Array
 
 if TYPE_CHECKING:
@@ -140,33 +139,3 @@ def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:
             raise FileRefused(f"{path}: {found[path.stem].name} is a mesh of this segment, too. Keep one.")
         found[path.stem] = path
     return found
-
-
-def mesh_lump(mesh: "Trimesh", *, density: float) -> RigidInertia:
-    """Return mass, centre of mass and inertia of a closed mesh that is filled evenly with ``density`` kg/m³.
-
-    Integrals over the enclosed volume by the divergence theorem, exact for the polyhedron (Eberly 2002, "Polyhedral
-    mass properties").
-
-    Raises
-    ------
-    BiodanceError
-        The mesh is not closed, its triangles face different ways, it encloses nothing, or the density is not positive.
-    """
-    if not (np.isfinite(density) and density > 0):
-        raise BiodanceError(f"A density of {density:g} kg/m³ cannot be; a body's is near 1000.")
-    if not mesh.is_watertight:
-        raise BiodanceError(
-            "The mesh is not closed, so it encloses no volume. Close its holes in the program that made it."
-        )
-    if not mesh.is_winding_consistent:
-        raise BiodanceError(
-            "The triangles of the mesh face different ways, so its inside is not known. Orient them alike."
-        )
-    volume = abs(mesh.volume)
-    if volume < 1e-12:
-        raise BiodanceError("The mesh encloses no volume. Give a solid.")
-    outward = np.sign(mesh.volume)
-    return RigidInertia(
-        density * volume, np.array(mesh.center_mass), outward * density / mesh.density * np.array(mesh.moment_inertia)
-    )

@@ -5,7 +5,7 @@ Only what moves is said, largest first, pairs together (right and left; trunk an
 rounded to what a person can follow; what goes beyond ``MOST`` things is said after them, so that nothing is left out.
 """
 
-from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
+from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
 _SMALLEST = 12.0
@@ -26,38 +27,7 @@ _MOST = 4
 """Things that a person can begin at once."""
 _ALIKE = 12.0
 """degrees within which right and left are called as a pair."""
-_WORDS = {
-    "shoulder_flexion": ("arm", "raise {} forward", "take {} back", "let {} down to the front of the body"),
-    "shoulder_adduction": ("arm", "bring {} across the body", "raise {} sideways", "bring {} in to the side"),
-    "shoulder_rotation": ("upper arm", "turn {} inwards", "turn {} outwards", "turn {} back to the middle"),
-    "elbow_flexion": ("elbow", "bend {}", "stretch {}", "straighten {}"),
-    "hip_flexion": ("thigh", "lift {} forward", "take {} back", "let {} hang straight down"),
-    "hip_adduction": ("leg", "bring {} across the other", "lift {} sideways", "bring {} in to the middle"),
-    "hip_rotation": ("leg", "turn {} inwards", "turn {} outwards", "turn {} to the front"),
-    "knee_flexion": ("knee", "bend {}", "stretch {}", "straighten {}"),
-    "ankle_dorsiflexion": ("foot", "pull {} up", "point {} down", "hold {} level"),
-    "ankle_inversion": (
-        "foot",
-        "turn the sole of {} inwards",
-        "turn the sole of {} outwards",
-        "hold {} level sideways",
-    ),
-    "trunk_flexion": ("", "lean the trunk forward", "lean the trunk back", "bring the trunk upright"),
-    "trunk_bending": ("", "lean the trunk to the right", "lean the trunk to the left", "bring the trunk to the middle"),
-    "trunk_rotation": ("", "turn the trunk to the left", "turn the trunk to the right", "turn the trunk to the front"),
-}
-"""Of each movement: the part, and what is called for a positive angle, a negative one and (nearly) none."""
-_HIPS = {
-    "hips_rotation": ("", "turn the hips to the left", "turn the hips to the right", "turn the hips to the front"),
-    "hips_bending": (
-        "",
-        "lean over to the right from the hips",
-        "lean over to the left from the hips",
-        "bring the hips level",
-    ),
-    "hips_flexion": ("", "bow forward from the hips", "lean back from the hips", "bring the hips upright"),
-}
-"""The same of the hips' turn, drop and tilt (`chain`), whoever stands."""
+
 _FORWARD = np.array([1.0, 1.0, -1.0])
 """Signs of turn, drop and tilt as they are called."""
 _BENT = 30.0
@@ -69,10 +39,14 @@ MIRROR_CALL = ("mirror: the same with right and left exchanged",)
 """What is called for the image of the last posture: one known thing."""
 
 
-@dataclass(frozen=True)
-class _Call:
-    size: float
-    text: str
+CueWords = tuple[str, str, str, str]
+"""The part that moves, and what is called for a positive angle, a negative one and (nearly) none."""
+
+
+@cache
+def _words(group: str) -> dict[str, CueWords]:
+    """Return the words of the ``joints`` or of the ``hips``: ``protocols/vocabulary/cues.toml``."""
+    return {name: tuple(words) for name, words in read_toml(locate("protocols/vocabulary", "cues"))[group].items()}
 
 
 def cue_sheet(
@@ -139,13 +113,14 @@ def calls(
         for joint, b, a in zip(body.joints, before, after, strict=True)
         if abs(a - b) >= _SMALLEST and _is_called(joint.name, planted)
     }
-    least = dict.fromkeys(_HIPS, _SMALLEST)
+    whole_body = _words("hips")
+    least = dict.fromkeys(whole_body, _SMALLEST)
     if any(f"{side}_knee_flexion" in changes for side in planted):
         least["hips_flexion"] = _BENT
     changes |= {
-        name: (float(b), float(a)) for name, b, a in zip(_HIPS, *hips, strict=True) if abs(a - b) >= least[name]
+        name: (float(b), float(a)) for name, b, a in zip(whole_body, *hips, strict=True) if abs(a - b) >= least[name]
     }
-    found: list[_Call] = []
+    found: list[tuple[float, str]] = []
     while changes:
         name = next(iter(changes))
         start, end = changes.pop(name)
@@ -153,7 +128,7 @@ def calls(
         if whole != name and whole in changes and _together((start, end), changes[whole]):
             also = changes.pop(whole)
             size = max(abs(one[1] - one[0]) for one in ((start, end), also))
-            found.append(_Call(size, f"{_call(name, '', start, end)}, hips too{_rest(end, also[1])}"))
+            found.append((size, f"{_call(name, '', start, end)}, hips too{_rest(end, also[1])}"))
             continue
         side, movement = _split(name)
         other = f"{'left' if side == 'right' else 'right'}_{movement}"
@@ -161,8 +136,8 @@ def calls(
         if pair:
             partner = changes.pop(other)
             start, end = (start + partner[0]) / 2, (end + partner[1]) / 2
-        found.append(_Call(abs(end - start), _call(movement, "both" if pair else side, start, end)))
-    return tuple(call.text for call in sorted(found, key=lambda call: -call.size))
+        found.append((abs(end - start), _call(movement, "both" if pair else side, start, end)))
+    return tuple(text for _, text in sorted(found, key=lambda call: -call[0]))
 
 
 def _together(trunk: tuple[float, float], hips: tuple[float, float]) -> bool:
@@ -226,7 +201,7 @@ def _split(name: str) -> tuple[str, str]:
 
 def _is_called(name: str, planted: tuple[str, ...]) -> bool:
     side, movement = _split(name)
-    return movement in _WORDS and not (side in planted and _is_leg(movement) and movement not in PLANTED)
+    return movement in _words("joints") and not (side in planted and _is_leg(movement) and movement not in PLANTED)
 
 
 def _is_leg(movement: str) -> bool:
@@ -234,7 +209,7 @@ def _is_leg(movement: str) -> bool:
 
 
 def _call(movement: str, side: str, start: float, angle: float) -> str:
-    part, positive, negative, none = (_WORDS | _HIPS)[movement]
+    part, positive, negative, none = (_words("joints") | _words("hips"))[movement]
     whole = f"both {PLURAL.get(part, part + 's')}" if side == "both" else f"the {side} {part}"
     rounded = _rounded(angle)
     if rounded == 0:

@@ -127,11 +127,7 @@ class Dance(Sendable):
         out = self.chain.motion(np.array([phase.start for phase in held]), x, *np.zeros((2, *x.shape))).table()
         out.insert(0, "start (s)", out.index.to_numpy())
         out.insert(1, "hold (s)", [phase.end - phase.start for phase in held])
-        out.insert(
-            2,
-            "feet",
-            [" and ".join(SIDES[foot] for foot in phase.stance.planted) or "none" for phase in held],
-        )
+        out.insert(2, "feet", [" and ".join(SIDES[foot] for foot in phase.stance.planted) or "none" for phase in held])
         return out.set_index(pd.Index([phase.posture for phase in held], name="posture"))
 
     @cached_property
@@ -146,9 +142,7 @@ class Dance(Sendable):
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """False for postures in between, (P,) bool: weight over one foot of two, and stops that are not held as
-        long.
-        """
+        """(P,) bool, False for postures in between: weight over one foot of two, and stops not held as long."""
         return np.array([stance.over is None for stance in self.stances]) & (self.hold == self.hold.max())
 
     @cached_property

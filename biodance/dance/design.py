@@ -25,15 +25,12 @@ from biodance.dance.postures.search import find_postures
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, under
 from biodance.dance.transitions.context import Checkpoint, Course, DesignContext, Tell
-from biodance.dance.transitions.planner import Way
-from biodance.dance.transitions.schedule import replan
+from biodance.dance.transitions.schedule import Way, replan
 from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread
 
 WORKERS = 2
-_SHORT = 1.0
-"""s that postures in between are held."""
 
 
 @one_thread()
@@ -134,9 +131,7 @@ def _postures(work: DesignContext) -> Course:
 
 
 def _joined(work: DesignContext, course: Course, ways: list[Way], notes: tuple[str, ...]) -> Dance:
-    """Return the dance of the postures of a course and the ways between them, stops on the way included, which are not
-    held.
-    """
+    """Return the dance of the postures of a course and the ways between them, stops on the way not held."""
     plan, (x, stances) = work.plan, (course.x, course.stances)
     rows, feet, hold, under_ = [x[0]], [stances[0]], [plan.hold], list[Stance]()
     for k, way in enumerate(ways):
@@ -144,7 +139,7 @@ def _joined(work: DesignContext, course: Course, ways: list[Way], notes: tuple[s
         under_ += [ground] * len(way.via)
         rows += [*way.stops, x[k + 1]]
         feet += [*[ground] * len(way.stops), stances[k + 1]]
-        hold += [*[0.0] * len(way.stops), plan.hold if stances[k + 1].over is None else min(_SHORT, plan.hold)]
+        hold += [*[0.0] * len(way.stops), plan.hold_on(stances[k + 1])]
     via, duration = (np.concatenate([getattr(way, name) for way in ways]) for name in ("via", "duration"))
     feet_, seed = tuple(feet), work.seed
     return Dance(

@@ -4,6 +4,11 @@ danced.
 The same machinery as identification, on the planned motion: information of the whitened regressor, discounted by what
 twins of the person (soft tissue, joint centres, hinge axes) and plates within their tolerances would disturb, on top of
 the table. Only the noise is not the session's own but that of virtual dances.
+
+`Telling` judges posture by posture and move by move, so that a page can add up while somebody dances. A posture that is
+held tells by weight alone: the vertical force, and its moments about the horizontal axes. A move tells by its
+accelerations, too. What disturbs a session beyond the noise (soft tissue, joint centres, plates) is left out; instead
+only a share of the information counts.
 """
 
 from dataclasses import dataclass, replace
@@ -20,8 +25,9 @@ from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
 from biodance.identification.posterior import Posterior, posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Array, Motion, Wrench
+from biodance.spatial import wrench_shift
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.caution import widened
@@ -62,9 +68,7 @@ def expect(dance: Dance, *, steps: int = 10) -> Expectation:
 
 
 def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
-    """Return what is expected when a ``motion`` at ``RATE`` or a multiple stops at each of the instants ``ends`` (D,)
-    s, increasing.
-    """
+    """Return what is expected when a ``motion`` at a multiple of ``RATE`` stops at each instant ``ends`` (D,) s."""
     wrench = predict_wrench(body, motion)
     noise = typical_noise(wrench)
     size = 10 * len(body.segments)
@@ -129,9 +133,7 @@ def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
 
 
 def parameter_deviations(belief: Posterior) -> Array:
-    """Return the standard deviations (N, 3) of mass kg, CoM m (per axis) and moments of inertia kg·m² of every
-    segment.
-    """
+    """Return the deviations (N, 3) of mass kg, CoM m per axis and moments of inertia kg·m² of every segment."""
     out = []
     for first in range(0, belief.prior.phi.size, 10):
         cut = slice(first, first + 10)
@@ -139,3 +141,60 @@ def parameter_deviations(belief: Posterior) -> Array:
         variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
         out.append(np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])]))
     return np.array(out)
+
+
+_FELT = 1.0
+"""s: a hold that is judged alone says nothing more after this time."""
+_TRUST = 0.1
+"""Share of the information that disturbances leave where postures and moves are judged one by one: with it whole dances
+tell of every segment what is expected of them.
+"""
+_AT_REST = slice(2, 5)
+"""Components of a wrench (Fx, Fy, Fz, Mx, My, Mz) that a body at rest has."""
+
+
+@dataclass(frozen=True, eq=False)
+class Telling:
+    """By what a movement is judged that shall tell of the p = 10 N inertial parameters of a body.
+
+    ``rate`` Hz of the motions that are judged; ``root`` (p, p): the table's covariance is ``root root'``; ``weights``
+    (B, 6): information of one coefficient of the wrench (N, N·m about ``about`` (3,) m of the lab) in each of the bands
+    between ``edges`` (B + 1,) Hz; ``still`` (3,): information of one held posture on Fz, Mx and My.
+    """
+
+    rate: float
+    root: Array
+    weights: Array
+    edges: tuple[float, ...]
+    still: Array
+    about: Array
+
+    def information(self, body: Body, motion: Motion, *, held: bool) -> Array:
+        """Return the information (p, p) of a ``motion`` at ``rate`` or of the posture in which it ends."""
+        W = regressor(body, motion)
+        if held:
+            rows = (wrench_shift(self.about) @ W[-1])[_AT_REST]
+            return np.asarray(rows.T @ (self.still[:, None] * rows))
+        covariance = np.array([np.diag(1.0 / row) for row in self.weights])
+        white = Noise(covariance, self.about, Bands(self.edges, self.rate)).whiten(W).reshape(-1, W.shape[2])
+        return np.asarray(white.T @ white)
+
+    def shares(self, information: Array) -> Array:
+        """Return the share (N,) of the table's variance that an ``information`` (p, p) removes, mean over the ten
+        parameters of a segment.
+        """
+        left = np.linalg.inv(np.eye(len(self.root)) + self.root.T @ information @ self.root)
+        before = np.sum(self.root**2, axis=1)
+        after = np.einsum("ij,jk,ik->i", self.root, left, self.root)
+        removed = np.where(before > 0, 1.0 - after / np.where(before > 0, before, 1.0), 0.0)
+        return np.asarray(removed.reshape(-1, 10).mean(axis=1))
+
+
+def telling_of(dance: Dance) -> Telling:
+    """Return by what the parts of ``dance`` are judged."""
+    plan = dance.motion(_RATE)
+    noise = typical_noise(predict_wrench(dance.body, plan))
+    weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
+    value, vector = np.linalg.eigh(widened(dance.body.sip).covariance)
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    return Telling(_RATE, root, weights, noise.bands.edges, _FELT * _RATE * weights[0, _AT_REST], noise.about)

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
-from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.dance import Dance
 from biodance.dance.limits import Copied
-from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at
 from biodance.records import Array
@@ -116,7 +115,7 @@ class PlannedDance:
         x = self._coordinates(rows, time)
         up, ankle = self._feet(rows, time)
         over = x[:, 2] - self._tops(x, up, ankle)
-        self.spline = CubicSpline(time, np.column_stack([x, mass_centre(self.chain, x)[:, :2], over]))
+        self.spline = CubicSpline(time, np.column_stack([x, self.chain.mass_centre(x)[:, :2], over]))
 
     def phase_at(self, when: Array) -> NDArray[np.intp]:
         """Return the phase (T,) at instants of the plan."""
@@ -136,9 +135,7 @@ class PlannedDance:
         return x
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
-        """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands if it does (T, 2, 3)
-        m.
-        """
+        """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
         way = ((when - self.start[rows]) / np.maximum(self.end[rows] - self.start[rows], 1e-9))[:, None]
         before, during, after = np.moveaxis(self.down[rows], 1, 0)
         rise = np.where(before, _eased(way / _LIFT), 1.0) * np.where(after, _eased((1 - way) / _LIFT), 1.0)
@@ -146,16 +143,9 @@ class PlannedDance:
         return np.where(during, 0.0, rise), ankle
 
     def _tops(self, x: Array, up: Array, ankle: Array) -> Array:
-        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a foot that is up gives
-        way.
-        """
-        turn, tops = self.chain.root_rotation(x), []
-        for side in (0, 1):
-            leg = self.chain.legs[side]
-            hip, reach = turn @ leg.hip, float(leg.length(_STRAIGHT))
-            across = np.sum((x[:, :2] + hip[:, :2] - ankle[:, side, :2]) ** 2, axis=1)
-            tops.append(ankle[:, side, 2] + np.sqrt(np.maximum(reach**2 - across, 0.01)) - hip[:, 2] + up[:, side])
-        return np.asarray(-np.log(np.exp(-_SOFT * np.array(tops)).sum(axis=0)) / _SOFT)
+        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a raised foot yields."""
+        tops = self.chain.root_heights(x, ankle, _STRAIGHT) + up.T
+        return np.asarray(-np.log(np.exp(-_SOFT * tops).sum(axis=0)) / _SOFT)
 
     def performed(self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision) -> Copied:
         """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s."""
@@ -206,7 +196,7 @@ class PlannedDance:
             x[:, 2] = self._tops(x, up, ankle) + over
             x = self._standing(x, wanted, up, ankle)
             if k < _ROUNDS:
-                x[:, :2] += (com - mass_centre(chain, x)[:, :2]) / _CARRIED
+                x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
         return x, rows
 
     def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
@@ -233,9 +223,3 @@ def _eased(way: Array) -> Array:
 def _instants(phase: Phase) -> Array:
     count = max(2, round((phase.end - phase.start) * _PLAN_RATE))
     return np.round(np.linspace(phase.start, phase.end, count, endpoint=False), 9)
-
-
-def mass_centre(chain: Chain, x: Array) -> Array:
-    """Return the centre of mass (S, 3) m of coordinates (S, n), lab frame."""
-    centre, model, data = load_pinocchio().centerOfMass, chain.model, chain.data
-    return np.array([centre(model, data, row) for row in x]).reshape(-1, 3)

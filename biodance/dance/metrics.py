@@ -29,12 +29,9 @@ from biodance.records import Array, Motion
 _RATE = 50.0
 """Hz, of the paper's transitions."""
 _LITTLE = 0.01
-"""rad²/s³: information on every inertia that is supposed before the first move, so that no condition number is
-infinite.
-"""
+"""rad²/s³: information on every inertia supposed before the first move, so that condition numbers are finite."""
 POOR = 30.0
-"""Condition number above which a segment was hardly tilted, so that gravity does not tell where along it the mass is.
-"""
+"""Condition number above which a segment was hardly tilted: gravity does not tell where along it the mass is."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,13 +25,9 @@ from biodance.records import Array, Motion, Wrench
 from biodance.spatial import quaternion_matrix, wrench_of_force
 
 _STEP = 0.00025
-"""s, of the simulation: at 1 and 0.5 ms the stiff legs ring on the floor and topple postures that stand at 0.25 and
-0.125 ms.
-"""
+"""s, of the simulation: at 1 and 0.5 ms stiff legs ring on the floor and topple postures that stand at 0.25 ms."""
 STIFFNESS = {"hip": 4000.0, "knee": 4000.0, "ankle": 4000.0, "trunk": 3000.0, "shoulder": 400.0, "elbow": 200.0}
-"""N·m/rad of the joint springs: legs and trunk several times the m g h (about 600 N·m/rad) that would topple a standing
-person.
-"""
+"""N·m/rad of the joint springs: several times the m g h (about 600 N·m/rad) that would topple a standing person."""
 _DAMPING, ROTOR = 0.05, 0.005
 """s, damper over spring; kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line,
 nothing else resists them."""
@@ -89,9 +85,7 @@ def _mujoco() -> Any:
 
 
 def floor_model(body: Body, *, friction: float = 0.5) -> Any:
-    """Return the MuJoCo model of ``body`` with contact points at the corners of its soles, on a floor with Coulomb
-    ``friction``.
-    """
+    """Return the MuJoCo model of ``body`` with contact points at its soles' corners, ``friction`` of the floor."""
     mujoco = _mujoco()
     spec = mujoco.MjSpec.from_string(mjcf.text(body, "biodance playback"))
     spec.option.timestep, spec.option.integrator = _STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -187,9 +181,7 @@ def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: 
 
 
 class _Driver:
-    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; gives the model its
-    dampers.
-    """
+    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; sets the dampers."""
 
     def __init__(self, body: Body, model: Any) -> None:
         self.body, self.model = body, model
@@ -201,9 +193,7 @@ class _Driver:
         model.dof_armature[self.v_place] = ROTOR
 
     def place(self, data: Any, q: Array, v: Array) -> None:
-        """Put the body into a configuration of Pinocchio's order (quaternion x y z w, root velocity in the root's
-        frame).
-        """
+        """Put the body into a configuration of Pinocchio's order (quaternion x y z w, velocity in the root's frame)."""
         data.qpos[:3], data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
         data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
         data.qvel[3:6] = v[3:6]

@@ -26,7 +26,7 @@ from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import FOLLOWABLE_SHARE, Plan
 from biodance.dance.problem.stance import Stance
 from biodance.dance.transitions.move import Task
-from biodance.dance.transitions.planner import find_way
+from biodance.dance.transitions.schedule import find_way
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
@@ -82,13 +82,9 @@ def _without(dance: Dance, why: str) -> Dance:
 _LEG, MASS = 0.9, 65.0
 """m from hip to sole, kg: the person whose size a robot is given."""
 _FORWARD = 2.0
-"""1/m: the right foot stands ahead by this times the protocol's m times the leg's: 0.1 m for 0.2 m and legs of 0.25 m
-(paper III.D).
-"""
+"""1/m: the right foot stands ahead by this times the plan's m times the leg's: 0.1 m, legs of 0.25 m (paper III.D)."""
 UNHURRIED = 2.5
-"""rad/s: a robot of slower joints (median) takes more time for its moves, in proportion: 5 s, not 2 s, at 1 rad/s
-(paper, Fig. 11).
-"""
+"""rad/s: a robot of slower joints (median) takes longer, in proportion: 5 s, not 2 s, at 1 rad/s (paper, Fig. 11)."""
 _LIGHTEST = 4.0
 """kg: what lighter robots press on the ground cannot be told from noise (`motion.dynamics.zmp` needs 20 N)."""
 _Tell = Callable[[str, int, int], None]
@@ -186,17 +182,13 @@ def shrunk(dance: Dance, body: Body, to: Likeness) -> Dance:
 
 
 ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
-"""N, N·m: error of one sample of the wrench; what Bonnet 2016 left unexplained of an unseen movement of HOAP-3 (table
-II).
-"""
+"""N, N·m: error of one sample of the wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table II)."""
 _RATE = 4.0
 """Hz: independent samples of the wrench."""
 
 
 def robot_rows(body: Body, motion: Motion, wrench: Array) -> Array:
-    """Return the whitened rows (6 T, 10N + 1) of [W y] for a ``motion`` and a ``wrench`` (T, 6) N, N·m at ``RATE`` or
-    slower.
-    """
+    """Return the whitened rows (6 T, 10N + 1) of [W y] for a ``motion`` and a ``wrench`` (T, 6) N, N·m."""
     rows = np.concatenate([regressor(body, motion), wrench[:, :, None]], axis=2) / ERROR[:, None]
     return np.asarray(rows.reshape(-1, rows.shape[2]))
 
@@ -206,9 +198,7 @@ _STEPS = 10
 
 
 def expect_robot(dance: Dance) -> Expectation:
-    """Return what is expected after ten durations of ``dance``, evenly spread over its postures, if it is danced
-    exactly.
-    """
+    """Return what is expected after ten durations of ``dance``, evenly spread, if it is danced exactly."""
     body, motion = dance.body, dance.motion(_RATE)
     rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
     ends = [phase.end for phase in dance.phases if phase.kind == "hold"]

@@ -17,9 +17,7 @@ from biodance.dance.limits import NOTHING, CheckedMotion, Limit
 from biodance.threads import one_thread
 
 EDGES = np.array([0.0025, 0.005])
-"""s after the start and before the end of every move that are judged, too: there a foot has just left the ground or is
-about to return.
-"""
+"""s after the start and before the end of moves that are judged, too: a foot has just left the ground or returns."""
 JUMP = 1e-6
 """rad, rad/s, rad/s²: jumps of coordinates between phases: rounding."""
 
@@ -54,17 +52,13 @@ def verify(body: Body, dance: Dance, limits: tuple[Limit, ...], *, part: slice =
 
 
 def verify_with(workers: Executor, body: Body, dance: Dance, limits: tuple[Limit, ...]) -> tuple[Margin, ...]:
-    """Return what `verify` does, found by two ``workers`` side by side: one looks at every second phase, one at the
-    others.
-    """
+    """Return what `verify` does, found by two ``workers``: one looks at every second phase, one at the others."""
     tasks = [workers.submit(verify, body, dance, limits, part=slice(first, None, 2)) for first in range(2)]
     return _least(margin for task in tasks for margin in task.result())
 
 
 def _least(margins: Iterable[Margin]) -> tuple[Margin, ...]:
-    """Return the worst margin of every limit, by name; of equal ones the first in time; one that is no number is the
-    worst.
-    """
+    """Return the worst margin of every limit, by name; of equal ones the first in time; no number is the worst."""
     worst: dict[str, Margin] = {}
     for margin in sorted(margins, key=lambda one: (np.nan_to_num(one.worst, nan=-np.inf), one.where_s)):
         worst.setdefault(margin.limit, margin)

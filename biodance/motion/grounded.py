@@ -115,13 +115,7 @@ def ground(
 
 
 def _q(
-    angle: Array,
-    turn: Array,
-    place: Array,
-    foot: NDArray[np.intp],
-    *,
-    base: BaseSeen | None,
-    tilt: Array | None = None,
+    angle: Array, turn: Array, place: Array, foot: NDArray[np.intp], *, base: BaseSeen | None, tilt: Array | None = None
 ) -> Array:
     """Return the configurations (T, nq) of a robot that stands on ``foot`` (T,), its soles at ``turn`` and ``place`` of
     `_soles`; ``tilt`` (T, 3) rad, small rotation vectors in the frame of the first standing sole, turns the standing

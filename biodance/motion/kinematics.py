@@ -98,9 +98,7 @@ def segment_motion(body: Body, motion: Motion, *, pose: Poses | None = None) -> 
 
 
 def _of_segments(body: Body, root: Array, joints: Array) -> Array:
-    """Return (T, N + P, ...) what the segments, and the body's parts behind them, have of ``root`` (T, ...) and
-    ``joints`` (T, n, ...).
-    """
+    """Return (T, N + P, ...) what segments, then parts, have of ``root`` (T, ...) and ``joints`` (T, n, ...)."""
     carrier = np.array(body.segment_joint)
     if not body.joints:
         return np.repeat(root[:, None], carrier.size, axis=1)

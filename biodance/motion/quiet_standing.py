@@ -51,9 +51,7 @@ class QuietStanding:
 def quiet_run(
     vertical: Array, used: NDArray[np.bool_], rate: float, rules: StandingRules | None = None
 ) -> slice | None:
-    """Return the longest run of ``used`` frames (T,) in which the ``vertical`` force (T,) N is steady; None if it is
-    too short.
-    """
+    """Return the longest run of ``used`` frames (T,) with a steady ``vertical`` force (T,) N; None if too short."""
     rules = rules or StandingRules()
     if not used.any() or np.median(vertical[used]) < rules.force:
         return None

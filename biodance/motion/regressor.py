@@ -162,9 +162,7 @@ def compare(measured: Wrench, simulated: Wrench, mask: NDArray[np.bool_] | None 
 
 
 def _pearson(first: Array, second: Array) -> float | None:
-    """Return Pearson's correlation of two signals (T,); None where one of them does not vary or there are too few
-    samples.
-    """
+    """Return Pearson's correlation of two signals (T,); None if one does not vary or there are too few samples."""
     if first.size < LEAST_FRAMES:
         return None
     a, b = first - first.mean(), second - second.mean()

@@ -28,9 +28,7 @@ _PERIODS = 3
 """Periods of the cut-off by which the ends are continued."""
 
 LEAST_COSINE = 1e-3
-"""Smallest |cos| of a ball joint's second angle that rates are divided by: nearer to the singularity the rates are
-bounded, not exact.
-"""
+"""Smallest |cos| of a ball joint's second angle that rates are divided by: bounded near the singularity."""
 
 
 _BLOCK = 2048
@@ -114,9 +112,7 @@ def _beyond(values: Array, period: int, count: int) -> Array:
 
 
 def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), free at both
-    ends.
-    """
+    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), ends free."""
     free = np.zeros(len(values))
     ends = [(3, free), (4, free)]
     spline = make_interp_spline(time, values.T, k=_DEGREE, bc_type=(ends, ends))
@@ -142,8 +138,7 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
     if len(time) < need:
         raise TrialRefused(
             f"{len(time)} frames at {rate_of(time):g} Hz are too few for velocities behind a low-pass at "
-            f"{settings.cutoff:g} Hz: "
-            f"at least {need} are needed. Record longer, or use one frame as a static pose."
+            f"{settings.cutoff:g} Hz: at least {need} are needed. Record longer, or use one frame as a static pose."
         )
 
 

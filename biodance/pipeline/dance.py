@@ -18,7 +18,7 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
-from biodance.dance.followable.price import freer_dance
+from biodance.dance.followable.walk import freer_dance
 from biodance.dance.limits import Limit
 from biodance.dance.metrics import dance_metrics
 from biodance.dance.performers import OF_PERFORMERS

@@ -32,8 +32,7 @@ from biodance.virtual_lab.recording.laboratory import (
     set_up,
     write,
 )
-from biodance.virtual_lab.recording.merge import CARRIERS
-from biodance.virtual_lab.truth import truth
+from biodance.virtual_lab.truth import CARRIERS, truth
 
 TRUTH = "truth"
 """Name of the folder inside a simulated session that holds the truth."""

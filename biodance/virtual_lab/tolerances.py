@@ -65,9 +65,7 @@ PERFECT = LabTolerances(**{f.name: 0.0 for f in fields(LabTolerances)})
 
 
 def instruments_perfect(tolerances: LabTolerances = REALISTIC) -> LabTolerances:
-    """Return the tolerances with a perfect plate, perfect cameras and bone-fixed markers, but an unchanged person
-    and motion.
-    """
+    """Return the tolerances with perfect plates, cameras and bone-fixed markers, but an unchanged person and motion."""
     from_skin_on = [f.name for f in fields(LabTolerances)][
         list(LabTolerances.__dataclass_fields__).index("marker_placement") :
     ]

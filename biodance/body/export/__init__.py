@@ -58,9 +58,7 @@ def formats() -> Mapping[str, ModelFormat]:
 
 
 def refuse_impossible(body: Body) -> None:
-    """Raise BiodanceError if a segment's parameters belong to no mass distribution (pseudo-inertia not positive, no
-    mass).
-    """
+    """Raise BiodanceError if a segment's parameters belong to no mass distribution (pseudo-inertia, mass)."""
     for name in body.segments:
         phi = body.sip.of(name)
         if not np.isfinite(phi).all():

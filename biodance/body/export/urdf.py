@@ -18,9 +18,7 @@ SUFFIX = ".urdf"
 
 
 def roll_pitch_yaw(rotation: Array) -> Array:
-    """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; exact also at pitch = +-90 deg, where yaw is
-    set to zero.
-    """
+    """Return (3,) rad with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``; at pitch = +-90 deg with yaw zero."""
     across = np.hypot(rotation[0, 0], rotation[1, 0])
     pitch = np.arctan2(-rotation[2, 0], across)
     if across < 1e-9:

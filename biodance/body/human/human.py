@@ -1,6 +1,4 @@
-"""The 12-segment, 23-degree-of-freedom human: from stature, mass and sex alone, and the assembly of a Body on any
-skeleton.
-"""
+"""The 12-segment, 23-degree-of-freedom human: from stature, mass and sex alone, and as a Body on any skeleton."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,9 +28,7 @@ from biodance.settings import STANDARD_GRAVITY, Settings
 COM_SIGMAS = 3.0
 """Half width of a CoM box in prior standard deviations."""
 LUMBAR_HEIGHT = 0.112 / 1.755
-"""Stature: height over the hip centres of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II man
-of 1.755 m).
-"""
+"""Stature: height over the hips of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II, 1.755 m)."""
 
 
 def shape_boxes(skeleton: Skeleton) -> Array:
@@ -50,9 +46,7 @@ def shape_boxes(skeleton: Skeleton) -> Array:
 
 
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
-    """Return where the CoM may be, (12, 2, 3) m: three prior standard deviations around the prior CoM, inside the
-    shape box.
-    """
+    """Return where the CoM may be, (12, 2, 3) m: three standard deviations around the prior, inside the shape box."""
     half = COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
     around = np.stack([sip.com - half, sip.com + half], axis=1)
     return np.clip(around, boxes[:, :1], boxes[:, 1:])
@@ -200,9 +194,7 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
 
 
 def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers:
-    """Return the markers of a set at their usual places (offset times normaliser); markers without a usual place are
-    left out.
-    """
+    """Return the markers of a set that have a usual place, there (offset times normaliser)."""
     shoulders = np.mean([skeleton.origins["right_shoulder"], skeleton.origins["left_shoulder"]], axis=0)
     worn = [marker for marker in marker_set.markers if marker.offset is not None]
     places = [

@@ -57,16 +57,12 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
 
 
 def peak_torque(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
-    """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear in age between 25, 60 and 70
-    years.
-    """
+    """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear between 25, 60 and 70 years."""
     return _coefficient(anderson, subject, joint, direction) * subject.mass * STANDARD_GRAVITY * subject.stature
 
 
 def age_factor(anderson: AnthropometricTable, subject: Subject) -> float:
-    """Return the strength at the subject's age against 18-25 years, mean over Anderson's six torques of the same
-    sex.
-    """
+    """Return the strength at the subject's age against 18-25 years, mean over Anderson's torques of the sex."""
     young = replace(subject, age=25.0)
     ratios = [_coefficient(anderson, subject, *one) / _coefficient(anderson, young, *one) for one in _ANDERSON]
     return float(np.mean(ratios))
@@ -91,9 +87,7 @@ _BEYOND = np.radians(25.0)
 in many places where the model has one joint, marker sets turn the axes, and skin slides.
 """
 HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
-"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, which is as wide as the
-hand's.
-"""
+"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
 _SPARE = np.radians(5.0)
 """rad: how far a joint range is widened beyond the angle of the static trial."""
 
@@ -133,9 +127,7 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
 
 
 def with_tracking_limits(body: Body) -> Body:
-    """Return a body of which no static trial is known, with the limits for tracking counted from the neutral
-    posture.
-    """
+    """Return a body without a static trial with the limits for tracking, counted from the neutral posture."""
     return replace(body, limits=widen_limits(body, body.neutral)[0])
 
 

@@ -1,6 +1,4 @@
-"""The subject's measures that joint centres need: typed ones from the file, otherwise from the markers or from
-proportions.
-"""
+"""The subject's measures that joint centres need: typed ones from the file, else from markers or proportions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -92,9 +90,7 @@ def elbow(shoulder_centre: Array, lateral: Array, mid_wrist: Array, distance: fl
 
 
 def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, side: float) -> Array:
-    """Return the wrist centre (3,) m under a wrist bar on the back of the wrist: square to the bar and to the
-    forearm (plug-in gait).
-    """
+    """Return the wrist centre (3,) m under a bar on its back: square to the bar and to the forearm (plug-in gait)."""
     middle = (radial + ulnar) / 2
     back = side * np.cross(radial - ulnar, elbow_centre - middle)
     return np.asarray(middle - distance * unit(back))
@@ -113,8 +109,7 @@ class Measures:
     centres; by side: ``leg_length``, ``asis_to_trochanter``, ``shoulder_offset``; ``widths`` of <side>_knee, _ankle,
     _elbow, _wrist. All m.
 
-    ``typed`` are the names of widths and offsets that were typed by the lab; ``notes`` say what was taken from where
-    and contradictions.
+    ``notes`` say what was taken from where, and contradictions.
     """
 
     marker_radius: float
@@ -124,7 +119,6 @@ class Measures:
     asis_to_trochanter: Mapping[str, float]
     shoulder_offset: Mapping[str, float]
     widths: Mapping[str, float]
-    typed: frozenset[str]
     notes: tuple[str, ...]
 
 
@@ -135,7 +129,7 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
     place = posture.landmarks
     middle = (place["right_asis"] + place["left_asis"]) / 2
     width = float(np.linalg.norm(place["right_asis"] - place["left_asis"]))
-    notes, typed = _contradictions(given, width, place), set()
+    notes, guessed = _contradictions(given, width, place), list[str]()
     diameter = given.get("markerdiameter")
     if diameter is None:
         notes.append(f"Marker diameter is not in the file: {1e3 * MARKER_DIAMETER:.0f} mm taken.")
@@ -145,16 +139,15 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
         for joint in ("knee", "ankle", "elbow", "wrist"):
             default = proportion(f"{joint}_width", subject.sex) * subject.stature
             widths[f"{side}_{joint}"] = given.get(f"{letter}{joint}width".lower(), default)
-            typed |= {f"{side}_{joint}"} if f"{letter}{joint}width".lower() in given else set()
+            guessed += [] if f"{letter}{joint}width".lower() in given else [f"{side}_{joint}"]
         acromia = float(np.linalg.norm(place["right_acromion"] - place["left_acromion"]))
         offsets[side] = given.get(
             f"{letter}shoulderoffset".lower(), proportion("shoulder_offset", subject.sex) * acromia
         )
-    guessed = sorted(set(widths) - typed)
     if guessed:
         notes.append(
             f"Joint widths not in the file, taken from stature where a medial marker is missing: "
-            f"{', '.join(guessed).replace('_', ' ')}."
+            f"{', '.join(sorted(guessed)).replace('_', ' ')}."
         )
     return Measures(
         marker_radius=(diameter or MARKER_DIAMETER) / 2,
@@ -166,7 +159,6 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
         },
         shoulder_offset=offsets,
         widths=widths,
-        typed=frozenset(typed),
         notes=tuple(notes),
     )
 

@@ -25,9 +25,7 @@ def usual_outline(length: float, sex: Sex) -> FootSizes:
 
 
 def sole_corners(outline: FootSizes, sex: Sex) -> Array:
-    """Return the corners (6, 2) m of a sole, ahead of the heel and to the right, counter-clockwise from above: heel,
-    ball, toes.
-    """
+    """Return the corners (6, 2) m of a sole, ahead of the heel and to the right, counter-clockwise from above."""
     length, wide, narrow = outline.length, outline.breadth / 2, outline.heel_breadth / 2
     ball = proportion("ball_from_heel", sex) * length
     return np.array([(0.0, narrow), (ball, wide), (length, narrow), (length, -narrow), (ball, -wide), (0.0, -narrow)])

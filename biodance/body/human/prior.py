@@ -1,6 +1,4 @@
-"""The prior segment inertial parameters of a person: a table scaled to the skeleton, with the spread between tables
-as a covariance.
-"""
+"""The prior segment inertial parameters of a person: a table scaled to the skeleton, with the spread of tables."""
 
 import functools
 from collections.abc import Iterable, Sequence
@@ -54,9 +52,7 @@ class Spread:
 
 @functools.cache
 def table_spread(kind: str) -> Spread:
-    """Return the standard deviations of one kind of segment (pelvis, thigh, shank, foot, trunk_head, upper_arm,
-    forearm_hand).
-    """
+    """Return the standard deviations of one kind of segment (`KINDS`)."""
     alike = kind not in TRUNK
     people = _by_sex([[_in_lengths(one, kind) for one in published_people(who.sex)] for who in _BOTH], alike)
     masses = _by_sex([published_fractions(kind, who) for who in _BOTH], alike)
@@ -274,17 +270,13 @@ def primitive_covariance(
 
 
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
-    """Return the standard deviations (3,) m of a segment's CoM in its joint frame: tables, people and misplaced
-    joint centres.
-    """
+    """Return the deviations (3,) m of a segment's CoM in its frame: tables, people, misplaced joint centres."""
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     return np.hypot(table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
 
 def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
-    """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of one segment about its true joint
-    centre.
-    """
+    """Return the deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of a segment about its true joint."""
     kind, own = table_spread(kind_of(segment)), lump.inertia / lump.mass
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))

@@ -55,9 +55,7 @@ class Scaling:
     gravity: float = STANDARD_GRAVITY
 
     def body(self) -> tuple[Body, Array]:
-        """Return the scaled body and its posture q (30,) in the static trial, at which all calibrated markers are
-        met exactly.
-        """
+        """Return the scaled body and its posture q (30,) in the static trial, meeting all markers exactly."""
         frames = segment_frames(self.centres)
         skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
         doubts = _doubts(skeleton, self.subject)
@@ -94,11 +92,7 @@ def measure_static(subject: Subject, static: Trial) -> Scaling:
     posture = with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
     sizes = measures(posture, static, subject)
     centres = static_centres(
-        posture.landmarks,
-        sizes,
-        hip=hip,
-        trunk_fraction=lengths["pelvis"] / lengths["trunk_head"],
-        flat=posture.still,
+        posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"], flat=posture.still
     )
     notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)

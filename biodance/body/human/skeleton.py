@@ -55,9 +55,7 @@ class Skeleton:
 
 
 def generic_skeleton(reference: Reference, subject: Subject) -> Skeleton:
-    """Return the skeleton of the table's reference person at the subject's stature, with the widths of
-    ``proportions.csv``.
-    """
+    """Return the skeleton of the table's reference person at the subject's stature, widths by ``proportions.csv``."""
     stature, sex = subject.stature, subject.sex
     scale = stature / reference.stature
     kinds = {kind: scale * reference.lengths[kind] for kind in KINDS}

@@ -15,9 +15,7 @@ NEEDED = (
     *("right_asis", "left_asis", "mid_psis"),
     *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe")),
 )
-"""Landmarks without which no body can be placed: pelvis and legs. What is not marked above stands by proportion
-(`unseen`).
-"""
+"""Landmarks without which no body can be placed: pelvis and legs. The rest may stand by proportion (`unseen`)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,9 +111,7 @@ def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dic
 
 
 def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
-    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion where
-    that has no marker.
-    """
+    """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion."""
     right, left = place["right_acromion"], place["left_acromion"]
     if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
         up = (place["c7"] + place["jugular_notch"]) - (place["t10"] + place["xiphoid"])
@@ -154,16 +152,13 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
         return centre, ""
     return usual, (
         f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of "
-        f"march, "
-        "so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial knee "
-        "marker."
+        "march, so the axis is taken as square. Place the marker in the frontal plane of the thigh, or add a medial "
+        "knee marker."
     )
 
 
 def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
-    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis
-    without either.
-    """
+    """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis."""
     lateral = place[f"{side}_ankle_lateral"]
     if f"{side}_ankle_medial" in place:
         return np.asarray((lateral + place[f"{side}_ankle_medial"]) / 2)
@@ -249,9 +244,7 @@ def _chain(
     centres: tuple[Array, ...],
     right: Array,
 ) -> None:
-    """Fill in the two segments of a limb: the second flexes about z of the first and is tilted about its own x
-    (varus).
-    """
+    """Fill in the two segments of a limb: the second flexes about z of the first, tilted about its own x (varus)."""
     (upper, lower), (top, middle, end) = names, centres
     rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
     direction = rotation[upper].T @ unit(middle - end)

@@ -30,9 +30,7 @@ CARRIES = {
 _SPEED = 1.0
 """rad/s, the limit that Bonnet 2016 used for this robot."""
 LEG_BASE, ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
-"""m: where the legs start in the pelvis (ISB axes) and the arms in the trunk (x forwards, y left, z up); Fujitsu
-manual, table 6.1-2.
-"""
+"""m: where legs start in the pelvis (ISB axes) and arms in the trunk (forwards, left, up); Fujitsu, table 6.1-2."""
 _SHOULDER = 0.111
 """m, from the middle to either shoulder."""
 _ANKLE_HEIGHT, SOLE_AHEAD, SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
@@ -42,9 +40,7 @@ _COM_SD = 0.010
 
 
 def hoap3() -> Body:
-    """Return the robot in configuration B (no battery, no wireless card): free-flyer root, nq = 28, nv = 27, no
-    markers.
-    """
+    """Return the robot in configuration B (no battery, no wireless card): free root, nq = 28, nv = 27, no markers."""
     joints = _joints()
     turns = _zero_posture(joints)
     lumps = [_lump(read_table("robots", "hoap3_segments").row(segment=name), turns[name]) for name in _SEGMENTS]

@@ -43,9 +43,8 @@ def standing_frames(body: Body) -> Body:
         if not up[1] > LEANS:
             away = np.degrees(np.arccos(np.clip(up[1], -1, 1)))
             raise BiodanceError(
-                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; "
-                f"the feet must be flat "
-                "within 30 degrees. Give the joints zeros at which the robot stands."
+                f"{body.name}: at zero joint angles the {side} sole faces {away:.0f} degrees away from the ground; the "
+                "feet must be flat within 30 degrees. Give the joints zeros at which the robot stands."
             )
         ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
         ahead /= np.linalg.norm(ahead)
@@ -78,9 +77,7 @@ def reframed(body: Body, segment: int, turn: Array, shift: Array) -> Body:
 
 
 def _ankle(body: Body, segment: int) -> Array:
-    """Return the point (3,) m, in the segment's frame, on the axis of its joint that is nearest to the axis before
-    it.
-    """
+    """Return the point (3,) m, in the segment's frame, on its joint's axis that is nearest to the axis before it."""
     last = body.joints[body.segment_joint[segment]]
     if last.parent < 0:
         return np.zeros(3)
@@ -105,9 +102,7 @@ class Likeness:
 
 
 def likeness(body: Body, to: Likeness) -> Body:
-    """Return the body of the same shape and angles, with all lengths, masses, strengths and speeds changed by the
-    factors of ``to``.
-    """
+    """Return the body of the same shape with lengths, masses, strengths and speeds changed by the factors of ``to``."""
     length, mass, limits = to.length, to.mass, body.limits
     units: Array = mass * np.tile([1.0, *[length] * 3, *[length**2] * 6], len(body.segments))
     return replace(

@@ -1,6 +1,4 @@
-"""How well a robot's maker knows its inertial parameters: standard deviations of a data sheet, for robots whose data
-come without any.
-"""
+"""How well a robot's maker knows its inertial parameters, for robots whose data come without deviations."""
 
 import numpy as np
 
@@ -34,16 +32,12 @@ def is_point(lump: RigidInertia) -> bool:
 
 
 def extended(lump: RigidInertia, box: Array) -> RigidInertia:
-    """Return the lump, or in place of a point mass one that fills its ``box`` (2, 3) m: what is left out is not
-    known exactly.
-    """
+    """Return the lump, or for a point mass one that fills its ``box`` (2, 3) m: what is left out is unknown."""
     return solid(lump, box) if is_point(lump) else lump
 
 
 def solid(lump: RigidInertia, box: Array) -> RigidInertia:
-    """Return a body of uniform density that fills a ``box`` (2, 3) m about its own middle, with the lump's mass and
-    centre of mass.
-    """
+    """Return a body of uniform density that fills a ``box`` (2, 3) m, with the lump's mass and centre of mass."""
     square = np.square(box[1] - box[0])
     return RigidInertia(lump.mass, lump.com, lump.mass / 12 * np.diag(square.sum() - square))
 
@@ -55,7 +49,5 @@ def is_possible(lump: RigidInertia) -> bool:
 
 
 def com_deviation(lump: RigidInertia) -> float:
-    """Return the standard deviation m, per axis, of the centre of mass of a lump of which only the data sheet is
-    known.
-    """
+    """Return the standard deviation m per axis of the CoM of a lump of which only the data sheet is known."""
     return float(_COM_SD * np.sqrt(np.trace(lump.inertia) / (2 * lump.mass)))

@@ -65,9 +65,7 @@ LAYER = 0.002
 _STEEPEST = 0.5
 """Cosine of the largest angle between a sole and the ground at zero joint angles."""
 CORNERS = 12
-"""A sole keeps at most so many corners: those that leave it largest. All lie on the true outline, so that support is
-never overrated.
-"""
+"""A sole keeps at most so many corners, those that leave it largest, all on its outline: support is not overrated."""
 
 
 def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array) -> Array:
@@ -112,9 +110,7 @@ def match_faces(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
-    """Return the outward normal (3,) of the face that is nearest to horizontal; of meshes, of the largest face
-    within the limit.
-    """
+    """Return the outward normal (3,) of the most horizontal face; of meshes, of the largest one within the limit."""
     from scipy.spatial import ConvexHull, QhullError
 
     if not hulls:
@@ -143,9 +139,7 @@ def _normals(corners: Array) -> Array:
 
 
 def _largest(flat: Array, outline: list[int]) -> list[int]:
-    """Return at most `CORNERS` indices of a convex ``outline`` into ``flat`` (K, 2): again and again the one that
-    matters least goes.
-    """
+    """Return at most `CORNERS` indices of a convex ``outline`` into ``flat`` (K, 2): the least important go first."""
     while len(outline) > CORNERS:
         here, before, after = flat[outline], flat[np.roll(outline, 1)], flat[np.roll(outline, -1)]
         (ax, ay), (bx, by) = (here - before).T, (after - before).T

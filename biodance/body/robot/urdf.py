@@ -169,9 +169,7 @@ def _on(file: UrdfFile, link: str) -> list[Connection]:
 
 
 def _box(carrier: _Carrier, lump: RigidInertia) -> Array:
-    """Return the box (2, 3) m around the shapes of a segment; without any, a box with its moments of inertia about
-    its axes.
-    """
+    """Return the box (2, 3) m around the shapes of a segment; without any, one with its moments of inertia."""
     corners = carrier.corners
     if corners.size:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
@@ -203,8 +201,7 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
     if axis == 0 or below[axis] > 0:
         raise FileRefused(
             f"{file.path}: at zero joint angles the feet are at {np.round(below, 3)} m from the root; the root must "
-            f"have x forwards and "
-            "y or z up, and the robot must stand upright at zero angles."
+            "have x forwards and y or z up, and the robot must stand upright at zero angles."
         )
     up, ahead = np.eye(3)[axis], np.eye(3)[0]
     if _backwards(feet, place, np.cross(ahead, up)):
@@ -223,9 +220,7 @@ def _standing(file: UrdfFile, body: Body, feet: dict[str, _Carrier]) -> Body:
 
 
 def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], sideways: Array) -> bool:
-    """Whether the root's x axis points backwards (iCub): seen along it the right foot is on the left, and the names
-    say right and left.
-    """
+    """Whether the root's x axis points backwards (iCub): along it the foot that is named right is on the left."""
     crossed = float((place["right"][1] - place["left"][1]) @ sideways) < 0
     right, left = (feet[side].link.lower() for side in SIDES)
     pairs = (("right", "left"), ("r_", "l_"), ("_r", "_l"))

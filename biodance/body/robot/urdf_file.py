@@ -175,9 +175,7 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
 
 
 def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
-    """Return the corners (K, 3) m of the convex hulls of all shapes that are meshes; why one cannot be read is added to
-    ``unread``.
-    """
+    """Return the corners (K, 3) m of the convex hulls of all meshes; why one cannot be read goes to ``unread``."""
     hulls = []
     for element in elements:
         mesh = element.find("geometry/mesh")

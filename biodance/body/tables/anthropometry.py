@@ -59,9 +59,7 @@ TableRow = Mapping[str, str]
 
 @dataclass(frozen=True, eq=False)
 class AnthropometricTable:
-    """One table: ``rows`` as text by column name; ``provenance``: title, source, doi, page, population, n, sex,
-    units, sd, sha256 ...
-    """
+    """One table: ``rows`` as text by column; ``provenance``: title, source, doi, population, units, sd, sha256 ..."""
 
     name: str
     rows: tuple[TableRow, ...]

@@ -62,9 +62,7 @@ def _length(table: SegmentTable, kind: str, subject: Subject, base: Reference) -
 
 
 def _masses(table: SegmentTable, subject: Subject, base: Reference) -> dict[str, float]:
-    """Return the share of the body mass of one segment of each kind; segments that are not given share what the
-    others leave.
-    """
+    """Return the share of the body mass of one segment of each kind; those not given share what the others leave."""
     given = {kind: found for kind in KINDS if (found := table.find(kind, "mass", sex=subject.sex))}
     share = {kind: one.of(subject) / (subject.mass if one.unit == "kg" else 1.0) for kind, one in given.items()}
     total = sum(COUNT[kind] * value for kind, value in share.items())

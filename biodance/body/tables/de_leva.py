@@ -72,9 +72,7 @@ def joined(table: str, height: float, sex: Sex, lumps: Mapping[str, RigidInertia
 
 
 def parts(sex: Sex) -> dict[str, RigidInertia]:
-    """Return the ten parts of the reference person: mass fraction, CoM m in the model's segment frame, inertia in
-    that unit of mass.
-    """
+    """Return the ten parts of the reference person: mass fraction, CoM m in the model's frame, inertia in that unit."""
     middle, upper = length("middle_trunk", sex), length("upper_trunk", sex)
     neck = middle + upper + length("trunk_2", sex) - length("trunk", sex)  # cervicale lies higher than suprasternale
     return {
@@ -106,9 +104,7 @@ def _down(segment: str, sex: Sex, top: float) -> RigidInertia:
 
 
 def _foot(sex: Sex) -> RigidInertia:
-    """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle
-    joint.
-    """
+    """Return the foot: long axis forwards, CoM on the heel-toe line at 0.6 of the ankle's height under the ankle."""
     mass, size, fraction = _sizes("foot", sex)
     radii = np.array(_table().values("foot", "gyration", "longitudinal sagittal transverse", sex=sex)) * size
     forward = (fraction - proportion("heel_behind_ankle", sex)) * size

@@ -1,6 +1,4 @@
-"""The one table of how wrong things are: ``anthropometry/uncertainty/sizes.csv``, with source, unit and where every
-size was learned.
-"""
+"""The one table of how wrong things are, ``anthropometry/uncertainty/sizes.csv``, with source and unit."""
 
 import functools
 

@@ -17,9 +17,7 @@ from biodance.records import Subject
 
 
 def dumas(subject: Subject) -> Reference:
-    """Return the reference woman (1.61 m) or man (1.77 m); mid hip to mid shoulder, which the table lacks, in de
-    Leva's proportion.
-    """
+    """Return the reference woman (1.61 m) or man (1.77 m); mid hip to mid shoulder in de Leva's proportion."""
     sex = subject.sex
     height, forearm = dumas_stature(sex), _dumas_length("forearm", sex)
     lengths = {kind: _dumas_length(kind, sex) for kind in ("pelvis", "thigh", "shank", "upper_arm")}
@@ -58,9 +56,7 @@ def trunk_parts(sex: Sex) -> tuple[RigidInertia, RigidInertia, RigidInertia, Rig
 
 
 def _dumas_lump(segment: str, sex: Sex, origin: float = 0.0) -> RigidInertia:
-    """Return the lump of a segment; ``origin`` m is the height of the table's own origin in the model's segment
-    frame.
-    """
+    """Return the lump of a segment; ``origin`` m: height of the table's origin in the model's segment frame."""
     table, length = _dumas_table(), _dumas_length(segment, sex)
     mass = table.value(segment, "mass", sex=sex)
     com = np.array(table.values(segment, "com", "x y z", sex=sex)) * length + [0.0, origin, 0.0]
@@ -71,9 +67,7 @@ def _dumas_lump(segment: str, sex: Sex, origin: float = 0.0) -> RigidInertia:
 
 
 def winter(subject: Subject) -> Reference:
-    """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, trunk shape and joint
-    (L5/S1) from Dumas 2018.
-    """
+    """Return Winter 2009 at the subject's stature; longitudinal radii from de Leva 1996, the trunk from Dumas 2018."""
     sex, height, table = subject.sex, subject.stature, read_segment_table("winter_2009")
     shape = dumas(subject)
     scale = height / shape.stature
@@ -146,9 +140,8 @@ def zatsiorsky(subject: Subject) -> Reference:
     """
     if subject.sex == "F":
         raise UnknownName(
-            "Table zatsiorsky_2002 holds the regressions for men only: the coefficients found for women give a foot "
-            "of negative mass. "
-            "Choose de_leva_1996 (the same women, without regression) or dumas_2018."
+            "Table zatsiorsky_2002 holds the regressions for men only: the coefficients found for women give a foot of "
+            "negative mass. Choose de_leva_1996 (the same women, without regression) or dumas_2018."
         )
     scale = subject.stature / de_leva.de_leva_stature("M")
     lumps = {}
@@ -160,8 +153,7 @@ def zatsiorsky(subject: Subject) -> Reference:
         if mass <= 0 or 2 * max(moments) > sum(moments) or min(moments) <= 0:
             raise UnknownName(
                 f"Table zatsiorsky_2002 gives no possible {part} for {subject.mass:.1f} kg and {subject.stature:.2f} "
-                f"m: "
-                "its regressions hold for men of 50 to 90 kg. Choose de_leva_1996."
+                "m: its regressions hold for men of 50 to 90 kg. Choose de_leva_1996."
             )
     return de_leva.joined("zatsiorsky_2002", subject.stature, "M", lumps)
 
@@ -187,9 +179,7 @@ def study(name: str, subject: Subject) -> Reference:
 
 
 def study_masses(name: str, subject: Subject) -> dict[str, float]:
-    """Return the mass fraction of each kind of segment in one study; the trunk over the joint with the head is what
-    remains.
-    """
+    """Return the mass fraction of each kind of segment in one study; the trunk over the joint is what remains."""
     numbers = read_segment_table("mass_studies").numbers
     part = {
         segment: one.value for (which, segment, sex, *_), one in numbers.items() if (which, sex) == (name, subject.sex)

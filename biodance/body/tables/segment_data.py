@@ -41,9 +41,7 @@ _LEGAL: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Number:
-    """One number: ``value`` in ``unit``; ``per_kg``, ``per_m`` its regression on body mass and stature; ``sd`` NaN
-    where not printed.
-    """
+    """One number: ``value`` in ``unit``; ``per_kg``, ``per_m`` its regression on mass and stature; ``sd`` or NaN."""
 
     value: float
     unit: str

@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 
 from biodance.dance.dance import Dance
 from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
-from biodance.dance.imprecision import mass_centre
 from biodance.dance.limits import Limit
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
-from biodance.motion.regressor import regressor
 from biodance.records import Array
 
 _ROUNDS = 5
@@ -79,12 +77,6 @@ class Catalogue:
         """Return the word of every part of posture ``s``."""
         return {part: self.words[part][k] for part, k in zip(self.parts, self.index[s], strict=True)}
 
-    @cached_property
-    def standing(self) -> Array:
-        """(S, 6, 10 N) regressor of standing still in each posture."""
-        motion = self.chain.motion(np.arange(len(self.x), dtype=float), self.x, *np.zeros((2, *self.x.shape)))
-        return np.asarray(regressor(self.chain.body, motion)).reshape(len(self.x), 6, -1)
-
     def keeps(self, s: int, limits: tuple[Limit, ...]) -> tuple[float, str]:
         """Return by how many deviations of imprecise people posture ``s`` keeps the limits and the one of which that is
         least; minus infinity where itself it breaks one or leaves too little for moves.
@@ -130,10 +122,10 @@ def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
         return x
     x[:, :2] = middle = _middle(stance)
     for _ in range(_ROUNDS):
-        x[:, 2] = _pelvis_height(chain, stance, x, knee)
+        x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
         x = chain.plant(x, stance.planted, stance.ankle)
-        x[:, :2] += middle - mass_centre(chain, x)[:, :2]
-    x[:, 2] = _pelvis_height(chain, stance, x, knee)
+        x[:, :2] += middle - chain.mass_centre(x)[:, :2]
+    x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
     return chain.plant(x, stance.planted, stance.ankle)
 
 
@@ -141,14 +133,3 @@ def _middle(stance: Stance) -> Array:
     """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
     along = stance if stance.over is None else stance.on(stance.over)
     return np.array([along.centre[0] - _BACK, stance.centre[1]])
-
-
-def _pelvis_height(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
-    """Return the height (S,) m of the pelvis at which no planted knee is bent by less than ``knee`` (S,) rad."""
-    turn, tops = chain.root_rotation(x), []
-    for side in stance.planted:
-        leg = chain.legs[side]
-        hip = turn @ leg.hip
-        across = np.sum((x[:, :2] + hip[:, :2] - stance.ankle[side, :2]) ** 2, axis=1)
-        tops.append(stance.ankle[side, 2] + np.sqrt(np.maximum(leg.length(knee) ** 2 - across, 0.01)) - hip[:, 2])
-    return np.min(tops, axis=0)

@@ -59,9 +59,7 @@ def mended_dance(walk: Walk, steps: list[DanceStep], moves: list[Move], workers:
 
 
 def _mended_at(walk: Walk, course: Walked, p: int, found: Rehearsed, workers: Executor) -> Walked:
-    """Return the course with another way to posture ``p`` or another posture there, if that is safe; else what is
-    nearest to it.
-    """
+    """Return the course with another way to posture ``p`` or another posture there that is safe or nearest to it."""
     best, least = course, _room(walk, course, (p,), found.failed, workers)
     for other, only in _others(walk, course, p, found):
         room = _room(walk, other, only, found.failed, workers)
@@ -114,7 +112,7 @@ def _exchanged(walk: Walk, course: Walked, q: int) -> Iterator[Walked]:
     """Yield courses with another posture in place ``q``, the best first."""
     steps, moves = course.steps, course.moves
     before, after = [*steps[:q]], steps[q + 1] if q + 1 < len(steps) else None
-    stances, belief = tuple(step.catalogue.stance for step in steps), np.eye(walk.factor.shape[1])
+    stances, belief = tuple(step.catalogue.stance for step in steps), walk.information.beforehand
     for number, step in enumerate(before):
         belief = walk.belief_after(belief, before[:number], step)
     taken = {step.key for step in steps}

@@ -75,9 +75,7 @@ def _roomiest(moves: Iterable[Move], room: Callable[[Move], tuple[float, str]]) 
 
 
 def _stepping(task: Task, step: tuple[float, ...]) -> Array:
-    """Return the via points (2, n) of a straight move on which the free leg takes the ``step``, within its joints'
-    ranges.
-    """
+    """Return the via points (2, n) of a straight move on which the free leg takes the ``step`` within its ranges."""
     via, limits = task.straight(), task.chain.body.limits
     for side in {0, 1} - set(task.stance.planted):
         columns = np.array(task.chain.leg_columns[side])

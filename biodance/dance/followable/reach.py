@@ -95,9 +95,7 @@ class Reach:
         return DanceStep(catalogue, s, said) if len(said) <= most else None
 
     def leads(self, catalogue: Catalogue, s: int, goal: Catalogue, steps: int) -> bool:
-        """Return whether posture ``s`` of a catalogue leads in so many ``steps`` at most to one of ``goal``, the arms
-        at rest.
-        """
+        """Return whether posture ``s`` leads in at most so many ``steps`` to one of ``goal``, the arms at rest."""
         return any(self._goes(int(row), catalogue, goal) for row in self._within(catalogue, s, steps - 1))
 
     def _within(self, catalogue: Catalogue, s: int, steps: int) -> NDArray[np.intp]:

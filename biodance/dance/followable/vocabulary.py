@@ -67,8 +67,8 @@ Vocabulary = dict[str, tuple[Word, ...]]
 """Group: its words, the one for rest first."""
 
 
-def read_vocabulary(name: str = "people") -> Vocabulary:
-    """Return the words of a file in ``protocols/vocabulary``.
+def read_vocabulary() -> Vocabulary:
+    """Return the words of ``protocols/vocabulary/people.toml``.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def read_vocabulary(name: str = "people") -> Vocabulary:
         A group is missing or unknown, a key is unknown, a group has not one word for rest, or a mirror image
         is missing.
     """
-    path = locate("protocols/vocabulary", name)
+    path = locate("protocols/vocabulary", "people")
     raw = read_toml(path)
     if set(raw) != set(_GROUPS):
         raise BiodanceError(f"{path}: groups {', '.join(sorted(raw))}; expected {', '.join(_GROUPS)}.")
@@ -186,9 +186,7 @@ def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
 
 
 def own_joint(part: str, joint: str) -> str:
-    """Return the name of the body's joint of a word's angle: ``right_arm``, ``shoulder_flexion`` ->
-    ``right_shoulder_flexion``.
-    """
+    """Return the joint of a word's angle: ``right_arm``, ``shoulder_flexion`` -> ``right_shoulder_flexion``."""
     side = part.partition("_")[0]
     return f"{side}_{joint}" if side in SIDES else joint
 

@@ -1,9 +1,9 @@
 """A dance that people can follow: a walk from posture to posture in which one or two parts of the body change.
 
 Every step takes, of all postures within reach of the last one - at most so many instructions away, or its mirror image
-- the one that tells most per second (`selection`), where an instruction costs time, too: the price of `simplicity`.
-Where the feet must change, only postures count from which they can in time (`reach`). What a posture must keep it keeps
-also for people who copy it imprecisely (`catalogue`).
+- the one that tells most per second (`problem.information`), where an instruction costs time, too: the price of
+`simplicity`. Where the feet must change, only postures count from which they can in time (`reach`). What a posture must
+keep it keeps also for people who copy it imprecisely (`catalogue`).
 """
 
 from collections import Counter
@@ -12,28 +12,25 @@ from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise
 
 import numpy as np
-from scipy.linalg import block_diag
 
+from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.followable.centres import CENTRES, told_of_centres
+from biodance.dance.followable.catalogue import Catalogue
 from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
 from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
 from biodance.dance.followable.vocabulary import rest_cut_short
 from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.ordering import learned
-from biodance.dance.problem.splines import rest_to_rest
+from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.problem.information import PostureInformation, update_belief
+from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words, under
 from biodance.dance.transitions.context import DesignContext
-from biodance.dance.transitions.move import Move, Task
+from biodance.dance.transitions.move import Move, Task, straight_way
 from biodance.errors import BiodanceError
-from biodance.identification.posterior import prior_factor
-from biodance.motion.regressor import regressor
 from biodance.records import Array
 
 _INSTRUCTION = 0.5
 """s that one instruction is worth at simplicity 1."""
-_FORCE, _MOMENT, _RATE = 8.0, 4.0, 4.0
-"""N, N·m, Hz: error of one independent sample of a person's wrench, and how many there are (`selection`)."""
 _TRIES = 200
 """Postures that are taken or given up before a walk is."""
 _WAYS_ON = 5
@@ -48,8 +45,6 @@ _LIFTING = 1.4
 """Times as long as others that a move takes in which a foot is lifted or put down."""
 _LOOKED_AT = 24
 """Postures that tell most standing still, whose ways are judged, too."""
-_SHORT = 1.0
-"""s that postures in between are held."""
 
 
 class NoWay(BiodanceError):
@@ -78,18 +73,12 @@ class Walk:
     work: DesignContext
     _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
+    _still: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        chain, plan = self.work.chain, self.work.plan
+        plan = self.work.plan
         self.reach = Reach(self.work, self._can)
-        self.factor = prior_factor(chain.body.sip)
-        before = np.sum(self.factor**2, axis=1)
-        weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
-        self.scale = self.factor * np.sqrt(weight / np.where(before > 0, before, 1.0))[:, None]
-        if plan.lively:
-            self.factor = np.pad(self.factor, ((0, 0), (0, CENTRES)))
-            self.scale = block_diag(self.scale, np.eye(CENTRES))
-        self.samples = rest_to_rest(plan.move, via=0, rate=_RATE)
+        self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
 
     def take(self, stances: tuple[Stance, ...]) -> tuple[list[DanceStep], list[Move]]:
         """Return one step for each of ``stances`` and the moves between them.
@@ -100,7 +89,7 @@ class Walk:
             From some posture no other one can be reached; the message names the limit that most of them break.
         """
         self._check_feet(stances)
-        path, farthest = [_Place(None, np.eye(self.factor.shape[1]))], 0
+        path, farthest = [_Place(None, self.information.beforehand)], 0
         why: dict[int, dict[str, int]] = {}
         for _ in range(_TRIES):
             number, steps = len(path) - 1, [place.taken[0] for place in path[1:]]
@@ -132,7 +121,7 @@ class Walk:
 
     def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
         """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
-        steps, belief = list[DanceStep](), np.eye(self.factor.shape[1])
+        steps, belief = list[DanceStep](), self.information.beforehand
         for number, stance in enumerate(stances):
             step = next((one for one in self._ranked(steps, stances, belief) if not self._kept(one)[1]), None)
             if step is None:
@@ -143,8 +132,7 @@ class Walk:
 
     def belief_after(self, belief: Array, steps: list[DanceStep], step: DanceStep) -> Array:
         """Return what is believed (k, k) when ``step`` follows on ``steps``, before whom it was ``belief``."""
-        Z = learned(belief, self._told(steps[-1] if steps else None, step))
-        return np.asarray(belief - Z.T @ Z)
+        return update_belief(belief, self._rows(steps[-1] if steps else None, step))
 
     def possible(
         self,
@@ -199,15 +187,12 @@ class Walk:
             least = sorted(found, key=lambda step: (len(step.said), step.s))
             yield from (step for step in least if not late(step))
             return
-        cost = self._seconds(found)
-        told = self._gains(belief, self._white(catalogue.standing[[step.s for step in found]]), cost)
-        on = (found[k] for k in np.argsort(-told, kind="stable") if not late(found[k]))
+        still = self.information.white(self._standing(catalogue)[[step.s for step in found]])
+        gains = self.information.gains(belief, still) / self._seconds(found)
+        on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
         first = list(islice(on, _LOOKED_AT))
-        worth = [
-            float(np.sum((self.scale @ learned(belief, self._told(last, step)).T) ** 2)) / seconds
-            for step, seconds in zip(first, self._seconds(first), strict=True)
-        ]
-        yield from (first[k] for k in np.argsort(-np.array(worth), kind="stable"))
+        gains = np.array([float(self.information.gains(belief, self._rows(last, step))) for step in first])
+        yield from (first[k] for k in np.argsort(-gains / self._seconds(first), kind="stable"))
         yield from on
 
     def _late(self, number: int, stances: tuple[Stance, ...]) -> Callable[[DanceStep], bool]:
@@ -252,32 +237,19 @@ class Walk:
         ends, duration = np.array([last.x, step.x]), slow * work.plan.move
         return Task(work.chain, work.blocks, under(was, now), ends, duration, work.plan.limits)
 
-    def _told(self, last: DanceStep | None, step: DanceStep) -> Array:
+    def _standing(self, catalogue: Catalogue) -> Array:
+        """Return the regressors (S, 6, 10 N) of standing still in all postures of a catalogue."""
+        key = feet_key(catalogue.stance)
+        if key not in self._still:
+            self._still[key] = self.information.standing(catalogue.x)
+        return self._still[key]
+
+    def _rows(self, last: DanceStep | None, step: DanceStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
-        still = self._white(step.catalogue.standing[step.s : step.s + 1])[0]
-        if self.work.plan.lively:
-            still = np.concatenate([still, told_of_centres(self.work.chain, step.x, still.shape[1])])
+        still = self.information.of_posture(step.x, self._standing(step.catalogue)[step.s])
         if last is None:
             return still
-        ends, chain = np.array([last.x, step.x]), self.work.chain
-        parts = [
-            part[1:-1] @ ends for part in (self.samples.position, self.samples.velocity, self.samples.acceleration)
-        ]
-        W = regressor(chain.body, chain.motion(np.arange(len(parts[0])) / _RATE, *parts))
-        return np.concatenate([still, self._white(np.asarray(W).reshape(1, -1, W.shape[-1]))[0]])
-
-    def _white(self, W: Array) -> Array:
-        """Return regressors (G, 6 T, 10 N) per standard deviation of error and of the table, (G, 6 T, k)."""
-        error = np.tile(np.repeat([_FORCE, _MOMENT], 3), W.shape[1] // 6)
-        flat = (W / error[:, None]).reshape(-1, W.shape[2]) @ self.factor  # one product: many small ones are slow
-        return np.asarray(flat.reshape(*W.shape[:2], -1))
-
-    def _gains(self, belief: Array, rows: Array, cost: Array) -> Array:
-        """Return what each of ``rows`` (G, m, k) tells per second."""
-        spread = rows @ belief
-        factor = np.linalg.cholesky(np.eye(rows.shape[1]) + spread @ np.swapaxes(rows, 1, 2))
-        Z = np.linalg.solve(factor, spread)
-        return np.asarray(np.sum((Z @ self.scale.T) ** 2, axis=(1, 2)) / cost)
+        return np.concatenate([still, self.information.of_ways(np.array([[last.x, step.x]]))[0]])
 
 
 def _room(task: Task, stances: tuple[Stance, Stance], move: Move) -> tuple[float, str]:
@@ -291,10 +263,23 @@ def walked_dance(work: DesignContext, steps: list[DanceStep], moves: list[Move])
     """Return the dance of ``steps`` and the ``moves`` between them."""
     plan, x = work.plan, np.array([step.x for step in steps])
     stances = tuple(step.catalogue.stance for step in steps)
-    hold = np.array([plan.hold if stance.over is None else min(_SHORT, plan.hold) for stance in stances])
+    hold = np.array([plan.hold_on(stance) for stance in stances])
     feet = tuple(under(*pair) for pair in pairwise(stances))
     via = np.array([move.via for move in moves]).reshape(-1, 2, x.shape[1])
     duration, names = np.array([move.duration for move in moves]), tuple(name_of(step) for step in steps)
     dance = Dance(plan.name, work.chain.body, x, stances, hold, via, duration, feet, work.seed)
     mirrored = tuple(p for p, step in enumerate(steps) if step.mirror)
     return replace(dance, names=names, mirrored=mirrored)
+
+
+def freer_dance(body: Body, plan: Plan, *, seed: int = 0) -> Dance:
+    """Return the dance of as many postures of the same words on the same feet, chosen freely: no limit on instructions,
+    no ``simplicity``. Its postures keep the limits and suit imprecise people; its moves go straight and nobody has
+    looked at them, so that it only tells what it costs that a dance can be followed.
+    """
+    free = replace(plan, instructions=np.inf, simplicity=0.0)
+    stances = support_sequence(body, free)
+    steps = Walk(DesignContext.alone(body, free, seed)).choose(stances)
+    x, hold = np.array([step.x for step in steps]), np.full(len(steps), plan.hold)
+    via, move = straight_way(x[:-1], x[1:]), np.full(len(x) - 1, plan.move)
+    return Dance(plan.name, body, x, stances, hold, via, move, tuple(under(*pair) for pair in pairwise(stances)), seed)

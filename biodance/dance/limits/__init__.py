@@ -43,9 +43,7 @@ __all__ = [
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
-    """Return a number of a limit: its ``default`` and the range from ``low`` to ``high`` in ``unit`` that a protocol
-    may give it.
-    """
+    """Return a number of a limit: its ``default`` and the legal range from ``low`` to ``high`` in ``unit``."""
     return field(default=default, metadata={"low": low, "high": high, "unit": unit})
 
 
@@ -85,14 +83,10 @@ class Limit(ABC):
 
     @abstractmethod
     def check(self, motion: CheckedMotion) -> Remaining:
-        """Return what is left in every sample of ``motion``, by code that shares nothing with `margins`: for the
-        judge.
-        """
+        """Return what is left in every sample of ``motion``, by code that shares nothing with `margins`: to judge."""
 
     def hold_reserve(self, stance: Stance) -> float:
-        """Return the share of the scale that a held posture keeps in reserve, for the moves that begin and end
-        there.
-        """
+        """Return the share of the scale that a held posture keeps in reserve for the moves that begin and end there."""
         return 0.06
 
     def straight_reserve(self, stance: Stance) -> float:

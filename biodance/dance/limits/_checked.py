@@ -21,9 +21,7 @@ from biodance.records import SIDES, Array, Motion, Wrench
 
 @dataclass(frozen=True, eq=False)
 class Remaining:
-    """What is left of a limit: ``value`` (T, m) in its unit, negative where it is broken; ``of`` (m) which joint, side
-    or pair.
-    """
+    """What is left of a limit: ``value`` (T, m) in its unit, negative if broken; ``of`` (m) joint, side or pair."""
 
     value: Array
     of: tuple[str, ...]
@@ -69,9 +67,7 @@ class CheckedMotion:
         return (self.stance.planted,) if self.stance.over is None else (self.stance.planted, (self.stance.over,))
 
     def torques(self, bearing: tuple[int, ...]) -> Array:
-        """Return the torques (T, n) N·m of the joints, by pinocchio's inverse dynamics, when the feet ``bearing`` carry
-        everything.
-        """
+        """Return the joint torques (T, n) N·m, by pinocchio's inverse dynamics, when the feet ``bearing`` carry all."""
         touching = np.tile([side in bearing for side in (0, 1)], (self.motion.time.size, 1))
         loads = {}
         if bearing:

@@ -1,6 +1,4 @@
-"""The zero-moment point (at rest: the projected centre of mass) stays inside the reduced base of support (paper eq.
-16).
-"""
+"""The zero-moment point (at rest: the projected centre of mass) stays inside the reduced support (paper eq. 16)."""
 
 from dataclasses import dataclass
 
@@ -38,9 +36,7 @@ class Balance(Limit):
         return Margins(state.zmp @ normals.T + offsets, normals @ state.zmp_slopes)
 
     def check(self, motion: CheckedMotion) -> Remaining:
-        """Return the distance (T, 1) m inside the reduced base, drawn from where the soles really are, of all feet that
-        may bear all.
-        """
+        """Return the distance (T, 1) m inside the reduced base of the true soles, of all feet that may bear all."""
         point, soles = motion.wrench.cop()[:, :2], [sole[0, :, :2] for sole in motion.soles]
         corners = [np.concatenate([*(soles[side] for side in base), motion.stance.props]) for base in motion.bases]
         least = np.min([_inside(point, some, self.share) for some in corners], axis=0)
@@ -62,9 +58,7 @@ def _left(copy: Copied) -> Remaining:
 
 
 def _inside(point: Array, corners: Array, share: float) -> Array:
-    """Return the distance (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), drawn together to ``share``
-    about its middle.
-    """
+    """Return the distance (T,) m of points (T, 2) inside the hull of ``corners`` (K, 2), reduced to ``share``."""
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(corners)

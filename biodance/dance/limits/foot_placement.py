@@ -1,6 +1,4 @@
-"""Planted feet stay where they are: the legs, solved in closed form, must reach them with the knee not quite
-straight.
-"""
+"""Planted feet stay where they are: the legs, solved in closed form, reach them with the knee not quite straight."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
 """No foot slips: the force stays inside the friction pyramid, mu F_z >= |F_x|, |F_y| (paper eq. 19, printed inverted).
 
-Both feet's forces point the same way (`problem.feet.foot_forces`), so that the total decides for each of them.
+Both feet's forces point the same way (`problem.stance.foot_forces`), so that the total decides for each of them.
 Standing still needs no friction.
 """
 

@@ -1,6 +1,4 @@
-"""A hand that holds on to a frame stays on its grip. The frame is for safety: the base of support remains that of the
-feet.
-"""
+"""A hand that holds on to a frame stays on its grip. The frame is for safety: the support remains that of the feet."""
 
 from dataclasses import dataclass
 
@@ -20,9 +18,7 @@ class Grip(Limit):
     name, unit, scale, suspicion = "grip", "m", 0.05, 40
 
     def margins(self, state: State) -> Margins:
-        """Return how much further each holding palm may be from its grip, (T, holding hands) m; none where nothing is
-        held.
-        """
+        """Return how much further each holding palm may be from its grip, (T, holding hands) m; none without a grip."""
         holding = [side for side in (0, 1) if np.isfinite(state.stance.hands[side, 0])]
         if not holding:
             return unconcerned(state)

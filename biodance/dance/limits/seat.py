@@ -17,9 +17,7 @@ class Seat(Limit):
     name, unit, scale, suspicion = "seat", "m", 0.05, 60
 
     def margins(self, state: State) -> Margins:
-        """Return the heights of the knees over the lowest that the seat allows, (T, 2) m; none for a standing
-        person.
-        """
+        """Return the heights of the knees over the lowest that the seat allows, (T, 2) m; none when standing."""
         if not state.stance.seat:
             return unconcerned(state)
         shanks = [state.chain.body.segment_index(f"{side}_shank") for side in SIDES]

@@ -195,9 +195,7 @@ def _limbs_apart(a: Array, b: Array, enough: float) -> Array:
 
 
 def _boxes_apart(line: Array, half: Array, enough: float) -> Array:
-    """Return the signed distances (T, K) of lines (T, K, 2, 3) from boxes about the origin with half sides ``half`` (K,
-    3).
-    """
+    """Return the signed distances (T, K) of lines (T, K, 2, 3) from boxes about the origin with half sides (K, 3)."""
     first, along = line[..., 0, :], _along(line)
     looked = [_depth(np.abs(first + (k + 0.5) / _LOOKS * along) - half) for k in range(_LOOKS)]
     out = np.min(looked, axis=0) - _length(along) / (2 * _LOOKS)
@@ -271,9 +269,7 @@ class _Shapes:
             self.boxes.append((coal.Box(*(high - low)), (low + high) / 2))
 
     def distance(self, pose: Poses, t: int, limb: int, other: int, *, box: bool) -> float:
-        """Return the distance m of a limb's capsule from another one or from the box of another segment in frame
-        ``t``.
-        """
+        """Return the distance m of a limb's capsule from another one, or from the box of a segment, in frame ``t``."""
         solid, middle = self.boxes[other] if box else (self.capsules[other], self.turns[other][1])
         own = np.eye(3) if box else self.turns[other][0]
         first, second = ((pose.rotation[t, s], pose.position[t, s]) for s in (limb, other))

@@ -18,8 +18,7 @@ from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
 APART = np.radians(10.0)
-"""rad: two postures on the same feet differ by this much in one joint at least; a smaller difference nobody would see.
-"""
+"""rad: two postures on the same feet differ by this much in one joint at least; less nobody would see."""
 
 
 def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
@@ -58,9 +57,7 @@ def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Postur
 
 
 def alike(x: Array) -> NDArray[np.bool_]:
-    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate; a posture is like
-    itself.
-    """
+    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate."""
     return np.asarray(np.abs(x[:, None] - x[None]).max(axis=2) < APART)
 
 
@@ -106,8 +103,7 @@ ACROSS = {"parallel": "parallel", "single_right": "single_left", "single_left": 
 FLIP = np.array([1.0, 1.0, -1.0])
 """Sense of the axes of a segment in the image (z to the right)."""
 SIDEWAYS = ("_bending", "_rotation")
-"""Ends of the names of middle joints that change their sense; those in pairs have the anatomical sense on both sides.
-"""
+"""Ends of the names of middle joints that change their sense; paired ones have the anatomical sense on both sides."""
 _SAME = 1e-9
 """m, kg, rad, N·m: differences between the sides that are rounding."""
 
@@ -159,9 +155,7 @@ def _joints(names: list[str]) -> tuple[list[int], Array]:
 
 
 def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
-    """Return the place of the first of ``stances`` on which images of postures on the feet ``here`` stand, None if
-    there is none.
-    """
+    """Return the place of the first of ``stances`` on which images of postures ``here`` stand, if there is one."""
     free = np.isnan(here.hands[::-1])
     alike = (
         k
@@ -172,9 +166,7 @@ def image_feet(here: Stance, stances: tuple[Stance, ...]) -> int | None:
 
 
 def mirror_posture(chain: Chain, x: Array, here: Stance, there: Stance) -> Array:
-    """Return the coordinates (n,) of the image, on the feet ``there``, of a posture with coordinates ``x`` (n,) on the
-    feet ``here``.
-    """
+    """Return the image (n,), on the feet ``there``, of a posture ``x`` (n,) on the feet ``here``."""
     across, sense = _joints([joint.name for joint in chain.body.joints])
     out = np.concatenate([x[:ROOT] * [1, -1, 1, -1, -1, 1], sense * x[ROOT:][across]])
     gap = there.ankle - here.ankle[::-1] * [1, -1, 1]

@@ -5,7 +5,7 @@ weight is shifted with both feet down, then one foot is lifted, moved or set dow
 between two foot configurations there are postures in between, both feet down, the weight over one of them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,18 +13,11 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.information import PostureInformation, update_belief
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.problem.stance import SINGLE, Stance, holding, seat, stance
 from biodance.errors import BiodanceError
-from biodance.identification.posterior import prior_factor
-from biodance.motion.regressor import regressor
 from biodance.records import Array
-
-SAMPLE_ERROR = np.array([8.0, 8.0, 8.0, 4.0, 4.0, 4.0])
-"""N, N·m: error of one independent sample of the wrench of a person (residual of the paper: 7.8 N, 4.3 N·m)."""
-SAMPLE_RATE = 4.0
-"""Hz: independent samples per second of moving."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,78 +40,46 @@ def choose(chain: Chain, x: Array, stances: tuple[str, ...], plan: Plan) -> Choi
     Blocks of one stance stay together in the order of the plan; within a block the postures come in the order in which
     they were picked.
     """
-    S = prior_factor(chain.body.sip)
-    before = np.sum(S**2, axis=1)
-    weight = np.repeat(plan.emphasis(chain.body.segments), 10) * (before > 0)
-    scale = S * np.sqrt(weight / np.where(before > 0, before, 1.0))[:, None]
-    told = _Told(chain, x, stances, plan.move, S)
-    belief, left, last = np.eye(S.shape[1]), set(range(len(x))), dict[str, int]()
-    picked: list[int] = []
-    spent, total = 0.0, [float(np.sum(scale**2))]
-    while left:
-        payable = sorted(p for p in left if spent + _cost(plan, stances[p], last) <= plan.budget)
-        if not payable:
-            break
-        changes = {p: learned(belief, told.rows(last.get(stances[p]), p)) for p in payable}
-        p = max(payable, key=lambda p: float(np.sum((scale @ changes[p].T) ** 2)))
+    information, last = PostureInformation(chain, plan), dict[str, int]()
+    still, ways = information.white(information.standing(x)), _Ways(information, x, stances)
+    belief, left, picked, spent = information.beforehand, set(range(len(x))), list[int](), 0.0
+    total = [float(np.sum(information.scale**2))]
+    while payable := sorted(p for p in left if spent + _cost(plan, stances[p], last) <= plan.budget):
+        rows = {p: np.concatenate([still[p], ways.to(p, last.get(stances[p]))]) for p in payable}
+        p = max(payable, key=lambda p: float(information.gains(belief, rows[p])))
         spent += _cost(plan, stances[p], last)
-        belief = belief - changes[p].T @ changes[p]
-        total.append(float(np.sum((scale @ belief) * scale)))
+        belief = update_belief(belief, rows[p])
+        total.append(float(np.sum((information.scale @ belief) * information.scale)))
         last[stances[p]] = p
         left.discard(p)
         picked.append(p)
     order = tuple(p for stance, _ in plan.blocks for p in picked if stances[p] == stance)
-    return Choice(order, tuple(picked), np.sqrt(np.array(total) / weight.sum()), spent)
+    return Choice(order, tuple(picked), np.sqrt(np.array(total) / information.weight.sum()), spent)
 
 
 def _cost(plan: Plan, stance: str, last: dict[str, int]) -> float:
-    """Return the seconds of one more posture; feet that were not used yet cost two moves through postures in
-    between.
-    """
+    """Return the seconds of one more posture; feet not used yet cost two moves through postures in between."""
     return plan.move + plan.hold + (2 * plan.move if stance not in last else 0.0)
 
 
-def learned(belief: Array, rows: Array) -> Array:
-    """Return Z (m, k) with new covariance = ``belief`` - Z'Z (k, k) after whitened ``rows`` (m, k) of data."""
-    spread = rows @ belief
-    factor = np.linalg.cholesky(np.eye(len(rows)) + spread @ rows.T)
-    return np.asarray(np.linalg.solve(factor, spread))
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """What going straight between postures ``x`` (P, n) on the same feet ``stances`` (P) tells, worked out once."""
 
+    information: PostureInformation
+    x: Array
+    stances: tuple[str, ...]
+    _known: dict[int, dict[int, Array]] = field(default_factory=dict)
 
-class _Told:
-    """What standing in a posture and going there tells: rows of the regressor, whitened by the error and by the
-    table.
-    """
-
-    def __init__(self, chain: Chain, x: Array, stances: tuple[str, ...], move: float, S: Array) -> None:
-        self.chain, self.x, self.stances, self.S = chain, x, stances, S
-        samples = rest_to_rest(move, via=0, rate=SAMPLE_RATE)
-        self.parts = [part[1:-1] for part in (samples.position, samples.velocity, samples.acceleration)]
-        self.still = self._white(x[:, None], *np.zeros((2, len(x), 1, x.shape[1])))
-        self.ways: dict[int, dict[int, Array]] = {}
-
-    def rows(self, origin: int | None, goal: int) -> Array:
-        """Return the rows (m, k) of the posture ``goal`` and of the way to it from ``origin``; None: from any posture
-        on the same feet.
-        """
+    def to(self, goal: int, origin: int | None) -> Array:
+        """Return the rows (m, k) of the way to the posture ``goal``; from None: from any other on the same feet."""
+        same = [p for p, stance in enumerate(self.stances) if stance == self.stances[goal]]
         if origin is None:
-            origin = next(
-                (p for p, stance in enumerate(self.stances) if stance == self.stances[goal] and p != goal), goal
-            )
-        if origin not in self.ways:
-            goals = [p for p, stance in enumerate(self.stances) if stance == self.stances[origin]]
-            ends = np.stack([np.broadcast_to(self.x[origin], self.x[goals].shape), self.x[goals]], axis=1)
-            self.ways[origin] = dict(zip(goals, self._white(*(part @ ends for part in self.parts)), strict=True))
-        return np.concatenate([self.still[goal], self.ways[origin][goal]])
-
-    def _white(self, x: Array, v: Array, a: Array) -> Array:
-        """Return the rows (G, 6 T, k) of G stretches of T samples."""
-        flat = [part.reshape(-1, x.shape[2]) for part in (x, v, a)]
-        W = (
-            regressor(self.chain.body, self.chain.motion(np.arange(len(flat[0])) / SAMPLE_RATE, *flat))
-            / SAMPLE_ERROR[:, None]
-        )
-        return W.reshape(len(x), -1, W.shape[2]) @ self.S
+            origin = next((p for p in same if p != goal), goal)
+        if origin not in self._known:
+            ends = np.stack([np.broadcast_to(self.x[origin], self.x[same].shape), self.x[same]], axis=1)
+            self._known[origin] = dict(zip(same, self.information.of_ways(ends), strict=True))
+        return self._known[origin][goal]
 
 
 METRE = 3.0
@@ -126,9 +87,7 @@ METRE = 3.0
 
 
 def order_postures(x: Array, groups: list[list[int]]) -> list[int]:
-    """Return the rows of ``x`` (P, n) coordinates in an order in which neighbours are near; groups stay together, one
-    after the other.
-    """
+    """Return the rows of ``x`` (P, n) in an order in which neighbours are near; groups stay together, in turn."""
     scaled = x.copy()
     scaled[:, :3] *= METRE
     apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
@@ -192,8 +151,7 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     if "seated" in names and len(names) > 1:
         raise BiodanceError(
             f"Plan {plan.name}: blocks {', '.join(names)} mix sitting and standing, and nobody can be planned onto a "
-            f"stool; "
-            "make two plans, one seated and one standing."
+            "stool; make two plans, one seated and one standing."
         )
     doubles = [name for name in names if name in ("parallel", "right_forward")] or ["parallel"]
     feet, out = _double(body, plan, doubles[0]), list[Stance]()
@@ -220,9 +178,7 @@ def _over(feet: Stance, side: int) -> Stance:
 
 
 def weight_shifts(last: Stance, goal: Stance) -> list[Stance]:
-    """Return the postures in between that lead from one stance to another: set down, shift, step with the right foot,
-    shift.
-    """
+    """Return the postures in between from one stance to another: set down, shift, step with the right foot, shift."""
     over = last.planted[0] if len(last.planted) == 1 else None
     out = [_over(last, over)] if over is not None and goal.planted != last.planted else []
     if not np.array_equal(last.ankle, goal.ankle):

@@ -1,6 +1,4 @@
-"""One static posture on given feet: found within all limits, near its neighbours, or refused by the name of the limit
-that forbids it.
-"""
+"""One static posture on given feet: found within all limits, or refused by the name of the limit that forbids it."""
 
 import math
 from dataclasses import dataclass
@@ -50,18 +48,14 @@ ATTEMPTS = 8
 
 
 def initial_guess(chain: Chain, stance: Stance, rng: np.random.Generator) -> Array:
-    """Return the coordinates (n,) of a squat of any depth over the support, arms and trunk anywhere; seated: all joints
-    anywhere.
-    """
+    """Return the coordinates (n,) of a squat of any depth over the support, arms anywhere; seated: all anywhere."""
     low, high, x = chain.body.limits.lower, chain.body.limits.upper, np.zeros(chain.size)
     x[ROOT:] = low + (high - low) * rng.uniform(0.15, 0.85, len(low))
     if stance.seat:
         x[2] = stance.seat
         return x
     reach = min(float(leg.length(np.radians(rng.uniform(15, 110)))) for leg in chain.legs)
-    above = UPRIGHT @ np.mean(
-        [leg.hip for leg in chain.legs], axis=0
-    )  # of a person's hips: zero, the root is in their middle
+    above = UPRIGHT @ np.mean([leg.hip for leg in chain.legs], axis=0)  # zero of a person: the root is in their middle
     x[:3] = [*(stance.centre - [0.02, 0.0]), stance.ankle[0, 2] + 0.97 * reach] - above
     x[3:6] = rng.normal([0.0, 0.0, -0.2], [0.25, 0.25, 0.4])
     return x
@@ -72,17 +66,15 @@ MILD = 0.3
 """Share of the neighbours' joint angles that a posture in between keeps: it is a rest."""
 
 
-@dataclass(frozen=True, eq=False)
-class Near:
-    """Objective: mean squared distance (rad, m) of the coordinates from ``target`` (n,)."""
+def distance_from(target: Array) -> Objective:
+    """Return the objective: mean squared distance (rad, m) of the coordinates from ``target`` (n,)."""
 
-    target: Array
-
-    def __call__(self, state: State) -> tuple[float, Array]:
-        """Return the objective and its slopes by x."""
-        gap, by = state.x - self.target, np.zeros((3, *state.x.shape))
-        by[0] = 2 * gap / len(self.target)
+    def distance(state: State) -> tuple[float, Array]:
+        gap, by = state.x - target, np.zeros((3, *state.x.shape))
+        by[0] = 2 * gap / len(target)
         return float(np.mean(gap**2)), by
+
+    return distance
 
 
 def intermediate_posture(
@@ -100,7 +92,7 @@ def intermediate_posture(
     begin = initial_guess(chain, stance, rng)
     begin[3:] = mild * neighbours[:, 3:].mean(axis=0)
     for _ in range(ATTEMPTS):
-        found = solve(chain, stance, begin, Near(begin), limits, iterations=_ITERATIONS)
+        found = solve(chain, stance, begin, distance_from(begin), limits, iterations=_ITERATIONS)
         if found.violation <= KEPT:
             return found
         tried.append(begin)
@@ -109,20 +101,17 @@ def intermediate_posture(
 
 
 def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit, ...]) -> NoReturn:
-    """Raise the BiodanceError that says which limit forbids every posture on these feet: the first without which there
-    would be one.
-    """
+    """Raise the BiodanceError that names the limit without which there would be a posture on these feet."""
     kept = [limit for limit in limits if limit.at_rest]
     for limit in sorted(kept, key=lambda limit: limit.suspicion):
         others = tuple(other for other in kept if other is not limit)
         for x in begin:
-            posture = solve(chain, stance, x, Excess(limit), others, iterations=60)
+            posture = solve(chain, stance, x, shortfall(limit), others, iterations=60)
             if posture.violation <= KEPT:
                 what = describe(State(chain, stance, posture.x[None], *np.zeros((2, 1, chain.size))), limit)
                 raise BiodanceError(
                     f"No posture {stance_words(stance)} keeps all limits; there would be one without the limit on "
-                    f"{what}. "
-                    "Widen that limit, or leave this stance out of the protocol."
+                    f"{what}. Widen that limit, or leave this stance out of the protocol."
                 )
     raise BiodanceError(
         f"No posture {stance_words(stance)} keeps all limits, whichever of them is left out. Leave this stance out of "
@@ -132,9 +121,7 @@ def refuse(chain: Chain, stance: Stance, begin: list[Array], limits: tuple[Limit
 
 @dataclass(frozen=True, eq=False)
 class Exciting:
-    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and the
-    performer's ease.
-    """
+    """Objective of one posture beside the Gram matrices of the ``others`` (N, 3, 3), per ``unit`` kg, and its ease."""
 
     blocks: Blocks
     others: Array
@@ -202,17 +189,15 @@ def describe(state: State, limit: Limit) -> str:
     return f"{what} (short by about {missing:.0f} {unit})"
 
 
-@dataclass(frozen=True)
-class Excess:
-    """Objective of a posture that breaks one ``limit`` as little as it can: sum of squares of what is missing, in its
-    scale.
+def shortfall(limit: Limit) -> Objective:
+    """Return the objective of a posture that breaks one limit as little as it can: sum of squares of what is missing,
+    in the limit's scale.
     """
 
-    limit: Limit
+    def missing(state: State) -> tuple[float, Array]:
+        margins, slopes = limit.margins(state), np.zeros((3, *state.x.shape))
+        lacks = np.minimum(margins.value / limit.scale, 0.0)
+        slopes[0] = 2 * np.einsum("tm,tmn->tn", lacks, margins.slopes[0]) / limit.scale
+        return float(np.sum(lacks**2)), slopes
 
-    def __call__(self, state: State) -> tuple[float, Array]:
-        """Return the objective and its slopes (3, T, n) by x, v, a."""
-        margins, slopes = self.limit.margins(state), np.zeros((3, *state.x.shape))
-        missing = np.minimum(margins.value / self.limit.scale, 0.0)
-        slopes[0] = 2 * np.einsum("tm,tmn->tn", missing, margins.slopes[0]) / self.limit.scale
-        return float(np.sum(missing**2)), slopes
+    return missing

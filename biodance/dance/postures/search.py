@@ -13,16 +13,7 @@ import numpy as np
 
 from biodance.dance.limits import Limit
 from biodance.dance.postures.exchange import criterion, exchange, image_feet, mirror_posture, mirror_vectors, symmetric
-from biodance.dance.postures.posture import (
-    ATTEMPTS,
-    KEPT,
-    Exciting,
-    Posture,
-    initial_guess,
-    posture_at,
-    refuse,
-    solve,
-)
+from biodance.dance.postures.posture import ATTEMPTS, KEPT, Exciting, Posture, initial_guess, posture_at, refuse, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, static_grams
 from biodance.dance.problem.nlp import anyhow
@@ -112,18 +103,14 @@ class _Search:
         return initial_guess(self.chain, self.stances[place], np.random.default_rng([self.seed, run, place]))
 
     def possible(self, place: int) -> Posture:
-        """Return a posture that keeps all limits at this place, or raise the BiodanceError that names the limit that
-        forbids it.
-        """
+        """Return a posture that keeps all limits at this place, or raise the BiodanceError that names a limit."""
         begin, stance = [self.anywhere(place, run) for run in range(ATTEMPTS)], self.stances[place]
         found = (solve(self.chain, stance, x, anyhow, self.limits, iterations=30) for x in begin)
         posture = next((p for p in found if p.violation <= KEPT), None)
         return posture or refuse(self.chain, stance, begin, self.limits)
 
     def with_images(self, kept: list[list[Posture]], found: list[list[Posture]]) -> list[list[Posture]]:
-        """Return the postures ``kept`` of every place and the mirror images of ``found`` (`mirror`), of a body whose
-        sides are alike.
-        """
+        """Return the postures ``kept`` of every place and the images of ``found``, of a body whose sides are alike."""
         out, body = [[*some] for some in kept], self.chain.body
         for here, some in zip(self.stances, found if symmetric(body) else [], strict=False):
             goal = image_feet(here, self.stances)
@@ -150,9 +137,7 @@ class _Search:
     def sweep(
         self, now: list[Posture], begin: list[Array], order: list[int], sharpness: int, iterations: int
     ) -> list[Posture]:
-        """Return the postures of the places ``order``, found one after the other from ``begin`` while all others are
-        held, by place.
-        """
+        """Return the postures of the places ``order``, found in turn from ``begin``, the others held, by place."""
         now, unit = list(now), 0.1 * float(self.blocks.weight.sum()) / len(now)
         for p in order:
             others = np.array([one.up for k, one in enumerate(now) if k != p]).reshape(-1, *now[p].up.shape)

@@ -40,9 +40,7 @@ class Chain(Sendable):
             )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what goes to other processes: all but what pinocchio computes in, which takes longer to send than to
-        make.
-        """
+        """Return what goes to other processes: all but what pinocchio computes in, which is made faster than sent."""
         return {name: value for name, value in super().__getstate__().items() if name != "_own"}
 
     @property
@@ -137,6 +135,23 @@ class Chain(Sendable):
                 turn, x[:, :3], flat, np.broadcast_to(ankle[side], (len(x), 3))
             )
         return out
+
+    def root_heights(self, x: Array, ankle: Array, knee: Array | float, sides: tuple[int, ...] = (0, 1)) -> Array:
+        """Return the heights (len(sides), T) m of the root of coordinates (T, n) at which each leg, its knee bent by
+        ``knee`` (T,) rad, just reaches its ``ankle`` (T, 2, 3) or (2, 3) m.
+        """
+        turn, heights = self.root_rotation(x), []
+        for side in sides:
+            hip, at = turn @ self.legs[side].hip, ankle[..., side, :]
+            across = np.sum((x[:, :2] + hip[:, :2] - at[..., :2]) ** 2, axis=1)
+            rise = np.sqrt(np.maximum(self.legs[side].length(knee) ** 2 - across, 0.01))
+            heights.append(at[..., 2] + rise - hip[:, 2])
+        return np.array(heights)
+
+    def mass_centre(self, x: Array) -> Array:
+        """Return the centre of mass (T, 3) m of coordinates (T, n), lab frame."""
+        centre, model, data = load_pinocchio().centerOfMass, self.model, self.data
+        return np.array([centre(model, data, row) for row in x]).reshape(-1, 3)
 
     def positions(self, x: Array) -> Array:
         """Return the positions (T, nq) of the body, as in `Motion`, from coordinates (T, n)."""

@@ -26,9 +26,7 @@ from biodance.spatial import cross, skew
 
 
 def condition(gram: Array) -> tuple[Array, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k,
-    k).
-    """
+    """Return cond = sqrt(largest / smallest eigenvalue) (...) of Gram matrices (..., k, k), and its gradient."""
     value, vector = _spectrum(gram)
     cond = np.sqrt(value[..., -1] / value[..., 0])
     by = np.zeros_like(value)
@@ -75,9 +73,7 @@ class Blocks:
 
 
 def excitation_blocks(body: Body) -> Blocks:
-    """Return the base columns of every segment, weighted by its mass in the table (structural base:
-    docs/derivations.md).
-    """
+    """Return the base columns of every segment, weighted by its mass in the table (docs/derivations.md)."""
     columns = structural_base(body).columns
     first, second = (
         tuple(
@@ -95,9 +91,7 @@ Measure = Callable[[Array], tuple[Array, Array]]
 def total(
     weight: Array, grams: Array, pick: tuple[list[int], ...], *, measure: Measure = condition
 ) -> tuple[float, Array]:
-    """Return sum_i M_i cond(W_bi) and its gradient by the Gram matrices (N, k, k); segments without weight or columns
-    do not count.
-    """
+    """Return sum_i M_i cond(W_bi) over segments with weight and columns, and its gradient by grams (N, k, k)."""
     value, slope = 0.0, np.zeros_like(grams)
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, columns in enumerate(pick):

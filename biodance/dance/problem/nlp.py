@@ -20,9 +20,7 @@ from biodance.dance.problem.state import Closure, State, close_legs
 from biodance.records import Array
 
 Objective = Callable[[State], tuple[float, Array]]
-"""Returns f and its slopes (3, T, n) by x, v, a; f may be judged without the slopes only at the price of computing
-them.
-"""
+"""Returns f and its slopes (3, T, n) by x, v, a, which are always computed together."""
 
 
 def anyhow(state: State) -> tuple[float, Array]:
@@ -130,9 +128,7 @@ class Evaluation:
         return gradient, np.concatenate([np.empty((0, gradient.size)), *parts])
 
     def _chain(self, slopes: list[Array], time: NDArray[np.intp], closure: Closure) -> Array:
-        """Return slopes (R, K * free) by the points of slopes (R, n) by coordinates, rates and accelerations at
-        instants ``time`` (R,).
-        """
+        """Return slopes (R, K * free) by the points, of slopes (R, n) by x, v, a at the instants ``time`` (R,)."""
         free, basis = self.problem.free, self.problem.basis
         by = [closure.followed(slopes[0], time)]
         if len(slopes) > 1 and basis[1].any():
@@ -159,12 +155,11 @@ class Point(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """``y`` (n,), ``value`` f, ``violation`` = largest -c (negative: room left), ``iterations``."""
+    """``y`` (n,), ``value`` f, ``violation`` = largest -c (negative: room left)."""
 
     y: Array
     value: float
     violation: float
-    iterations: int
 
 
 WEIGHT = 100.0
@@ -176,17 +171,12 @@ _RADIUS, _SETTLED = 0.3, 1e-3
 """The first step's largest change of a variable; a gain that counts as none."""
 
 
-def minimise(
-    evaluate: Callable[[Array], Point],
-    start: Array,
-    *,
-    iterations: int = 30,
-) -> Solution:
+def minimise(evaluate: Callable[[Array], Point], start: Array, *, iterations: int = 30) -> Solution:
     """Return a local minimum from ``start``; f and c should be scaled so that 1 is a large amount."""
     y, n = start.copy(), start.size
     point, hessian = evaluate(y), np.eye(n)
-    count, radius = 0, _RADIUS
-    for count in range(1, iterations + 1):  # noqa: B007
+    radius = _RADIUS
+    for _ in range(iterations):
         rows = np.flatnonzero(point.margins < _NEAR)
         gradient, jacobian = point.slopes(rows)
         step, price = quadratic_step(hessian, gradient, jacobian, point.margins[rows], radius)
@@ -206,7 +196,7 @@ def minimise(
         y, point = y + step, trial
         if gained < _SETTLED and worst(point.margins) < 1e-4:
             break
-    return Solution(y, point.value, float(-point.margins.min(initial=np.inf)), count)
+    return Solution(y, point.value, float(-point.margins.min(initial=np.inf)))
 
 
 def worst(margins: Array) -> float:
@@ -217,9 +207,7 @@ def worst(margins: Array) -> float:
 def quadratic_step(
     hessian: Array, gradient: Array, jacobian: Array, margins: Array, radius: float
 ) -> tuple[Array, Array]:
-    """Return the step d (n,) and the prices (m,) of the margins: min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d|
-    <= radius.
-    """
+    """Return the step d (n,) and the prices (m,): min d'Hd/2 + g'd + t + t²/2, Jd + t/weight >= -c, |d| <= radius."""
     from scipy.optimize import nnls
 
     n, box, price = gradient.size, np.eye(gradient.size), np.zeros(len(jacobian))
@@ -244,9 +232,7 @@ def quadratic_step(
 
 
 def update(hessian: Array, step: Array, change: Array) -> Array:
-    """Return the BFGS update, damped after Powell so that it stays positive definite; the identity where it would
-    not.
-    """
+    """Return the BFGS update, damped after Powell to stay positive definite; the identity where it would not."""
     curved = hessian @ step
     bend = float(step @ curved)
     if bend < 1e-14:

@@ -51,14 +51,16 @@ import numpy as np
 
 from biodance.body.human.limits import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
+from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
 _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
-"""Foot configurations: both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I),
-on a stool.
-"""
+"""Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
+
+_BRIEF = 1.0
+"""s that postures in between are held at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +150,12 @@ class Plan:
         """Share of every half width of the base of support that all limits leave: for it the feet are set."""
         return min((limit.support_share for limit in self.limits), default=1.0)
 
+    def hold_on(self, stance: Stance) -> float:
+        """Return for how long a posture is held on these feet, s: postures in between only shortly."""
+        return self.hold if stance.over is None else min(_BRIEF, self.hold)
+
     def with_limits(self, more: Iterable[Limit | type[Limit]]) -> "Plan":
-        """Return the plan with ``more`` limits, objects or classes; one of a name that is there already takes its
-        place.
-        """
+        """Return the plan with ``more`` limits, objects or classes; one of a name that is there takes its place."""
         return replace(self, limits=join_limits(self.limits, more))
 
     def emphasis(self, segments: tuple[str, ...]) -> Array:

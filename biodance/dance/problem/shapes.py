@@ -27,9 +27,7 @@ _KINDS = {
 
 
 def capsule_pairs(body: Body) -> list[tuple[int, int]]:
-    """Return the pairs of limbs (segment indices) that must not touch: the paper's and others that a dance could bring
-    together.
-    """
+    """Return the pairs of limbs (segments) that must not touch: the paper's, and others that could come together."""
     kinds = [s.removeprefix("right_").removeprefix("left_") for s in body.segments]
     side = [s.split("_")[0] for s in body.segments]
     near = {
@@ -97,9 +95,7 @@ class Solids:
 
 
 def palm(body: Body, side: str) -> tuple[int, Array]:
-    """Return the segment of a hand and the middle of its palm (3,) m in that segment: 0.85 of the way to the
-    fingertips.
-    """
+    """Return the segment of a hand and the middle of its palm (3,) m there: 0.85 of the way to the fingertips."""
     segment = body.segment_index(f"{side}_forearm_hand")
     low, high = body.boxes[segment]
     return segment, np.array([(low[0] + high[0]) / 2, 0.85 * low[1], (low[2] + high[2]) / 2])
@@ -114,9 +110,7 @@ _LEAST = 0.01
 
 
 def capsule(body: Body, segment: int) -> tuple[Array, float]:
-    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of a limb's capsule: the widest in
-    its box.
-    """
+    """Return the ends (2, 3) m of the axis, in the segment frame, and the radius m of the widest capsule in its box."""
     low, high = body.boxes[segment]
     half, centre = (high - low) / 2, (high + low) / 2
     axis = int(np.argmax(half))

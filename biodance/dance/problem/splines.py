@@ -51,9 +51,7 @@ def rest_to_rest(duration: float, *, via: int = 2, rate: float = 50.0) -> Basis:
 
 
 def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
-    """Return the basis of a rest-to-rest transition of ``duration`` s at the instants ``time`` (n,) in [0,
-    duration].
-    """
+    """Return the basis of a rest-to-rest transition of ``duration`` s at instants ``time`` (n,) in [0, duration]."""
     count = via + 6  # two ends with position, velocity and acceleration each, and the via points
     inner = np.linspace(0, duration, count - _DEGREE + 1)[1:-1]
     knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.full(_DEGREE + 1, duration)])

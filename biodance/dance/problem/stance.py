@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,28 +10,19 @@ from biodance.body.body import Body
 from biodance.records import SIDES, Array, Index, assign, freeze
 from biodance.threads import Sendable
 
-if TYPE_CHECKING:
-    pass
-
 _WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
 STRIP, _CLEAR = 0.1, 1.25
-"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half:
-room between feet.
-"""
+"""Of a sole's width: least overlap of the reduced supports of both feet and of one; room between the feet."""
 _FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}
 STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
-"""(4, 2) m where the legs of a stool stand, from below the hips: a seat of 0.4 m by 0.4 m that bears the thighs to
-their middle.
-"""
+"""(4, 2) m, the legs of a stool from below the hips: a seat of 0.4 m by 0.4 m bears the thighs to their middle."""
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
 _GRIP = (0.18, 0.28, 0.50)
-"""Grips of a walking frame: m ahead of the heels' line, m to the side, and height over stature (crease of the wrist, as
-they are set).
-"""
+"""Grips of a walking frame: m ahead of the heels, m to the side, height over stature (crease of the wrist)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +62,7 @@ class Stance(Sendable):
 
     @cached_property
     def centre(self) -> Array:
-        """(2,) m middle of the base of support: of its bounding box; with the weight over one foot: deepest inside both
-        bases.
-        """
+        """(2,) m middle of the base of support: of its bounding box; weight over one foot: deepest in both bases."""
         if self.over is not None:
             from scipy.optimize import linprog
 
@@ -129,18 +118,17 @@ def stance(
     body: Body,
     name: str,
     *,
-    left: float = 0.0,
     right: float = 0.0,
     planted: tuple[int, ...] = (0, 1),
     share: float = 1.0,
     wide: float = 1.0,
 ) -> Stance:
-    """Return a stance with the ankles ``left`` and ``right`` m ahead of the lab origin, side by side at the person's
-    width, or ``wide`` times as far apart.
+    """Return a stance with the left ankle at the lab origin's line and the right one ``right`` m ahead, side by side at
+    the person's width, or ``wide`` times as far apart.
     """
     height = -float(body.feet["right"].outline[:, 1].min())
     half = apart(body, share, wide=wide) / 2
-    ankle = np.array([[right, -half, height], [left, half, -float(body.feet["left"].outline[:, 1].min())]])
+    ankle = np.array([[right, -half, height], [0.0, half, -float(body.feet["left"].outline[:, 1].min())]])
     soles = [
         ankle[k] + np.stack([o[:, 0], -o[:, 2], o[:, 1]], axis=1)
         for k, o in enumerate(body.feet[side].outline for side in SIDES)
@@ -182,9 +170,7 @@ def apart(body: Body, share: float, *, wide: float = 1.0) -> float:
 
 
 def hip_width(body: Body) -> float:
-    """Return the distance (m) sideways between the ankles of the upright body at zero angles: that of its hips where
-    legs are straight.
-    """
+    """Return the distance (m) sideways between the ankles of the upright body: its hips' with straight legs."""
     from biodance.motion.kinematics import poses
 
     place = poses(body, body.neutral[None]).position[0]
@@ -226,9 +212,7 @@ def stance_words(stance: Stance) -> str:
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s in which the feet do not change; ``posture`` is held, or moved
-    to.
-    """
+    """A stretch of a dance from ``start`` to ``end`` s on the same feet; ``posture`` is held, or moved to."""
 
     start: float
     end: float
@@ -247,3 +231,41 @@ def phase_at(phases: tuple[Phase, ...], time: Array) -> Index:
     """Return which of the ``phases`` every instant (T,) s lies in."""
     starts = np.array([phase.start for phase in phases])
     return np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+
+
+_TINY = 1e-30
+"""Step of the complex-step derivative: exact to machine precision."""
+
+
+def foot_forces(total: Array, stance: Stance) -> tuple[Array, Array]:
+    """Return the wrenches (T, 2, 6) of the right and left foot while a dance is planned, and their derivative (T, 2, 6,
+    6) by the total (T, 6) that the ground must give (paper eq. 2).
+
+    Each foot bears a share in inverse proportion to the distance of its sole's centre from the zero-moment point, of
+    the force as of the moment about the vertical through that point; both forces point the same way.
+    """
+    if len(stance.planted) == 1:
+        chosen = np.eye(2)[stance.planted[0]]
+        return total[:, None] * chosen[:, None], np.broadcast_to(
+            chosen[:, None, None] * np.eye(6), (len(total), 2, 6, 6)
+        )
+    stepped = total[:, None] + 1j * _TINY * np.eye(6)
+    derivative = np.swapaxes(
+        _share(stepped.reshape(-1, 6), stance.sole_centres).reshape(len(total), 6, 2, 6).imag / _TINY, 1, 2
+    )
+    return _share(total, stance.sole_centres), np.swapaxes(derivative, 2, 3)
+
+
+def _share(total: Array, centres: Array) -> Array:
+    force, moment = total[:, :3], total[:, 3:]
+    point = np.stack([-moment[:, 1] / force[:, 2], moment[:, 0] / force[:, 2]], axis=1)
+    reach = [np.sqrt(np.sum((point - c[:2]) ** 2, axis=1)) for c in centres]
+    right = reach[1] / (reach[0] + reach[1])
+    middle = right[:, None] * centres[0, :2] + (1 - right[:, None]) * centres[1, :2]
+    twist = moment[:, 2] - point[:, 0] * force[:, 1] + point[:, 1] * force[:, 0]
+    feet = []
+    for part, centre in ((right, centres[0]), (1 - right, centres[1])):
+        x, y = (point + centre[:2] - middle).T
+        own = np.stack([y * force[:, 2], -x * force[:, 2], x * force[:, 1] - y * force[:, 0] + twist], axis=1)
+        feet.append(part[:, None] * np.concatenate([force, own], axis=1))
+    return np.stack(feet, axis=1)

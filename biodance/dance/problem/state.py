@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.feet import foot_forces
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import Stance, foot_forces
 from biodance.records import Array
 from biodance.spatial import spatial_cross, wrench_of_force
 
@@ -84,9 +83,7 @@ class State:
         return np.asarray((self.rotation[:, segment] @ local[:, :, None])[..., 0] + self.position[:, segment])
 
     def along(self, segment: _Index, place: Array, direction: Array) -> Array:
-        """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T,
-        K, 3).
-        """
+        """Return (T, K, n) derivative by x of places (T, K, 3) m, fixed in the segments (K), along directions."""
         if not self.sloped:
             return np.zeros((*place.shape[:2], self.chain.size))
         wrench = wrench_of_force(direction, place)
@@ -149,9 +146,7 @@ class State:
         return np.asarray((turned - self.zmp[:, :, None] * slopes[:, :, None, 2]) / self.wrench[:, 2, None, None])
 
     def moved_twists(self, columns: list[int], wrench: Array) -> Array:
-        """Return (T, k, n) derivative of J_k' F with respect to x for the coordinates ``columns`` and a fixed wrench
-        (T, 6).
-        """
+        """Return (T, k, n) derivative by x of J_k' F for the coordinates ``columns`` and a fixed wrench (T, 6)."""
         swept = self.chain.ancestors[columns] - np.eye(self.chain.size)[columns]
         pairs = spatial_cross(self.twists[:, None], self.twists[:, columns, None])
         return np.einsum("tkic,tc->tki", pairs, wrench) * swept
@@ -174,9 +169,7 @@ class State:
 
     @cached_property
     def feet(self) -> tuple[Array, Array]:
-        """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative (T, 2, 6, 6) by the
-        total.
-        """
+        """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative by the total."""
         return foot_forces(self.wrench, self.stance)
 
     @cached_property
@@ -260,9 +253,7 @@ class Closure:
         return self._handed(slopes.copy(), slopes, "x", time)
 
     def turned(self, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:
-        """Return what slopes (R, n) by rates ("v") or accelerations ("ax", "av") become by coordinates or, last, by
-        rates of the root.
-        """
+        """Return what slopes (R, n) by rates ("v") or accelerations ("ax", "av") become by x or, last, by rates."""
         return self._handed(np.zeros_like(slopes), slopes, kind, time)
 
     def _handed(self, out: Array, slopes: Array, kind: str, time: NDArray[np.intp]) -> Array:

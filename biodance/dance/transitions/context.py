@@ -1,6 +1,4 @@
-"""What all stages of one design share, and what of it is kept on disk, so that a design that was interrupted goes on
-where it stopped.
-"""
+"""What all stages of one design share, and what of it is kept on disk, so that an interrupted design goes on."""
 
 import hashlib
 from collections.abc import Callable
@@ -26,9 +24,7 @@ ROOMS = ("body", "dance", "identification", "motion", "uncertainty", "spatial.py
 
 
 class Checkpoint:
-    """Named sets of arrays in a folder that belongs to one body, plan, seed and state of the code; without a folder
-    nothing is kept.
-    """
+    """Named arrays in a folder that belongs to one body, plan, seed and state of the code; nothing without a folder."""
 
     def __init__(self, folder: Path | None, body: Body, plan: Plan, seed: int) -> None:
         key = hashlib.sha256(f"{code()}{body_text(body, '')}{plan!r}{seed}".encode()).hexdigest()[:16]
@@ -57,9 +53,7 @@ class Checkpoint:
 
 @cache
 def code() -> str:
-    """Return a hash of the source of all `ROOMS`: parts that older code found do not fit those that newer code
-    finds.
-    """
+    """Return a hash of the source of all `ROOMS`: what older code found does not fit what newer code finds."""
     package = Path(__file__).parents[2]
     files = sorted(file for file in package.rglob("*.py") if file.relative_to(package).parts[0] in ROOMS)
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

@@ -24,9 +24,7 @@ GRID = 10.0
 CHECK = 50.0
 """Hz at which a move is judged before it is taken."""
 SLOW = 4.0
-"""s: longer moves, of slow robots, are judged at as many instants as a move of this time: it is the same spline through
-as many points.
-"""
+"""s: longer moves, of slow robots, are judged at as many instants as one of this time: it is the same spline."""
 RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
@@ -54,9 +52,7 @@ def straight_way(start: Array, end: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the
-    ``limits``.
-    """
+    """A move to find: between ``ends`` (2, n) in ``duration`` s on the feet of ``stance``, within the ``limits``."""
 
     chain: Chain
     blocks: Blocks
@@ -67,9 +63,7 @@ class Task:
 
     @property
     def excited(self) -> list[int]:
-        """Coordinates that excite: trunk and arms with both feet down, the free leg with one (paper Table I), all
-        joints when seated.
-        """
+        """Coordinates that excite: trunk and arms on both feet, the free leg on one (paper Table I), seated all."""
         legs = [self.chain.leg_columns[side] for side in (0, 1) if side not in self.stance.planted]
         return sorted([*([] if len(legs) == 1 else self.chain.upper), *(c for leg in legs for c in leg)])
 
@@ -85,9 +79,7 @@ class Task:
     def problem(
         self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective
     ) -> NonlinearProgramme:
-        """Return the problem of the via points of the ``free`` coordinates at instants ``time`` s, the others as in
-        ``via`` (2, n).
-        """
+        """Return the problem of the via points of the ``free`` coordinates at ``time`` s, the others as in ``via``."""
         basis, kept = basis_at(time, self.duration), tuple(limit for limit in self.limits if limit.in_motion)
         points = np.stack([self.ends[0], *via, self.ends[1]])
         points[1:3, free] = 0.0
@@ -126,9 +118,7 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class MoveObjective:
-    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and the distance of the
-    ZMP.
-    """
+    """Mass-weighted mean log cond of the inertias after ``history`` (N, 6, 6), times ``share``, and ZMP distance."""
 
     task: Task
     history: Array
@@ -162,18 +152,14 @@ def _logarithm(gram: Array) -> tuple[Array, Array]:
 
 
 def off_centre(state: State) -> tuple[float, Array]:
-    """Return the mean squared distance (dm²) of the zero-moment point from the middle of the support, and its slopes
-    (3, T, n).
-    """
+    """Return the mean squared distance (dm²) of the ZMP from the middle of the support, and its slopes (3, T, n)."""
     gap = state.zmp - state.stance.centre
     slopes = 200 / len(gap) * np.einsum("tc,ktcn->ktn", gap, state.zmp_slopes)
     return 100 * float(np.mean(np.sum(gap**2, axis=1))), slopes
 
 
 def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
-    """Return the best feasible move found after the information ``history`` (N, 6, 6); if there is none, the one that
-    violates least.
-    """
+    """Return the best feasible move after ``history`` (N, 6, 6); if there is none, the one that violates least."""
     best = None
     for spread, share, rounds in _ATTEMPTS:
         via, time, objective = task.straight(), task.grid(GRID), MoveObjective(task, history, share)
@@ -214,9 +200,7 @@ def improved_way(
 
 
 def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
-    """Return the move through ``via`` as it is, judged by all limits on the fine grid, and the worst instants s where
-    one is broken.
-    """
+    """Return the move through ``via`` as all limits judge it on the fine grid, and the worst instants s."""
     time = task.grid(CHECK)
     problem = task.problem(via, [], time, reserve=BETWEEN, objective=anyhow)
     found = Evaluation(problem, problem.state(np.empty(0)).judged)

@@ -1,4 +1,5 @@
-"""The ways between all postures of a dance, and what is done where a move cannot be made.
+"""The ways between all postures of a dance: at once, slower, or by way of a comfortable posture in between; and what is
+done where a move cannot be made.
 
 They are found side by side in chains of those that excite the same segments. A way's random numbers and the information
 before it do not depend on who was faster, so that any order of finishing gives the same dance. Where a move cannot be
@@ -7,27 +8,100 @@ made another posture takes the place of one of its ends, then one posture is lef
 
 from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from biodance.dance.dance import Dance
 from biodance.dance.postures.exchange import alike, criterion
 from biodance.dance.postures.posture import KEPT, Exciting, initial_guess, intermediate_posture, posture_at, solve
 from biodance.dance.problem.excitation import static_grams
 from biodance.dance.problem.stance import stance_words, under
 from biodance.dance.transitions.context import Course, DesignContext
-from biodance.dance.transitions.move import Task
-from biodance.dance.transitions.planner import Way, find_way
+from biodance.dance.transitions.move import Move, Task, find_move
+from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
-_ENDS = (1, 0, 1)
-"""Which end of a move that cannot be made is exchanged: where it goes to, where it comes from, the new one where it
-goes to again.
+SLOWER = (1.0, 1.4)
+"""Factors on the duration of a move, one after the other."""
+DETOURS = 2
+"""Postures in between that are tried."""
+_SPARE = 0.5
+"""Share of what a limit's check forgives (`Limit.rounding`) that a way leaves, because the check of the whole dance
+sees other instants of the same way.
 """
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One or two moves: ``via`` (M, 2, n) points, ``duration`` (M,) s, ``stops`` (M - 1, n) the posture in between;
+    ``gram`` (N, 6, 6) information on the inertias; ``limit`` that is broken all the same, "" if none.
+    """
+
+    via: Array
+    duration: Array
+    stops: Array
+    gram: Array
+    limit: str = ""
+
+
+def find_way(task: Task, history: Array, seed: list[int]) -> Way:
+    """Return a way that keeps all limits, by the design's own judgement and by `verify`; if there is none, the direct
+    one that was tried last, with the limit it breaks.
+    """
+    for factor in SLOWER:
+        move = find_move(replace(task, duration=task.duration * factor), history, rng=np.random.default_rng(seed))
+        way = _way([move], task.ends[:0])
+        wrong = move.limit or _doubted(task, way)
+        if not wrong:
+            return way
+    for attempt in range(DETOURS):
+        try:
+            stop = intermediate_posture(task.chain, task.stance, task.ends, task.limits, seed=[*seed, attempt]).x
+        except BiodanceError:
+            continue
+        parts = _through(task, history, stop, [*seed, attempt])
+        if parts and not _doubted(task, detour := _way(parts, stop[None])):
+            return detour
+    return replace(way, limit=wrong)
+
+
+def _doubted(task: Task, way: Way) -> str:
+    """Return the limit that the way breaks by the independent check, "" if it breaks none."""
+    rows = np.array([task.ends[0], *way.stops, task.ends[1]])
+    feet, body = (task.stance,) * len(rows), task.chain.body
+    margins = verify(
+        body, Dance("way", body, rows, feet, np.zeros(len(rows)), way.via, way.duration, feet[1:], 0), task.limits
+    )
+    spare = {limit.name: _SPARE * limit.rounding for limit in task.limits}
+    wrong = [margin.limit for margin in margins if not margin.worst >= spare.get(margin.limit, 0.0)]
+    return wrong[0] if wrong else ""
+
+
+def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> list[Move]:
+    """Return the two moves by way of ``stop`` (n,), slow ones as the direct way was impossible; none if one fails."""
+    parts: list[Move] = []
+    for ends in ((task.ends[0], stop), (stop, task.ends[1])):
+        slow = replace(task, ends=np.array(ends), duration=task.duration * SLOWER[-1])
+        move = find_move(slow, history, rng=np.random.default_rng(seed))
+        if move.violation > 0:
+            return []
+        parts.append(move)
+        history = history + move.gram
+    return parts
+
+
+def _way(moves: list[Move], stops: Array) -> Way:
+    gram = np.sum([move.gram for move in moves], axis=0)
+    return Way(np.array([move.via for move in moves]), np.array([move.duration for move in moves]), stops, gram)
+
+
+_ENDS = (1, 0, 1)
+"""Which end of a move that cannot be made is exchanged: where it goes to, comes from, the new one where it goes to."""
 REST = (0.0, 0.6, 0.15)
-"""Share of their neighbours' joint angles that postures in between keep in these attempts (`between.MILD` at first)."""
+"""Share of their neighbours' joint angles that postures in between keep in these attempts."""
 STARTS, _SHARPNESS, _ITERATIONS = 6, 8, 20
 """Of the search for another posture: starts, sharpness of the condition number, iterations."""
 FEWER = 4
@@ -72,14 +146,8 @@ class _Search:
         while running:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 k, way = running.pop(future), future.result()
-                self.work.ledger.put(
-                    self._name(k),
-                    via=way.via,
-                    duration=way.duration,
-                    stops=way.stops,
-                    gram=way.gram,
-                    limit=np.array(way.limit),
-                )
+                arrays = {one: np.array(getattr(way, one)) for one in ("via", "duration", "stops", "gram", "limit")}
+                self.work.ledger.put(self._name(k), **arrays)
                 self._accept(k, way)
                 self._advance(self.tasks[k].stance.planted, running)
         return [self.found[k] for k in range(len(self.tasks))]
@@ -150,7 +218,7 @@ def _exchanged(work: DesignContext, course: Course, places: list[int], attempt: 
         if course.stances[place].over is None:
             x[place] = _another(work, course, place, np.random.default_rng([work.seed, 4, attempt, place]))
         else:
-            near, seed = _neighbours(x, place), [work.seed, 5, attempt, place]
+            near, seed = x[[k for k in (place - 1, place + 1) if 0 <= k < len(x)]], [work.seed, 5, attempt, place]
             x[place] = intermediate_posture(
                 work.chain, course.stances[place], near, work.plan.limits, seed=seed, mild=REST[attempt - 1]
             ).x
@@ -159,31 +227,19 @@ def _exchanged(work: DesignContext, course: Course, places: list[int], attempt: 
 
 
 def _another(work: DesignContext, course: Course, place: int, rng: np.random.Generator) -> Array:
-    """Return the most exciting posture (n,) beside all others from a few fresh starts; the old one where none is
-    feasible.
-    """
+    """Return the most exciting posture (n,) beside all others from a few fresh starts, or the old one."""
     chain, blocks, stance = work.chain, work.blocks, course.stances[place]
-    pairs = zip(course.stances, course.x, range(len(course.x)), strict=True)
-    others = [posture_at(chain, s, x) for s, x, k in pairs if s.over is None and k != place]
+    places = [k for k, one in enumerate(course.stances) if one.over is None and k != place]
+    others = [posture_at(chain, course.stances[k], course.x[k]) for k in places]
     grams = static_grams(np.array([p.up for p in others]).reshape(-1, len(chain.body.segments), 3))
     objective = Exciting(blocks, grams, 0.1 * float(blocks.weight.sum()) / (len(others) + 1), _SHARPNESS)
     starts = [initial_guess(chain, stance, rng) for _ in range(STARTS)]
-    tasks = [
-        work.workers.submit(solve, chain, stance, begin, objective, work.plan.limits, iterations=_ITERATIONS)
-        for begin in starts
-    ]
+    given = objective, work.plan.limits
+    tasks = [work.workers.submit(solve, chain, stance, one, *given, iterations=_ITERATIONS) for one in starts]
     found = [task.result() for task in tasks]
-    same = [
-        x
-        for s, x, k in zip(course.stances, course.x, range(len(course.x)), strict=True)
-        if s.name == stance.name and k != place
-    ]
+    same = [x for k, x in enumerate(course.x) if course.stances[k].name == stance.name and k != place]
     kept = [p for p in found if p.violation <= KEPT and not alike(np.array([p.x, *same]))[0, 1:].any()]
     return min(kept, key=lambda posture: criterion(blocks, [*others, posture])).x if kept else course.x[place]
-
-
-def _neighbours(x: Array, place: int) -> Array:
-    return x[[k for k in (place - 1, place + 1) if 0 <= k < len(x)]]
 
 
 def _spare(course: Course, k: int, way: Way, first: Course) -> int:
@@ -219,11 +275,9 @@ def _said(course: Course, place: int, what: str, limit: str) -> str:
 
 
 def _impossible(course: Course, k: int, way: Way) -> str:
-    first, second = course.stances[k], course.stances[k + 1]
+    feet = f"{course.stances[k].name} to {course.stances[k + 1].name}"
     return (
-        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({first.name} to {second.name}) cannot be "
-        f"made: "
-        f"{way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
-        f"postures at its ends. "
-        "Leave these feet out of the protocol, or widen that limit."
+        f"The move from posture {k + 1} to {k + 2} of {len(course.stances)} ({feet}) cannot be "
+        f"made: {way.limit.replace('_', ' ')} is exceeded even slowly, by way of a posture in between, and with other "
+        "postures at its ends. Leave these feet out of the protocol, or widen that limit."
     )

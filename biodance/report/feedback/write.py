@@ -14,8 +14,8 @@ from biodance.body.body import Body
 from biodance.body.solids import segment_solids
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
+from biodance.dance.expectation import telling_of
 from biodance.dance.problem.stance import Stance, stance_words
-from biodance.dance.telling import telling_of
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, side_in_name

@@ -1,6 +1,4 @@
-"""All causes that can be hidden in a session, by name: in the files, in the person, around the person; asked for in
-words.
-"""
+"""All causes that can be hidden in a session, by name: in the files, in and around the person; asked for in words."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -10,20 +8,21 @@ import numpy as np
 
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Subject
-from biodance.virtual_lab.faults import faults, forces, instrument_faults
+from biodance.virtual_lab.faults import forces
+from biodance.virtual_lab.faults import plate_faults as plate
+from biodance.virtual_lab.faults import recording_faults as whole
 from biodance.virtual_lab.faults.forces import sloshing_load, wobbling_mass
+from biodance.virtual_lab.faults.plate_faults import Builder, Clock, axis_index
 from biodance.virtual_lab.movement.performance import AppliedForce
 from biodance.virtual_lab.movement.protocol import Protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, Fault, LabVisit
-from biodance.virtual_lab.recording.merge import load_on
+from biodance.virtual_lab.truth import load_on
 
 
 @dataclass(frozen=True)
 class Hidden:
-    """One cause to hide: its ``name``, where (``target``) and how large (``values`` by parameter, SI units; a place
-    has three numbers).
-    """
+    """One cause to hide: its ``name``, where (``target``), how large (``values`` by parameter, SI units)."""
 
     name: str
     target: str
@@ -50,9 +49,7 @@ class Hidden:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a cause may change: the ``visit``, and the ``loads`` that the ``person`` carries through the trials of
-    ``protocol``.
-    """
+    """What a cause may change: the ``visit``, and the ``loads`` of the ``person`` in the trials of ``protocol``."""
 
     person: Person
     protocol: Protocol
@@ -60,7 +57,7 @@ class Scene:
     loads: tuple[AddedLoad, ...] = ()
 
 
-def clock_of(protocol: Protocol) -> dict[str, tuple[float, float]]:
+def clock_of(protocol: Protocol) -> Clock:
     """Return from and to where in the session (0 to 1) every trial lies, the trials one after another."""
     ends = np.cumsum([trial.duration for trial in protocol.trials])
     starts = ends - [trial.duration for trial in protocol.trials]
@@ -70,39 +67,28 @@ def clock_of(protocol: Protocol) -> dict[str, tuple[float, float]]:
     }
 
 
-FAULTS: dict[str, Callable[..., Fault]] = {
+FAULTS: dict[str, Builder] = {
     f.__name__: f
     for f in (
-        faults.plate_offset, faults.plate_gain, faults.plate_crosstalk, faults.plate_drift, faults.time_delay,
-        faults.clock_drift,
-        faults.plate_position, faults.plate_rotation, faults.body_mass, faults.unit_error, faults.axis_error,
-        faults.clipping,
-        faults.mains_hum, faults.labels_swapped, instrument_faults.filter_mismatch, instrument_faults.plate_hysteresis,
-        instrument_faults.plate_creep, instrument_faults.plate_bending, instrument_faults.loose_connection,
-        instrument_faults.trigger_jitter,
-        instrument_faults.object_on_plate, instrument_faults.saturating, instrument_faults.frame_rate,
-        instrument_faults.dropped_frames,
-        instrument_faults.swaying_cameras,
+        *(plate.plate_offset, plate.plate_gain, plate.plate_crosstalk, plate.plate_drift, plate.plate_position),
+        *(plate.plate_rotation, plate.plate_hysteresis, plate.plate_creep, plate.plate_bending, plate.object_on_plate),
+        *(plate.axis_error, plate.clipping, plate.mains_hum, plate.loose_connection, plate.saturating),
+        *(whole.time_delay, whole.clock_drift, whole.trigger_jitter, whole.frame_rate, whole.filter_mismatch),
+        *(whole.body_mass, whole.unit_error, whole.labels_swapped, whole.dropped_frames, whole.swaying_cameras),
     )
-}  # fmt: skip
+}
 FORCES: dict[str, Callable[..., AppliedForce]] = {
     f.__name__: f
     for f in (
-        forces.external_contact,
-        forces.body_weight_support,
-        forces.slack_harness,
-        forces.table_edge,
-        forces.spinning_wheel,
+        *(forces.external_contact, forces.body_weight_support, forces.slack_harness),
+        *(forces.table_edge, forces.spinning_wheel),
     )
 }
-_UNKNOWN = (
-    "plate_creep", "plate_bending", "loose_connection", "trigger_jitter", "object_on_plate", "saturating",
-    "swaying_cameras",
-    "slack_harness", "table_edge", "spinning_wheel",
-)  # fmt: skip
+_GIVEN = ("target", "clock", "channel", "wrench", "recording", "performance", "time", "return")
+"""What a builder, or the function behind it, takes beside the sizes of a cause."""
 
 
-def fault_of(cause: Hidden, clock: dict[str, tuple[float, float]]) -> Fault:
+def fault_of(cause: Hidden, clock: Clock) -> Fault:
     """Return the change of a recording that a cause makes; ``clock`` says from and to where in the session each trial
     lies.
 
@@ -121,7 +107,7 @@ def fault_of(cause: Hidden, clock: dict[str, tuple[float, float]]) -> Fault:
 
 
 def _parameters(builder: Callable[..., object]) -> tuple[str, ...]:
-    return tuple(name for name in builder.__annotations__ if name not in ("target", "clock", "person", "return"))
+    return tuple(name for name in builder.__annotations__ if name not in _GIVEN)
 
 
 def _load(cause: Hidden, scene: Scene) -> Scene:
@@ -146,7 +132,7 @@ def _slosh(cause: Hidden, scene: Scene) -> Scene:
 def _tilt(cause: Hidden, scene: Scene) -> Scene:
     """Turn the laboratory's axes by ``angle`` rad about lab x or y."""
     turn = np.array(scene.visit.tilt)
-    turn[faults.axis_index(cause.target)] += cause.numbers(("angle",))["angle"]
+    turn[axis_index(cause.target)] += cause.numbers(("angle",))["angle"]
     return replace(scene, visit=replace(scene.visit, tilt=tuple(turn)))
 
 
@@ -162,9 +148,7 @@ def _shifted(field: Literal["joint_shifts", "marker_shifts"]) -> Callable[[Hidde
 
 
 def _longer(cause: Hidden, scene: Scene) -> Scene:
-    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower, with all that
-    hangs on it.
-    """
+    """Make a thigh or shank ``error`` m longer than its markers say: the joint at its end lies lower."""
     ends = {
         f"{side}_{upper}": f"{side}_{joint}"
         for side in SIDES

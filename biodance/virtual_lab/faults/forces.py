@@ -1,6 +1,8 @@
 """What acts on the person beside gravity and the plates: rails, ropes, table edges, and masses on springs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 
 import numpy as np
 
@@ -12,8 +14,8 @@ from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.person.person import AddedLoad, Person
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.merge import CARRIERS, MERGED
 from biodance.virtual_lab.tolerances import stream
+from biodance.virtual_lab.truth import CARRIERS, MERGED
 
 GRIPS = {
     "right_forearm_hand": ("right_hand", (0.0, -0.08, 0.0)),
@@ -59,90 +61,76 @@ def touches(time: Array, rng: np.random.Generator, *, every: float) -> Array:
     return out
 
 
-def external_contact(target: str, force: float) -> AppliedForce:
-    """Touch a rail or be held by a helper: touches of ``force`` (N), mostly from below, at a part of the body; one
-    in every 4 s.
-    """
+def acting(act: Callable[..., Array]) -> Callable[..., AppliedForce]:
+    """Build forces from ``act`` (performance, time (T,) s, target, **sizes) -> wrench (T, 6) about the lab origin."""
 
-    def act(performance: Performance, time: Array) -> Array:
-        rng = stream(performance.person.seed, "touch", target, performance.plan.name)
-        direction = np.array([0.35 * rng.normal(), 0.35 * rng.normal(), 1.0])
-        strength = force * touches(time, rng, every=4.0) * (performance.plan.role != "static")
-        return force_at_point(
-            strength[:, None] * direction / np.linalg.norm(direction), grip(target, true_poses(performance, time))
-        )
+    @wraps(act)
+    def build(target: str, **sizes: float) -> AppliedForce:
+        return lambda performance, time: act(performance, time, target, **sizes)
 
-    return act
+    return build
 
 
-def body_weight_support(target: str, force: float, stiffness: float) -> AppliedForce:
+@acting
+def external_contact(performance: Performance, time: Array, target: str, force: float) -> Array:
+    """Touch a rail or be held: touches of ``force`` (N), mostly from below, at a part of the body; one in every 4 s."""
+    rng = stream(performance.person.seed, "touch", target, performance.plan.name)
+    direction = np.array([0.35 * rng.normal(), 0.35 * rng.normal(), 1.0])
+    strength = force * touches(time, rng, every=4.0) * (performance.plan.role != "static")
+    pull = strength[:, None] * direction / np.linalg.norm(direction)
+    return force_at_point(pull, grip(target, true_poses(performance, time)))
+
+
+def _rope(performance: Performance, point: Array) -> tuple[Array, Array]:
+    """Return the way (T, 3) m from ``point`` (T, 3) to the ceiling over the feet, and its length (T,) m."""
+    away = np.array([*np.mean(list(performance.stance.pressure.values()), axis=0), CEILING]) - point
+    return away, np.linalg.norm(away, axis=1)
+
+
+@acting
+def body_weight_support(performance: Performance, time: Array, target: str, force: float, stiffness: float) -> Array:
     """Hang a rope from the ceiling to a harness at the pelvis: ``force`` (N) when standing, ``stiffness`` (N/m) as
     the person goes down.
     """
-
-    def act(performance: Performance, time: Array) -> Array:
-        if performance.plan.role == "static":
-            return np.zeros((time.size, 6))
-        point = grip("pelvis", true_poses(performance, time))
-        away = np.array([*np.mean(list(performance.stance.pressure.values()), axis=0), CEILING]) - point
-        length = np.linalg.norm(away, axis=1)
-        tension = np.maximum(force + stiffness * (length - length[0]), 0.0)
-        return force_at_point((tension / length)[:, None] * away, point)
-
-    return act
+    if performance.plan.role == "static":
+        return np.zeros((time.size, 6))
+    point = grip("pelvis", true_poses(performance, time))
+    away, length = _rope(performance, point)
+    tension = np.maximum(force + stiffness * (length - length[0]), 0.0)
+    return force_at_point((tension / length)[:, None] * away, point)
 
 
-def slack_harness(target: str, stiffness: float) -> AppliedForce:
-    """Hang a safety rope that is loose until the hips are 5 cm down, then pulls with the square of its stretch (N =
-    stiffness m²).
-    """
-
-    def act(performance: Performance, time: Array) -> Array:
-        point = grip("trunk_head", true_poses(performance, time))
-        away = np.array([*np.mean(list(performance.stance.pressure.values()), axis=0), CEILING]) - point
-        length = np.linalg.norm(away, axis=1)
-        stretch = np.maximum(length - length[0] - 0.05, 0.0)
-        return force_at_point((stiffness * stretch**2 / length)[:, None] * away, point)
-
-    return act
+@acting
+def slack_harness(performance: Performance, time: Array, target: str, stiffness: float) -> Array:
+    """Hang a safety rope, loose until the hips are 5 cm down, that pulls with its stretch squared (N/m²)."""
+    point = grip("trunk_head", true_poses(performance, time))
+    away, length = _rope(performance, point)
+    stretch = np.maximum(length - length[0] - 0.05, 0.0)
+    return force_at_point((stiffness * stretch**2 / length)[:, None] * away, point)
 
 
-def table_edge(target: str, force: float) -> AppliedForce:
-    """Let the right thigh run against furniture: short horizontal pushes of ``force`` (N), one in every 2 s, of
-    either sign.
-    """
-
-    def act(performance: Performance, time: Array) -> Array:
-        rng = stream(performance.person.seed, "table", performance.plan.name)
-        strength = np.zeros_like(time)
-        for start in np.arange(time[0], time[-1] - 2.0, 2.0):
-            begin = start + rng.uniform(0.0, 1.4)
-            strength += rng.choice([-1.0, 1.0]) * force * np.sin(np.pi * np.clip((time - begin) / 0.6, 0.0, 1.0)) ** 2
-        return force_at_point(
-            strength[:, None] * np.array([0.8, 0.6, 0.0]), grip("right_thigh", true_poses(performance, time))
-        )
-
-    return act
+@acting
+def table_edge(performance: Performance, time: Array, target: str, force: float) -> Array:
+    """Let the right thigh run against furniture: horizontal pushes of ``force`` (N), one in 2 s, of either sign."""
+    rng = stream(performance.person.seed, "table", performance.plan.name)
+    strength = np.zeros_like(time)
+    for start in np.arange(time[0], time[-1] - 2.0, 2.0):
+        begin = start + rng.uniform(0.0, 1.4)
+        strength += rng.choice([-1.0, 1.0]) * force * np.sin(np.pi * np.clip((time - begin) / 0.6, 0.0, 1.0)) ** 2
+    point = grip("right_thigh", true_poses(performance, time))
+    return force_at_point(strength[:, None] * np.array([0.8, 0.6, 0.0]), point)
 
 
-def spinning_wheel(target: str, momentum: float) -> AppliedForce:
-    """Carry a wheel that spins in a rucksack about the right-left axis of the chest: its angular ``momentum``
-    (N·m·s) resists turning.
-    """
-
-    def act(performance: Performance, time: Array) -> Array:
-        turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
-        spin = momentum * turn[:, :, 2]
-        return np.concatenate([np.zeros((time.size, 3)), -np.gradient(spin, time, axis=0)], axis=1)
-
-    return act
+@acting
+def spinning_wheel(performance: Performance, time: Array, target: str, momentum: float) -> Array:
+    """Carry a spinning wheel about the right-left axis of the chest: its ``momentum`` (N·m·s) resists turning."""
+    turn = true_poses(performance, time).rotation[:, TRUE_SEGMENTS.index("thorax")]
+    return np.concatenate([np.zeros((time.size, 3)), -np.gradient(momentum * turn[:, :, 2], time, axis=0)], axis=1)
 
 
 @dataclass(frozen=True)
 class Spring:
-    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 or 0 = it can move along
-    lab x, y, z.
-    """
+    """How a loose mass hangs: ``frequency`` Hz undamped, ``damping`` ratio, ``free`` (3,) 1 = moves along x, y, z."""
 
     frequency: float
     damping: float
@@ -172,9 +160,7 @@ def swing(acceleration: Array, step: float, spring: Spring) -> tuple[Array, Arra
 
 
 def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedForce:
-    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but hanging there on a
-    spring.
-    """
+    """Return the force of ``mass`` kg, counted as fixed at ``place`` (3,) m of a true segment but on a spring there."""
 
     def act(performance: Performance, time: Array) -> Array:
         from scipy.interpolate import make_interp_spline
@@ -197,9 +183,7 @@ def wobbling_mass(person: Person, target: str, mass: float) -> AppliedForce:
 
 
 def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> tuple[AddedLoad, AppliedForce]:
-    """Carry a vessel of ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, and what
-    sloshing adds.
-    """
+    """Carry ``mass`` kg behind one of the 12 segments, of which ``sloshing`` kg move: the load, what sloshing adds."""
     segment = _carrier(target)
     place = person.body.sip.com[TRUE_SEGMENTS.index(segment)] + np.array([-0.16, 0.0, 0.0])
     return AddedLoad(segment, mass, place, np.full(3, 0.05)), loose(segment, place, sloshing, LIQUID)

@@ -16,12 +16,11 @@ from scipy.special import logsumexp
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError
-from biodance.motion.ik.legs import Leg
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, freeze
 from biodance.virtual_lab.movement.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
 from biodance.virtual_lab.movement.performance import MARGIN, NODE_RATE, Performance, keep_balance
-from biodance.virtual_lab.movement.posing import STRAIGHT, FootStance, Pose, Z, turn_about, upper_body
+from biodance.virtual_lab.movement.posing import FootStance, Pose, Z, leg_tops, turn_about, upper_body
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, smooth_noise, stream
@@ -126,9 +125,7 @@ def copy_dance(
     performer: Performer = Performer(),
     tolerances: LabTolerances = REALISTIC,
 ) -> Performance:
-    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; the same arguments give the
-    same motion.
-    """
+    """Let ``person`` copy one stretch around ``centre`` (2,) m, facing ``heading`` rad; reproducible."""
     rng = stream(person.seed, "copy", str(session), shown.name)
     duration, *clock = performer.clock(
         stream(person.seed, "tempo", str(session), shown.name), float(np.ptp(shown.motion.time))
@@ -171,8 +168,6 @@ def _fields(shown: Shown) -> Array:
 
 def pelvis_angles(turn: Array) -> Array:
     """Return forward tilt, right drop and left turn (T, 3) degrees of lab_R_pelvis (T, 3, 3), facing lab x."""
-    from scipy.spatial.transform import Rotation
-
     left, drop, back = Rotation.from_matrix(UPRIGHT.T @ turn).as_euler("YXZ").T
     return np.degrees(np.stack([-back, drop, left], axis=1))
 
@@ -180,37 +175,31 @@ def pelvis_angles(turn: Array) -> Array:
 def _depth(shown: Shown) -> Array:
     """Return how far (T,) the pelvis is below the highest place that the feet allow, per leg length."""
     pose = poses(shown.body, shown.motion.q)
-    highest, length = _reach(shown.body, pose.rotation[:, 0], pose.position[:, 0, :2], shown.ankle, shown.raised)
+    highest, length = _reach(
+        shown.body,
+        pose.rotation[:, 0],
+        pose.position[:, 0, :2],
+        dict(zip(SIDES, shown.ankle, strict=True)),
+        shown.raised,
+    )
     return np.asarray((highest - pose.position[:, 0, 2]) / length)
 
 
 def _height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
     """Return the height (T,) m of the pelvis of the person who copies."""
-    raised, ankle = (
-        np.stack([curves.raised(side) for side in SIDES], axis=1),
-        np.array([stance.ankle[side] for side in SIDES]),
-    )
-    highest, length = _reach(person.body, pose.pelvis_turn, xy, ankle, raised)
+    raised = np.stack([curves.raised(side) for side in SIDES], axis=1)
+    highest, length = _reach(person.body, pose.pelvis_turn, xy, stance.ankle, raised)
     return highest - curves["depth"][:, 0] * length
 
 
-def _reach(body: Body, turn: Array, xy: Array, ankle: Array, raised: Array) -> tuple[Array, float]:
-    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the mean length m of
-    the legs.
+def _reach(body: Body, turn: Array, xy: Array, ankle: dict[str, Array], raised: Array) -> tuple[Array, float]:
+    """Return the highest place (T,) m of a pelvis at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, and the legs' length m.
 
     A foot that is lifted gives way as it rises (`posing.pelvis_height` lets go at once, which would throw up a leaning
     body).
     """
-    tops, lengths = [], []
-    for k, side in enumerate(SIDES):
-        leg = Leg.of(body, side)
-        hip, reach = turn @ leg.hip, float(leg.length(STRAIGHT))
-        across = np.sum((xy + hip[:, :2] - ankle[k, :2]) ** 2, axis=1)
-        tops.append(
-            ankle[k, 2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2] + AWAY * raised[:, k]
-        )
-        lengths.append(reach)
-    return -logsumexp(-SOFTNESS * np.array(tops), axis=0) / SOFTNESS, float(np.mean(lengths))
+    tops, length = leg_tops(body, turn, xy, ankle)
+    return -logsumexp(-SOFTNESS * (tops + AWAY * raised.T), axis=0) / SOFTNESS, length
 
 
 def _stand(

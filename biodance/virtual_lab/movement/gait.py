@@ -1,23 +1,219 @@
-"""A person who walks or runs on a belt: one stride that the ground forces carry, repeated through the trial."""
+"""A person who walks or runs on a belt: one stride that prescribed ground forces make of the body, found by repetition
+and repeated through the trial.
+
+Translation: the centre of mass moves as the sum of the forces says (a parabola in flight). Rotation: pelvis and trunk
+turn so that the angular momentum of the whole body about its centre of mass follows the forces' moment (constant in
+flight). Arms, spine and feet move as they are told; the legs follow from the feet.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from biodance.body.parts import UPRIGHT
+from biodance.body.pinocchio_model import load_pinocchio
+from biodance.errors import BiodanceError
+from biodance.motion.ik.legs import Leg
 from biodance.records import SIDES, Array, Wrench
 from biodance.virtual_lab.movement.choreography import WIDTH, Curves
-from biodance.virtual_lab.movement.performance import MARGIN, Performance
-from biodance.virtual_lab.movement.posing import Z, take_stance, turn_about
-from biodance.virtual_lab.movement.protocol import GAITS, Gait, TrialPlan
-from biodance.virtual_lab.movement.steps import BeltFoot
-from biodance.virtual_lab.movement.stride import STRIDE_RATE, FoundStride, find_stride
+from biodance.virtual_lab.movement.performance import MARGIN, Performance, motion_through
+from biodance.virtual_lab.movement.posing import Z, take_stance, turn_about, without_jumps
+from biodance.virtual_lab.movement.protocol import GAITS, STAND, Gait, TrialPlan
+from biodance.virtual_lab.movement.steps import Aim, BeltFoot, G
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
+STRIDE_RATE = 200.0
+"""Hz of the nodes of a stride."""
+_ROUNDS, _LEARNED, _EASE = 300, 30, 0.5
+"""Most rounds; rounds in which forces learn to aim; share of each correction that is made."""
+_AIM = {False: 0.57, True: 0.75}
+"""Of stature, height at which the ground forces aim: the centre of mass in walking, above it in running (Maus et al.
+2010, doi:10.1038/ncomms1073)."""
+_SPIN, _PLACE = 1e-3, 1e-6
+"""N·m·s and m: a stride is settled when angular momentum and centre of mass are this close to the forces' own."""
+_SHORT = 1e-3
+"""m by which the longest distance from hip to ankle may miss that of a nearly straight leg."""
+_PAD = 12
+"""Nodes of the strides before and after with which a stride's derivatives are taken."""
+_LATERAL = np.array([0.0, -1.0, 0.0])
+_TURNS = np.array([0.022, 0.022, 0.005])
+"""Of mass times stature squared: about how much turns with the pelvis, per axis of the belt."""
 _STATURE = 1.75
-"""m of the person whose gait is described by `gaits`; others go in proportion."""
+"""m of the person whose gait is described by `GAITS`; others go in proportion."""
+
+
+@dataclass(frozen=True, eq=False)
+class FoundStride:
+    """One stride of a person on a belt, in the belt's axes.
+
+    ``q`` (N, 46) nodes at `STRIDE_RATE`; ``aim`` of the ground forces; ``twist`` m, free moment per vertical force of
+    both feet; ``missed`` N·m·s, angular momentum that the motion lacks of the one that the forces make.
+    """
+
+    q: Array
+    aim: Aim
+    twist: float
+    missed: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    person: Person
+    gait: Gait
+    feet: tuple[BeltFoot, ...]
+
+    @cached_property
+    def time(self) -> Array:
+        """(N,) s of the nodes."""
+        return np.arange(round(self.gait.stride * STRIDE_RATE)) / STRIDE_RATE
+
+    def carried(self, aim: Aim) -> tuple[Array, Array]:
+        """Return the total force (N, 3) N and its moment (N, 3) N·m about the belt's middle."""
+        force = [foot.force(self.gait, self.time, self.person.mass, aim) for foot in self.feet]
+        places = [foot.pressure(self.gait, self.time) for foot in self.feet]
+        moment = [np.cross(place, one) for place, one in zip(places, force, strict=True)]
+        return np.sum(force, axis=0), np.sum(moment, axis=0)
+
+    def aimed(self, height: float, sway: Array) -> Aim:
+        """Return the aim at ``height`` m whose forces push nobody ahead or aside in the mean."""
+        force, _ = self.carried(Aim(height, self.gait.stride, sway))
+        return Aim(height, self.gait.stride, sway - height * force[:, :2].mean(axis=0) / force[:, 2].mean())
+
+    @cached_property
+    def model(self) -> tuple[Any, Any]:
+        """The loaded body's model in pinocchio, and its data."""
+        model = self.person.loaded_body.model
+        return model, model.createData()
+
+    @cached_property
+    def soles(self) -> dict[str, tuple[Array, Array]]:
+        """Rotation (N, 3, 3) and ankle (N, 3) m of each foot."""
+        out = {}
+        for foot in self.feet:
+            ankle, pitch = foot.path(self.gait, self.time)
+            yaw = turn_about(np.array([0.0, 0.0, 1.0]), np.full(pitch.size, foot.sign * foot.out))
+            out[foot.side] = yaw @ turn_about(_LATERAL, pitch) @ UPRIGHT, ankle
+        return out
+
+    def demanded(self, aim: Aim, height: float) -> tuple[Array, Array, float]:
+        """Return the path of the centre of mass (N, 3) m, the angular momentum (N, 3) N·m·s about it (up to a
+        constant) that the forces make, and the twist m, with the centre of mass at a mean ``height`` m.
+        """
+        force, moment = self.carried(aim)
+        weight = self.person.mass * G
+        com = _integral(_integral(force / self.person.mass - [0.0, 0.0, G], self.gait.stride), self.gait.stride)
+        com[:, 2] += height
+        about = (moment - np.cross(com, force)).mean(axis=0) / weight
+        com[:, :2] += np.array([-about[1], about[0]])
+        rate = moment - np.cross(com, force)
+        twist = -rate[:, 2].mean() / weight
+        rate[:, 2] += twist * force[:, 2]
+        return com, _integral(rate, self.gait.stride), float(twist)
+
+    def posed(self, upper: Array, root: Array, turned: Array) -> tuple[Array, float]:
+        """Return the nodes (N, 46) with the pelvis at ``root`` (N, 3) m, ``turned`` (N, 3) rad, and by how much m the
+        legs are too short.
+        """
+        body, q = self.person.body, upper.copy()
+        turn = Rotation.from_rotvec(turned).as_matrix() @ UPRIGHT
+        q[:, :3] = root
+        q[:, 3:7] = Rotation.from_matrix(turn).as_quat()
+        short = -np.inf
+        for side, (foot, ankle) in self.soles.items():
+            leg = Leg.of(body, side)
+            away = np.linalg.norm(root + turn @ leg.hip - ankle, axis=1)
+            short = max(short, float(np.max(away - leg.length(self.gait.knee))))
+            q[:, [7 + column for column in leg.columns]] = leg.solve(turn, root, foot, ankle)
+        return q, short
+
+    def moved(self, q: Array) -> tuple[Array, Array]:
+        """Return the centre of mass (N, 3) m and the angular momentum (N, 3) N·m·s about it of the nodes."""
+        around = np.arange(-_PAD, len(q) + _PAD)
+        motion = motion_through(around / STRIDE_RATE, q[np.mod(around, len(q))], self.time)
+        pin, (model, data) = load_pinocchio(), self.model
+        centre, spin = np.empty((len(q), 3)), np.empty((len(q), 3))
+        for k in range(len(q)):
+            spin[k] = pin.computeCentroidalMomentum(model, data, motion.q[k], motion.v[k]).angular
+            centre[k] = data.com[0]
+        return centre, spin
+
+    def upper(self) -> Array:
+        """Return the nodes (N, 46) with arms, trunk and head as they are told."""
+        body, gait, n = self.person.body, self.gait, self.time.size
+        q = np.zeros((n, body.nq))
+        angle: dict[str, Array | float] = dict(self.person.habits.angles)
+        angle["lumbar_flexion"] += gait.lean
+        swing = np.cos(2 * np.pi * self.time / gait.stride)
+        for side, sign in zip(SIDES, (-1.0, 1.0), strict=True):
+            _, adduction, rotation, _ = np.radians(STAND.values[f"{side}_arm"])
+            angle |= {
+                f"{side}_shoulder_flexion": sign * gait.arm * swing,
+                f"{side}_shoulder_adduction": adduction,
+                f"{side}_shoulder_rotation": rotation,
+                f"{side}_elbow_flexion": gait.elbow * (1 + 0.15 * sign * swing),
+            }
+        for name, value in angle.items():
+            q[:, 7 + body.joint_index(name)] = value
+        return q
+
+
+def find_stride(person: Person, gait: Gait, feet: tuple[BeltFoot, ...]) -> FoundStride:
+    """Return the stride of ``person`` whose ``feet`` take the prescribed forces.
+
+    In walking the forces first learn to aim so that the trunk neither nods nor rolls; then the pelvis turns by what
+    is left. The legs are as long as the height of the centre of mass allows.
+
+    Raises
+    ------
+    BiodanceError
+        The repetition does not settle: no such motion was found for this person.
+    """
+    problem, learns = _Problem(person, gait, feet), gait.flight == 0
+    upper, level = problem.upper(), 0.55 * person.subject.stature
+    root, turned = np.tile([0.0, 0.0, level], (problem.time.size, 1)), np.zeros((problem.time.size, 3))
+    height, sway = (_AIM[gait.flight > 0] * person.subject.stature), np.zeros((problem.time.size, 2))
+    lever, missed, off = person.mass * person.subject.stature**2 * _TURNS, np.inf, np.inf
+    for number in range(_ROUNDS):
+        aim = problem.aimed(height, sway)
+        com, spin, twist = problem.demanded(aim, level)
+        q, short = problem.posed(upper, root, turned)
+        centre, has = problem.moved(q)
+        lacks = spin - has
+        lacks = lacks - lacks.mean(axis=0)
+        missed, off = float(np.abs(lacks).max()), float(np.abs(com - centre).max())
+        if missed < _SPIN and off < _PLACE and abs(short) < _SHORT:
+            return FoundStride(q, aim, twist, missed)
+        level, root = level - _EASE * short, root + _EASE * (com - centre)
+        step = _EASE * _integral(lacks / lever, gait.stride)
+        if learns and number < _LEARNED:
+            sway = sway + _EASE * _sway(lacks, problem.carried(aim)[0][:, 2], gait.stride, height / level)
+            step[:, :2] = 0.0
+        turned = turned + step
+    raise BiodanceError(
+        f"Gait {gait.name} at {gait.speed:.2f} m/s: no motion of this person was found that the ground forces carry "
+        f"({missed:.3g} N·m·s of angular momentum, {off:.3g} m of the centre of mass left). Choose another seed or "
+        f"speed."
+    )
+
+
+def _sway(lacks: Array, vertical: Array, period: float, lever: float) -> Array:
+    """Return by how much (N, 2) m the forces must aim elsewhere to give the angular momentum that ``lacks`` (N, 3)."""
+    spectrum = np.fft.rfft(lacks[:, :2], axis=0)
+    spectrum *= 2j * np.pi * np.fft.rfftfreq(len(lacks), period / len(lacks))[:, None]
+    rate = np.fft.irfft(spectrum, len(lacks), axis=0)
+    return np.asarray(lever * np.stack([rate[:, 1], -rate[:, 0]], axis=1) / vertical[:, None])
+
+
+def _integral(rate: Array, period: float) -> Array:
+    """Return the periodic integral (N, k) of ``rate`` (N, k) less its mean, of zero mean."""
+    frequency = 2j * np.pi * np.fft.rfftfreq(len(rate), period / len(rate))
+    spectrum = np.fft.rfft(rate, axis=0)
+    spectrum[0] = 0.0
+    return np.asarray(np.fft.irfft(spectrum / np.where(frequency == 0, 1, frequency)[:, None], len(rate), axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +269,7 @@ def perform_gait(
     centre: Array,
     heading: float = 0.0,
 ) -> GaitPerformance:
-    """Let ``person`` walk or run through a trial with the ``plan``'s gait at ``centre`` (2,) m, facing ``heading`` rad
-    from lab x; the same arguments give the same motion.
-    """
+    """Let ``person`` walk or run through a trial with the ``plan``'s gait at ``centre`` (2,) m, ``heading`` rad."""
     rng = stream(person.seed, "gait", str(session), plan.name)
     gait = _personal(GAITS[plan.gait], rng, tolerances, plan.speed, person.subject.stature)
     stance = take_stance(person, "parallel", centre, heading, rng)
@@ -88,7 +282,7 @@ def perform_gait(
     nodes, time = found.q[np.mod(index, len(found.q))].copy(), index / STRIDE_RATE
     turn = turn_about(Z, np.array([stance.heading]))[0]
     nodes[:, :3] = nodes[:, :3] @ turn.T + floor_between(stance.ankle)
-    nodes[:, 3:7] = _without_jumps((Rotation.from_matrix(turn) * Rotation.from_quat(nodes[:, 3:7])).as_quat())
+    nodes[:, 3:7] = without_jumps((Rotation.from_matrix(turn) * Rotation.from_quat(nodes[:, 3:7])).as_quat())
     curves = Curves(time, np.zeros((time.size, WIDTH)))
     return GaitPerformance(plan, person, stance, curves, time, nodes, found.missed, gait=gait, feet=feet, stride=found)
 
@@ -104,9 +298,3 @@ def _personal(gait: Gait, rng: np.random.Generator, tolerances: LabTolerances, s
     pace = np.sqrt(size) * float(1 + 0.3 * tolerances.performance * rng.normal())
     stride = 2 * round(0.5 * gait.stride * pace * STRIDE_RATE) / STRIDE_RATE
     return replace(gait, speed=float(np.sqrt(size)) * (speed or gait.speed), stride=stride, **own)
-
-
-def _without_jumps(quaternion: Array) -> Array:
-    """Return quaternions (T, 4) without jumps of sign."""
-    flips = np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0)
-    return np.asarray(quaternion * np.concatenate([[1.0], np.cumprod(flips)])[:, None])

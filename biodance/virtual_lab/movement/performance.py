@@ -132,9 +132,7 @@ def perform(
 
 
 def wanted_pressure(curves: Curves, stance: FootStance) -> Array:
-    """Return where the centre of pressure should be (T, 2) m: between the feet by the share of weight, plus the
-    posture's lean.
-    """
+    """Return where the centre of pressure should be (T, 2) m: between the feet by share of weight, plus lean."""
     right = curves["shift"]
     forward, sideways = curves["lean"][:, :1], curves["lean"][:, 1:]
     ahead = np.array([np.cos(stance.heading), np.sin(stance.heading)])
@@ -219,17 +217,13 @@ def _motion(splines: tuple[Any, Any, Any], time: Array) -> Motion:
 
 
 def _twice_conjugate_times(quaternion: Array, rate: Array) -> Array:
-    """Return the vector part (T, 3) of 2 q* r: the angular velocity for r = q', its derivative for r = q'' (unit q,
-    x y z w).
-    """
+    """Return the vector part (T, 3) of 2 q* r: angular velocity for r = q', its rate for r = q'' (unit q, xyzw)."""
     vector, scalar = quaternion[:, :3], quaternion[:, 3:]
     return 2 * (scalar * rate[:, :3] - rate[:, 3:] * vector - np.cross(vector, rate[:, :3]))
 
 
 def true_wrench(person: Person, motion: Motion) -> Wrench:
-    """Return the ground wrench about the lab origin that ``motion`` of the loaded true body needs, by pinocchio's
-    RNEA.
-    """
+    """Return the ground wrench about the lab origin that ``motion`` of the loaded true body needs, by RNEA."""
     pin = load_pinocchio()
     model = person.loaded_body.model.copy()
     model.gravity = pin.Motion(np.array(GRAVITY), np.zeros(3))

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import logsumexp
 
+from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
 from biodance.motion.ik.legs import LEG, Leg, soft_limit
 from biodance.records import SIDES, Array
@@ -70,9 +71,7 @@ class Pose:
 def upper_body(
     person: Person, curves: Curves, stance: FootStance, tolerances: LabTolerances, rng: np.random.Generator
 ) -> Pose:
-    """Return the pose above the legs: the posture's angles, shared out over the true joints, with what no
-    instruction asks for.
-    """
+    """Return the pose above the legs: the posture's angles over the true joints, with what no instruction asks for."""
     body, t, time = person.body, tolerances, curves.time
     angle = np.zeros((time.size, len(body.joints)))
     unasked = dict(zip(_UNASKED, smooth_noise(rng, time, columns=len(_UNASKED), cutoff=0.8).T, strict=True))
@@ -114,7 +113,7 @@ def upper_body(
     angle[:, upper] += tremor[:, :-3][:, upper]
     q = np.zeros((time.size, body.nq))
     q[:, 7:] = -soft_limit(-soft_limit(angle, body.limits.upper, 0.1), -body.limits.lower, 0.1)
-    q[:, 3:7] = _quaternion(turn)
+    q[:, 3:7] = without_jumps(Rotation.from_matrix(turn).as_quat())
     return Pose(q, turn)
 
 
@@ -134,35 +133,36 @@ def _pelvis_turn(angle: Array, heading: float) -> Array:
 
 
 def turn_about(axis: Array, angle: Array) -> Array:
-    """Return rotations (T, 3, 3) about one unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not those of
-    `biodance.spatial`.
-    """
+    """Return rotations (T, 3, 3) about a unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not `spatial`'s."""
     return Rotation.from_rotvec(np.multiply.outer(angle, axis)).as_matrix()
 
 
-def _quaternion(turn: Array) -> Array:
-    """Return unit quaternions x y z w (T, 4) of rotations, without jumps of sign."""
-    xyzw = Rotation.from_matrix(turn).as_quat()
-    flips = np.cumprod(np.where(np.sum(xyzw[1:] * xyzw[:-1], axis=1) < 0, -1.0, 1.0))
-    xyzw[1:] *= flips[:, None]
-    return xyzw
+def without_jumps(quaternion: Array) -> Array:
+    """Return quaternions (T, 4) without jumps of sign."""
+    flips = np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0)
+    return np.asarray(quaternion * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
 
 
-def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
-    """Return the height (T,) m of the pelvis origin over ``xy`` (T, 2): as high as the planted legs allow, minus the
-    posture's depth.
+def leg_tops(body: Body, turn: Array, xy: Array, ankle: dict[str, Array]) -> tuple[Array, float]:
+    """Return the heights (2, T) m of the pelvis, at ``turn`` (T, 3, 3) over ``xy`` (T, 2) m, at which each leg is
+    nearly straight, and the mean length m of the legs.
     """
     tops, lengths = [], []
     for side in SIDES:
-        leg = Leg.of(person.body, side)
-        hip = pose.pelvis_turn @ leg.hip
-        reach = float(leg.length(STRAIGHT))
-        across = np.sum((xy + hip[:, :2] - stance.ankle[side][:2]) ** 2, axis=1)
-        tops.append(stance.ankle[side][2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2])
+        leg = Leg.of(body, side)
+        hip, reach = turn @ leg.hip, float(leg.length(STRAIGHT))
+        across = np.sum((xy + hip[:, :2] - ankle[side][:2]) ** 2, axis=1)
+        tops.append(ankle[side][2] + np.sqrt(np.maximum(reach**2 - across, (0.5 * reach) ** 2)) - hip[:, 2])
         lengths.append(reach)
+    return np.array(tops), float(np.mean(lengths))
+
+
+def pelvis_height(person: Person, pose: Pose, curves: Curves, stance: FootStance, xy: Array) -> Array:
+    """Return the height (T,) m of the pelvis over ``xy`` (T, 2): as high as planted legs allow, less the depth."""
+    tops, length = leg_tops(person.body, pose.pelvis_turn, xy, stance.ankle)
     weight = np.array([1.0 - curves.raised(side) for side in SIDES])
-    height = -logsumexp(-_SHARPNESS * np.array(tops), axis=0, b=weight) / _SHARPNESS
-    return height - curves["depth"][:, 0] * np.mean(lengths)
+    height = -logsumexp(-_SHARPNESS * tops, axis=0, b=weight) / _SHARPNESS
+    return height - curves["depth"][:, 0] * length
 
 
 Height = Callable[[Person, Pose, Curves, FootStance, Array], Array]

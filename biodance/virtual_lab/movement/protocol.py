@@ -81,9 +81,7 @@ _STANCES = ("parallel", "right_forward")
 
 @dataclass(frozen=True)
 class ProtocolPosture:
-    """One posture: ``values`` by field (degrees; depth as a fraction, lean in m, shift as a share); ``raised`` feet
-    ("right", "left").
-    """
+    """One posture: ``values`` by field (degrees; depth as a fraction, lean in m, shift as a share); ``raised`` feet."""
 
     name: str
     values: dict[str, tuple[float, ...]]
@@ -92,9 +90,7 @@ class ProtocolPosture:
 
 @dataclass(frozen=True)
 class ProtocolStep:
-    """Go to a posture in ``move`` s and hold it for ``hold`` s, or go there and back ``cycles`` times, ``period`` s
-    each.
-    """
+    """Go to a posture in ``move`` s and hold it ``hold`` s, or go there and back ``cycles`` times in ``period`` s."""
 
     to: ProtocolPosture
     move: float = 1.0

@@ -3,44 +3,14 @@ construction.
 
 A pseudo-inertia is the 4x4 matrix J = [[S, h], [h', m]] of a body's density: S = second moment, h = first moment, m =
 mass. Any positive density gives J >= 0; a linear map of the body's points, J -> A J A', keeps it so. Population mean:
-rounded midpoint of Dumas & Wojtusch 2018 and de Leva 1996, so that neither table is the truth.
+``anthropometry/virtual/people.toml``.
 """
 
 import numpy as np
 
 from biodance.records import Array, Sip, Subject
-from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions
+from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, Proportions, virtual_people
 from biodance.virtual_lab.tolerances import LabTolerances, stream
-
-PopulationRow = tuple[float, float, float, float, float, float, float]
-_FEMALE: dict[str, PopulationRow] = {
-    "pelvis": (13.9, -0.080, 0.772, 0.0, 0.950, 1.050, 0.820),
-    "lumbar": (4.3, 0.150, 0.590, 0.0, 0.650, 0.780, 0.520),
-    "thorax": (25.2, 0.030, 0.458, 0.0, 0.380, 0.320, 0.340),
-    "head": (6.7, 0.030, 0.540, 0.0, 0.290, 0.240, 0.300),
-    "thigh": (14.7, -0.040, -0.370, 0.004, 0.333, 0.174, 0.334),
-    "shank": (4.65, -0.025, -0.420, 0.015, 0.280, 0.098, 0.280),
-    "foot": (1.15, 0.370, -0.310, 0.030, 0.260, 0.520, 0.530),
-    "upper_arm": (2.4, -0.025, -0.530, -0.016, 0.285, 0.150, 0.290),
-    "forearm": (1.4, 0.010, -0.435, 0.010, 0.265, 0.117, 0.257),
-    "hand": (0.53, 0.040, -0.760, 0.024, 0.580, 0.400, 0.570),
-}
-_MALE: dict[str, PopulationRow] = {
-    "pelvis": (13.3, 0.000, 0.720, 0.0, 1.020, 1.060, 0.960),
-    "lumbar": (3.3, 0.120, 0.640, 0.0, 0.540, 0.660, 0.430),
-    "thorax": (29.2, 0.015, 0.445, 0.0, 0.420, 0.330, 0.360),
-    "head": (6.8, 0.030, 0.535, 0.0, 0.290, 0.220, 0.300),
-    "thigh": (13.2, -0.020, -0.415, 0.015, 0.310, 0.150, 0.313),
-    "shank": (4.55, -0.024, -0.430, 0.004, 0.265, 0.102, 0.270),
-    "foot": (1.28, 0.450, -0.250, 0.017, 0.250, 0.500, 0.500),
-    "upper_arm": (2.55, 0.009, -0.525, -0.016, 0.280, 0.145, 0.292),
-    "forearm": (1.66, -0.006, -0.435, 0.006, 0.272, 0.116, 0.278),
-    "hand": (0.60, 0.040, -0.820, 0.037, 0.580, 0.400, 0.600),
-}
-"""Mass in per cent of the body; CoM (x, y, z) and radii of gyration about it (x, y, z) in fractions of the segment's
-length.
-"""
-
 
 _POPULATION = 0.08
 """Relative standard deviation of what the people of one place have in common beside the tables' midpoint: as published
@@ -48,9 +18,7 @@ tables differ among themselves (de Leva 1996, Dumas 2018, Zatsiorsky)."""
 
 
 def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
-    """Return J (4, 4) of a body of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes
-    at the CoM.
-    """
+    """Return J (4, 4) of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's axes at the CoM."""
     gyration = np.asarray(radii, float) ** 2
     second = np.diag(0.5 * gyration.sum() - gyration)
     out = np.empty((4, 4))
@@ -61,9 +29,7 @@ def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
 
 
 def parameters_of_inertia(J: Array) -> Array:
-    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] of a pseudo-inertia, about the frame's origin (kg,
-    kg·m, kg·m²).
-    """
+    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the frame's origin (kg, kg·m, kg·m²)."""
     second = J[:3, :3]
     inertia = np.trace(second) * np.eye(3) - second
     rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
@@ -89,9 +55,7 @@ def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
 
 
 def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
-    """Return J after a random linear map of the body about its CoM and a random shift, both relative to the body's
-    own size.
-    """
+    """Return J after a random linear map of the body about its CoM and a random shift, relative to its own size."""
     com = J[:3, 3] / J[3, 3]
     centred = place_inertia(J, np.eye(3), -com)
     size = np.sqrt(np.diag(centred)[:3] / J[3, 3])
@@ -110,7 +74,7 @@ def draw_sip(
     that between right and left; ``segment_shape`` that of the linear map of the shape; ``com`` the sd of the CoM shift
     in units of the body's own spread along each axis.
     """
-    table = _FEMALE if subject.sex == "F" else _MALE
+    table = virtual_people()["segments"][subject.sex]
     rng = stream(seed, "flesh")
     factor = {kind: np.exp(tolerances.segment_mass * rng.normal()) for kind in table}
     if population is not None:

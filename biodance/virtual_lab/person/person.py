@@ -11,14 +11,14 @@ from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Array, Sip, Subject, freeze
 from biodance.virtual_lab.person.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
-from biodance.virtual_lab.person.placement import glue_markers
 from biodance.virtual_lab.person.skeleton import (
-    LIMITS_DEGREES,
     TRUE_SEGMENTS,
     Proportions,
     build_joints,
     draw_proportions,
+    glue_markers,
     on_side,
+    virtual_people,
 )
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
 
@@ -83,9 +83,7 @@ class Person:
         return float(self.loaded_body.sip.mass.sum())
 
     def with_markers_moved(self, shifts: Mapping[str, Array]) -> "Person":
-        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames; UnknownName
-        lists the labels.
-        """
+        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames."""
         markers = self.body.markers
         position = np.array(markers.position)
         for label, shift in shifts.items():
@@ -122,7 +120,8 @@ def make_person(
     size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(size, subject, seed, tolerances=t, population=population)
     joints = build_joints(size)
-    lower, upper = np.radians([LIMITS_DEGREES[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
+    ranges = virtual_people()["range_deg"]
+    lower, upper = np.radians([ranges[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
     limits = JointLimits(
         lower, upper, np.full(len(joints), 15.0), np.full(len(joints), -400.0), np.full(len(joints), 400.0)
     )
@@ -162,9 +161,7 @@ def _box(phi: Array) -> Array:
 
 
 def _sole(size: Proportions, side: str) -> Foot:
-    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (mesh of Millard et al.
-    2017).
-    """
+    """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (Millard et al. 2017)."""
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
     corners = [
         (back, 0.6 * half),

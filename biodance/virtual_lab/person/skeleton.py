@@ -1,41 +1,36 @@
-"""The true size and skeleton of a virtual person: 16 segments, 39 joint angles - more than any model that reads the
-recording has.
+"""The true size and skeleton of a virtual person, 16 segments, 39 joint angles - more than any model that reads the
+recording has -, and where its 39 plug-in-gait markers are glued, with an error per session.
+
+Places of markers: means of the static trials of nine adults in public recordings, moved from the 12 segments of the
+reading model to the true ones. Wands (THI, TIB, UPA, FRM) sit at a different height on each side, as the guide of the
+marker set asks.
 """
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from biodance.body.parts import Joint
+from biodance.body.parts import Joint, SegmentMarkers
+from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array, Subject
 from biodance.virtual_lab.tolerances import stream
 
-_FEMALE = {"thigh": 0.2354, "shank": 0.2410, "pelvis": 0.0640, "lumbar": 0.0776, "thorax": 0.2000, "head": 0.1509}
-_MALE = {"thigh": 0.2441, "shank": 0.2446, "pelvis": 0.0525, "lumbar": 0.0853, "thorax": 0.1887, "head": 0.1571}
-FEMALE_ARM = {"upper_arm": 0.1559, "forearm": 0.1534, "hand": 0.0441}
-MALE_ARM = {"upper_arm": 0.1565, "forearm": 0.1599, "hand": 0.0452}
-BREADTHS = {
-    "ankle_height": 0.039,
-    "foot": 0.0755,
-    "sole": 0.152,
-    "sole_breadth": 0.055,
-    "hips": 0.100,
-    "asis": 0.130,
-    "shoulders": 0.185,
-    "shoulder_drop": 0.048,
-    "knee_width": 0.060,
-    "ankle_width": 0.041,
-    "elbow_width": 0.040,
-    "wrist_width": 0.033,
-    "hand_thickness": 0.016,
-}
+
+@cache
+def virtual_people() -> dict[str, Any]:
+    """Return what is true of the people of the virtual laboratory: ``anthropometry/virtual/people.toml``."""
+    return read_toml(locate("anthropometry/virtual", "people"))
+
+
 UPRIGHT_CHAIN = ("ankle_height", "shank", "thigh", "pelvis", "lumbar", "thorax", "head")
 
 
 @dataclass(frozen=True)
 class Proportions:
-    """``size`` m by name (the keys of this module's tables); ``centre_shift`` (16, 3) m moves the joint centres off the
-    ideal anatomy, ``axis_tilt`` (16, 3) rad turns the joint axes off it; rows in the order of ``skeleton.SEGMENTS``.
+    """``size`` m by name (the keys of `virtual_people`); ``centre_shift`` (16, 3) m moves the joint centres off the
+    ideal anatomy, ``axis_tilt`` (16, 3) rad turns the joint axes off it; rows in the order of `TRUE_SEGMENTS`.
     """
 
     size: dict[str, float]
@@ -54,8 +49,7 @@ def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd
     centres and axes.
     """
     rng = stream(seed, "proportions")
-    female = subject.sex == "F"
-    mean = (_FEMALE if female else _MALE) | (FEMALE_ARM if female else MALE_ARM) | BREADTHS
+    mean = virtual_people()["lengths"][subject.sex] | virtual_people()["breadths"]
     size = {name: fraction * subject.stature * (1 + length_sd * rng.normal()) for name, fraction in mean.items()}
     stretch = subject.stature / sum(size[name] for name in UPRIGHT_CHAIN)
     size |= {name: size[name] * stretch for name in UPRIGHT_CHAIN} | {"stature": subject.stature}
@@ -63,44 +57,8 @@ def draw_proportions(subject: Subject, seed: int, *, length_sd: float, centre_sd
 
 
 ARM_AND_LEG = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-TRUE_SEGMENTS = (
-    "pelvis",
-    "lumbar",
-    "thorax",
-    "head",
-    *(f"{side}_{part}" for side in SIDES for part in ARM_AND_LEG),
-)
+TRUE_SEGMENTS = ("pelvis", "lumbar", "thorax", "head", *(f"{side}_{part}" for side in SIDES for part in ARM_AND_LEG))
 _X, _Y, _Z = np.eye(3)
-
-LIMITS_DEGREES = {
-    "hip_flexion": (-25, 125),
-    "hip_adduction": (-45, 30),
-    "hip_rotation": (-45, 45),
-    "knee_flexion": (0, 145),
-    "ankle_dorsiflexion": (-50, 38),
-    "ankle_inversion": (-25, 35),
-    "lumbar_flexion": (-25, 80),
-    "lumbar_bending": (-35, 35),
-    "lumbar_rotation": (-40, 40),
-    "thorax_flexion": (-20, 35),
-    "thorax_bending": (-20, 20),
-    "thorax_rotation": (-25, 25),
-    "neck_flexion": (-60, 60),
-    "neck_bending": (-45, 45),
-    "neck_rotation": (-75, 75),
-    "clavicle_elevation": (-10, 30),
-    "clavicle_protraction": (-20, 25),
-    "shoulder_flexion": (-50, 170),
-    "shoulder_adduction": (-165, 35),
-    "shoulder_rotation": (-85, 75),
-    "elbow_flexion": (0, 145),
-    "forearm_pronation": (-10, 170),
-    "wrist_flexion": (-70, 80),
-    "wrist_deviation": (-25, 40),
-}
-"""Hard anatomical ranges, young adults (Norkin & White, AAOS/AMA tables); dorsiflexion as in the weight-bearing
-lunge.
-"""
 
 TrueChain = tuple[tuple[str, Array], ...]
 ROTATIONS: dict[str, TrueChain] = {
@@ -134,14 +92,12 @@ def small_rotation(vector: Array) -> Array:
 class _Builder:
     """Collects the joints of a skeleton in topological order."""
 
-    def __init__(self, proportions: Proportions) -> None:
-        self.proportions = proportions
+    def __init__(self, size: Proportions) -> None:
+        self.size = size
         self.joints: list[Joint] = []
 
     def add(self, joint: str, segment: str, parent: int, place: Array, *, side: str = "") -> int:
-        """Append one anatomical joint (a chain of rotations) at ``place`` (3,) m in the parent's frame; return its
-        last index.
-        """
+        """Append one anatomical joint (rotations in turn) at ``place`` (3,) m in the parent's; return its index."""
         rotations = ROTATIONS[joint]
         row = TRUE_SEGMENTS.index(segment) if segment else -1
         for k, (motion, axis) in enumerate(rotations):
@@ -150,8 +106,8 @@ class _Builder:
             if k == 0:
                 shift = np.array(place)
                 if segment:
-                    shift = shift + self.proportions.centre_shift[row]
-                    turn = small_rotation(self.proportions.axis_tilt[row])
+                    shift = shift + self.size.centre_shift[row]
+                    turn = small_rotation(self.size.axis_tilt[row])
             name = f"{side}_{joint}_{motion}" if side else f"{joint}_{motion}"
             carried = row if k == len(rotations) - 1 and segment else -1
             self.joints.append(Joint(name, parent, axis, turn, shift, carried))
@@ -178,3 +134,85 @@ def build_joints(size: Proportions) -> tuple[Joint, ...]:
         forearm = build.add("forearm", f"{side}_forearm", elbow, np.zeros(3), side=side)
         build.add("wrist", f"{side}_hand", forearm, -size["forearm"] * _Y, side=side)
     return tuple(build.joints)
+
+
+MARKER_RADIUS = 0.007
+"""m; 14 mm markers, the plug-in-gait default."""
+SKIN_PLANE = np.array([1.0, 1.0, 0.35])
+"""Placement errors are along the skin; through it (z of the limbs' lateral markers) bone holds the marker."""
+
+Place = tuple[str, tuple[float, float, float]]
+
+
+def _paired(size: Proportions) -> dict[str, Place]:
+    """Return the places (segment, (3,) m) of the markers that exist on both sides, for the right side."""
+    s = size["stature"]
+    shoulder = size["thorax"] - size["shoulder_drop"]
+    r = MARKER_RADIUS
+    return {
+        "ASI": ("pelvis", (0.026 * s, 0.054 * s, size["asis"] / 2)),
+        "PSI": ("pelvis", (-0.073 * s, 0.053 * s, 0.0294 * s)),
+        "THI": ("thigh", (0.0, -0.66 * size["thigh"], 0.048 * s)),
+        "KNE": ("thigh", (0.0, -size["thigh"], size["knee_width"] / 2 + r)),
+        "TIB": ("shank", (0.0, -0.50 * size["shank"], 0.036 * s)),
+        "ANK": ("shank", (0.0, -size["shank"], size["ankle_width"] / 2 + r)),
+        "HEE": ("foot", (-0.0308 * s, -0.0191 * s, 0.0027 * s)),
+        "TOE": ("foot", (0.0902 * s, -0.0200 * s, 0.0027 * s)),
+        "FHD": ("head", (0.070 * s, 0.102 * s, 0.0315 * s)),
+        "BHD": ("head", (-0.015 * s, 0.090 * s, 0.0400 * s)),
+        "SHO": ("thorax", (-0.005 * s, shoulder + 0.0335 * s, size["shoulders"] / 2 - 0.004 * s)),
+        "UPA": ("upper_arm", (-0.004 * s, -0.60 * size["upper_arm"], 0.029 * s)),
+        "ELB": ("upper_arm", (0.0, -size["upper_arm"], size["elbow_width"] / 2 + r)),
+        "FRM": ("forearm", (-0.022 * s, -0.50 * size["forearm"], 0.012 * s)),
+        "WRA": ("forearm", (-0.012 * s, -0.99 * size["forearm"], 0.021 * s)),
+        "WRB": ("forearm", (-0.012 * s, -0.98 * size["forearm"], -0.021 * s)),
+        "FIN": ("hand", (-0.016 * s, -0.95 * size["hand"], 0.004 * s)),
+    }
+
+
+def _single(size: Proportions) -> dict[str, Place]:
+    """Return the places of the markers on the midline and of RBAK."""
+    s = size["stature"]
+    shoulder = size["thorax"] - size["shoulder_drop"]
+    return {
+        "C7": ("thorax", (-0.034 * s, shoulder + 0.046 * s, 0.0)),
+        "T10": ("thorax", (-0.058 * s, shoulder - 0.106 * s, 0.0)),
+        "CLAV": ("thorax", (0.041 * s, shoulder + 0.004 * s, 0.0)),
+        "STRN": ("thorax", (0.066 * s, shoulder - 0.088 * s, 0.0)),
+        "RBAK": ("thorax", (-0.064 * s, shoulder - 0.022 * s, 0.060 * s)),
+    }
+
+
+WAND_RISE = {"THI": 0.06, "TIB": 0.05, "UPA": 0.04, "FRM": 0.03}
+"""Right wands higher, left wands lower than the mean by this fraction of the segment's length."""
+
+
+def ideal_places(size: Proportions) -> tuple[tuple[str, ...], tuple[int, ...], Array]:
+    """Return the labels (39), their true segments (39) and their ideal places (39, 3) m in the segment frames."""
+    names: list[str] = []
+    segments: list[int] = []
+    places: list[Array] = []
+    for side, letter in (("right", "R"), ("left", "L")):
+        for stem, (kind, place) in _paired(size).items():
+            point = np.array(place)
+            if stem in WAND_RISE:
+                point[1] += WAND_RISE[stem] * size[kind] * (1.0 if side == "right" else -1.0)
+            names.append(letter + stem)
+            segments.append(TRUE_SEGMENTS.index(kind if kind in TRUE_SEGMENTS else f"{side}_{kind}"))
+            places.append(on_side(point, side))
+    for name, (kind, place) in _single(size).items():
+        names.append(name)
+        segments.append(TRUE_SEGMENTS.index(kind))
+        places.append(np.array(place))
+    return tuple(names), tuple(segments), np.array(places)
+
+
+def glue_markers(size: Proportions, person_seed: int, session_seed: int, *, error: float) -> SegmentMarkers:
+    """Return the markers as glued in one session.
+
+    ``error`` m per axis: half of the variance belongs to the person (bony landmarks differ), half to the day.
+    """
+    names, segments, places = ideal_places(size)
+    person, day = stream(person_seed, "anatomy of landmarks"), stream(person_seed, "placement", str(session_seed))
+    shift = np.sqrt(0.5) * (person.normal(size=places.shape) + day.normal(size=places.shape))
+    return SegmentMarkers(names, segments, places + error * SKIN_PLANE * shift, np.ones(len(names)))

@@ -1,6 +1,4 @@
-"""What the cameras record: marker trajectories with skin and fat between bone and marker, noise, gaps, in the lab's
-own axes.
-"""
+"""What the cameras record: markers with skin and fat between them and the bone, noise, gaps, in the lab's axes."""
 
 from dataclasses import dataclass
 
@@ -12,24 +10,9 @@ from biodance.records import SIDES, Array, Markers
 from biodance.virtual_lab.movement.performance import Performance
 from biodance.virtual_lab.movement.protocol import STAND
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS
+from biodance.virtual_lab.person.skeleton import ARM_AND_LEG, TRUE_SEGMENTS, virtual_people
 from biodance.virtual_lab.tolerances import LabTolerances, smooth_noise, stream
 
-PULL: dict[str, dict[str, float]] = {
-    "pelvis": {"right_hip_flexion": 4, "left_hip_flexion": 4, "lumbar_flexion": 4},
-    "lumbar": {},
-    "thorax": {"lumbar_flexion": 5, "lumbar_rotation": 5, "right_shoulder_adduction": 4, "left_shoulder_adduction": 4},
-    "head": {"neck_flexion": 3},
-    "thigh": {"hip_flexion": 11, "hip_rotation": 8, "knee_flexion": 11},
-    "shank": {"knee_flexion": 7, "ankle_dorsiflexion": 8},
-    "foot": {"ankle_dorsiflexion": 5},
-    "upper_arm": {"shoulder_flexion": 7, "shoulder_adduction": 7, "elbow_flexion": 6},
-    "forearm": {"elbow_flexion": 5, "forearm_pronation": 7},
-    "hand": {"wrist_flexion": 4},
-}
-"""mm per rad, rms length of the pull of each joint on a marker: a deep squat moves thigh markers 18 mm, shank markers 8
-mm (Lahkar 2021; thigh and shank in gait 18 and 17 mm, PMC8631460; back 9-10 mm, Zemp 2014; foot < 9 mm).
-"""
 SHOULDER_PULL = {"shoulder_flexion": 12.0, "shoulder_adduction": 12.0}
 """mm per rad for SHO and RBAK: the shoulder blade slides on the thorax."""
 SWING = {"THI": 9.0, "UPA": 10.0, "TIB": 12.0, "FRM": 14.0}
@@ -73,7 +56,7 @@ def draw_soft_tissue(person: Person, session: int, tolerances: LabTolerances, ti
     swing = np.zeros(len(markers.names))
     for k, (name, segment) in enumerate(zip(markers.names, markers.segment, strict=True)):
         kind, side = _kind_and_side(TRUE_SEGMENTS[segment], name)
-        pulls = dict(PULL[kind])
+        pulls = dict(virtual_people()["pull_mm_rad"][kind])
         if name.endswith(("SHO", "BAK")):
             pulls |= SHOULDER_PULL
         for joint, millimetres in pulls.items():
@@ -107,9 +90,7 @@ def _kind_and_side(segment: str, marker: str) -> tuple[str, str]:
 
 
 def reference_angles(person: Person) -> Array:
-    """Return the true joint angles (39,) rad of the posture in which the markers were glued: upright, arms slightly
-    away.
-    """
+    """Return the true joint angles (39,) rad in which the markers were glued: upright, arms slightly away."""
     angles = dict(person.habits.angles)
     for side in SIDES:
         flexion, adduction, rotation, elbow = np.radians(STAND.values[f"{side}_arm"])
@@ -151,9 +132,7 @@ LONGEST_GAP, SHORTEST_GAP = 0.30, 0.05
 
 
 def true_markers(performance: Performance, tissue: SoftTissue, time: Array, rng: np.random.Generator) -> Array:
-    """Return the true marker positions (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what the skin adds;
-    true vertical.
-    """
+    """Return the true markers (T, K, 3) m at ``time`` (T,) s: fixed to the bone, plus what skin adds; true vertical."""
     from scipy.interpolate import make_interp_spline
 
     person = performance.person

@@ -13,8 +13,7 @@ from biodance.virtual_lab.movement.gait import perform_gait
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance, perform
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.person.placement import MARKER_RADIUS
-from biodance.virtual_lab.person.skeleton import small_rotation
+from biodance.virtual_lab.person.skeleton import MARKER_RADIUS, small_rotation
 from biodance.virtual_lab.recording.cameras import TISSUES, SoftTissue, draw_soft_tissue, film
 from biodance.virtual_lab.recording.plates import HALF_BELT, HALF_SIZE, TruePlate, digitise, lay_plate, sense_plate
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
@@ -141,9 +140,7 @@ FIRST_VISIT = LabVisit()
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """What is true of a visit's instruments: plates, the cameras' ``tilt`` (3, 3) from true vertical, the skin under
-    the markers.
-    """
+    """What is true of a visit's instruments: plates, ``tilt`` (3, 3) of the cameras, the skin under the markers."""
 
     visit: LabVisit
     plates: tuple[TruePlate, ...]
@@ -189,9 +186,7 @@ def _places(laboratory: Laboratory) -> list[tuple[str, Array, Array]]:
 
 
 def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Performance:
-    """Let the person perform one trial where the laboratory's plates are, with the forces and the moved markers of
-    the visit.
-    """
+    """Let the person perform one trial where the plates are, with the visit's forces and moved markers."""
     visit = instruments.visit
     lab = visit.laboratory
     if plan.role != "static":
@@ -204,9 +199,7 @@ def perform_in(instruments: Instruments, person: Person, plan: TrialPlan) -> Per
 
 
 def record(performance: Performance, instruments: Instruments) -> Recording:
-    """Return what the instruments deliver of one performance: markers at the camera rate, plates at ``samples``
-    times that rate.
-    """
+    """Return what the instruments deliver: markers at the camera rate, plates at ``samples`` times that rate."""
     visit, plan, seed = instruments.visit, performance.plan, performance.person.seed
     lab, tolerances, session = visit.laboratory, visit.tolerances, visit.number
     frames = round(plan.duration * lab.camera_rate) + 1
@@ -239,9 +232,7 @@ def record(performance: Performance, instruments: Instruments) -> Recording:
 def measurements(
     person: Person, session: int, tolerances: LabTolerances
 ) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
-    """Return the C3D groups with the subject's typed measurements, as Vicon stores them (mm, kg), with errors of
-    tape and calliper.
-    """
+    """Return the C3D groups with the subject's typed measurements as Vicon stores them (mm, kg), errors included."""
     rng = stream(person.seed, "measurements", str(session))
     size = person.size
     sided = {

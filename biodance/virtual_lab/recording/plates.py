@@ -36,9 +36,7 @@ CALIBRATION = (
     )
     * 50.0
 )
-"""(6, 6) N/V and N·m/V: the sheet of a real AMTI unit (pounds, pound-inches per microvolt and volt) at gain 2000 and
-10 V excitation.
-"""
+"""(6, 6) N/V, N·m/V: the sheet of a real AMTI unit (lb, lb·in per microvolt and volt), gain 2000, 10 V excitation."""
 FULL_SCALE = 10.0 * np.diag(CALIBRATION)
 """(6,) N, N·m at 10 V: 1450, 1450, 5710, 728, 574, 309."""
 
@@ -119,9 +117,7 @@ def sense_plate(
 
 
 def digitise(channels: Array, plate: TruePlate, *, kind: int, bits: int) -> PlateRecording:
-    """Return channels (S, 6) N, N·m as the converter stores them: ``bits`` over ±10 V, ``kind`` TYPE 2 or, in volts,
-    TYPE 4.
-    """
+    """Return channels (S, 6) N, N·m as the converter stores them: ``bits`` over ±10 V, TYPE 2 or, in volts, 4."""
     calibration = CALIBRATION if kind == 4 else np.diag(FULL_SCALE / 10.0)
     step = 20.0 / 2**bits
     volts = np.clip(np.round(channels @ np.linalg.inv(calibration).T / step) * step, -10.0, 10.0)
