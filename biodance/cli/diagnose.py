@@ -39,7 +39,7 @@ def foresee_command(
     Parameters
     ----------
     dance
-        The dance.npz written by `biodance dance`.
+        The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document

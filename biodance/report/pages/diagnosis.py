@@ -201,7 +201,10 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from markupsafe import Markup
 
     one = found.diagnosis
-    unseen = [(row, size_seen(vars(row), "limit")) for row in one.unobservable]
+    witnesses = _witnesses(one.witnesses)
+    witnessed = {(row.effect, row.target) for row in witnesses["seen"]} if witnesses else set()
+    blind = [row for row in one.unobservable if (row.effect, row.target) not in witnessed]
+    unseen = [(row, size_seen(vars(row), "limit")) for row in blind]
     masses, made = [], f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     if found.before and found.accepted:
         then, now = (
@@ -236,7 +239,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         adequacy=Markup(adequacy_table(one.adequacy)) if one.adequacy else "",
         limits=Markup(limits_figure(one.limits)) if one.limits else "",
         gain=found.gain,
-        witnesses=_witnesses(one.witnesses),
+        witnesses=witnesses,
     )
 
 
