@@ -91,7 +91,12 @@ def test_standing_still_has_no_correlation_on_the_page():
 
 def test_a_doubt_about_a_load_points_to_the_cause_that_was_found():
     heavy = Check(
-        "mass on the plates against declared", "static", "5.6 %", "at most 2 %", False, "Weigh again, or check the zero."
+        "mass on the plates against declared",
+        "static",
+        "5.6 %",
+        "at most 2 %",
+        False,
+        "Weigh again, or check the zero.",
     )
     doubt = f"{heavy.what}, static: 5.6 % (at most 2 %). {heavy.advice}"
     result = session_result()
@@ -102,7 +107,9 @@ def test_a_doubt_about_a_load_points_to_the_cause_that_was_found():
     assert "5.6 % (at most 2 %). Plate gain Fz, which was found, may explain it." in told
     assert "Weigh again" not in told
     assert "Markers are far." in told
-    assert "which was found" not in say_load(as_diagnosed(session, replace(NOTHING, findings=(OWN,))).identification.search)
+    assert "which was found" not in say_load(
+        as_diagnosed(session, replace(NOTHING, findings=(OWN,))).identification.search
+    )
 
 
 def test_pelvis_markers_lean_backwards_by_a_positive_angle():
