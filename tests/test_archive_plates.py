@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from biodance.diagnosis.archive.walking import StepRow, places
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, read_index, read_plate_text, visit_date
 from biodance.pipeline.plates import judge_plates
+from biodance.report.pages.plates import QUANTITY_TITLES, plate_figure
 
 WEIGHT = 600.0
 
@@ -123,7 +125,22 @@ def test_a_pad_that_was_not_zeroed_is_named_in_everybody(balance, tmp_path, caps
     assert float(rows[0]["offset_x_n"]) == pytest.approx(5.0, abs=0.2)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "was not zeroed" in page
+    assert 'counter(page) " of "' in page
+    assert not re.search(r"[+−]0\.0+ N<", page)
     assert run(["plates", str(balance), "--out", str(tmp_path / "out")]) == 2
+
+
+def test_plates_are_drawn_in_two_columns_without_what_never_differs():
+    histories = judge(draw(20)).histories
+    zero = next(one for one in histories if one.series.quantity == "offset_z")
+    zero = replace(zero, series=replace(zero.series, value=0.0 * zero.series.value))
+    others = [one for one in histories if one.series.quantity in ("place_x", "place_y", "delay")]
+    drawn = plate_figure("plate1", (*others, zero))
+    titles = {axes.get_ylabel().partition("\n")[0] for axes in drawn.axes}
+    assert titles == {QUANTITY_TITLES[one.series.quantity] for one in others}
+    assert len(titles) == 3
+    assert len({axes.get_subplotspec().colspan.start for axes in drawn.axes}) == 2
+    assert len(plate_figure("plate1", (zero,)).axes) == 1
 
 
 def test_the_index_knows_conditions_and_leaves_out_what_is_not_there(balance):

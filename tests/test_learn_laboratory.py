@@ -12,7 +12,13 @@ from biodance.diagnosis.learning import Null, learn_tolerances, shown_by
 from biodance.errors import SessionRefused
 from biodance.lab.session.read import read_session
 from biodance.pipeline.lab_file import read_lab
-from biodance.pipeline.learn import LearnedLaboratory, LearnedSession, learned_session, learned_together
+from biodance.pipeline.learn import (
+    LearnedLaboratory,
+    LearnedSession,
+    learn_laboratory,
+    learned_session,
+    learned_together,
+)
 from biodance.pipeline.session import examine
 from biodance.report.laboratory import lab_file_text, write_lab_file
 from biodance.uncertainty.tolerances import InstrumentNoise, shipped
@@ -92,6 +98,27 @@ def test_too_few_sessions_teach_nothing(laboratory, tmp_path, capsys):
     (tmp_path / "there.toml").write_text("mine")
     assert run(["learn", str(tmp_path), "--out", str(tmp_path / "there.toml")]) == 2
     assert "never overwritten" in capsys.readouterr().err
+
+
+def test_recordings_beside_the_sessions_are_no_session_and_a_missing_folder_is_told_at_once(
+    tmp_path, monkeypatch, capsys
+):
+    for name in ("A", "B", "C"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "walk.c3d").write_bytes(b"P")
+    (tmp_path / "stray.c3d").write_bytes(b"P")
+    seen = []
+    with pytest.raises(SessionRefused, match="0 of 3 sessions can be learned from"):
+        learn_laboratory(tmp_path, tell=seen.append)
+    assert any("beside the session folders" in one for one in seen)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SessionRefused, match="0 of 3 sessions"):
+        learn_laboratory(".")
+    with pytest.raises(SessionRefused, match="holds 1 session"):
+        learn_laboratory("A")
+    monkeypatch.setattr("biodance.pipeline.learn.learn_laboratory", None)  # no work before the check
+    assert run(["learn", ".", "--out", "nowhere/lab.toml"]) == 2
+    assert "nowhere: there is no such folder" in capsys.readouterr().err
 
 
 def test_norms_are_medians_of_sessions_pooled():

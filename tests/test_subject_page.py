@@ -1,8 +1,10 @@
 """The subject's page: short words, ranges first, and no mass where a check failed."""
 
 import re
+from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 import pytest
 from identified_sessions import session_result
@@ -64,6 +66,17 @@ def test_the_measure_of_reading_tells_plain_from_learned():
     assert syllables("plates") == 1
     assert grade("<p>The cat sat on the mat. It was warm.</p>") < 2
     assert grade("<p>Segmental inertial parameters necessitate careful probabilistic interpretation.</p>") > 12
+
+
+def test_a_phone_gets_a_picture_with_letters_that_can_be_read(result):
+    html = subject_page(account_for(result))
+    small, wide = (
+        ElementTree.fromstring(b64decode(address))
+        for address in re.findall(r'(?:srcset|src)="data:image/svg\+xml;base64,([^"]+)"', html)
+    )
+    for drawing, shown, least in ((small, 364, 11.0), (wide, 736, 11.0)):
+        assert float(drawing.get("font-size")) * shown / float(drawing.get("width")) > least
+    assert len(list(small.iter("{http://www.w3.org/2000/svg}text"))) == len(PLAIN_NAMES)
 
 
 def test_every_part_has_a_range_or_an_honest_word(result):

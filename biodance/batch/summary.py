@@ -147,17 +147,19 @@ def _page(
 
     from biodance.pipeline.provenance import now
     from biodance.report.figures.style import svg_address
-    from biodance.report.pages.template import render, template_text
+    from biodance.report.pages.template import print_sheet, render, template_text
+    from biodance.report.wording import moment, signed
     from biodance.version import __version__
 
-    drawn = _figure(table)
+    drawn, made = _figure(table), now()
     first = table.drop_duplicates("session").set_index("session")
     return render(
         "archive.html.j2",
-        style=Markup(template_text("page.css")),
+        filters={"signed": signed},
+        style=Markup(template_text("page.css") + print_sheet(name, {}, f"biodance {__version__}, {moment(made)}")),
         name=name,
         version=__version__,
-        created=now(),
+        created=made,
         outcomes=outcomes,
         unread=[one for one in outcomes if one.unread],
         counts={

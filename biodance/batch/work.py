@@ -174,7 +174,7 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     """Return status, reason and rows of a session that goes through."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed
-    from biodance.pipeline.load import with_weighed_load
+    from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine
     from biodance.report.write import write_report
@@ -182,7 +182,7 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
 
     result = examine(read_session(task.session, settings=assignments(task.chosen), tell=tell), tell=tell)
     found = diagnosed(result, tell=tell)
-    result = with_weighed_load(result, found.diagnosis) if found else result
+    result = as_diagnosed(result, found.diagnosis) if found else result
     tell("writing")
     document = write_report(result, folder, diagnosis=found, movement=session_movement(result), drawn=task.pages)
     first = document["attention"][0]["text"] if document["attention"] else ""

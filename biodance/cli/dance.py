@@ -138,7 +138,7 @@ def play_command(
     Parameters
     ----------
     dance
-        The dance.npz written by `biodance dance`.
+        The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.dance.dance import Dance
     from biodance.dance.rehearsal import rehearse

@@ -39,7 +39,7 @@ def foresee_command(
     Parameters
     ----------
     dance
-        The dance.npz written by `biodance dance`.
+        The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
@@ -92,7 +92,7 @@ def diagnose_command(
     from biodance.pipeline.accepted import write_mended
     from biodance.pipeline.attention import is_well
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.load import with_weighed_load
+    from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
     from biodance.report.terminal import print_diagnosis
     from biodance.report.write import write_diagnosis
@@ -104,7 +104,7 @@ def diagnose_command(
         if found.mended is not None:
             write_mended(result.session, found.mended.session, folder)
             result = found.mended
-        result = with_weighed_load(result, found.diagnosis)
+        result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tabled(result, place, found.diagnosis, movement=moved)

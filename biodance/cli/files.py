@@ -177,9 +177,12 @@ def export_command(
     source
         Session folder; results folder of `biodance identify`; or hoap3, the built-in robot model.
     """
+    from biodance.pipeline.export import FOLDERS, replaceable
     from biodance.pipeline.export import export as write
-    from biodance.pipeline.export import replaceable
+    from biodance.report.files import refuse_page
 
+    if format not in FOLDERS:
+        refuse_page(out, force=force)
     with progress() as tell, replaceable(out, force=force) as place:
         _, sentence = write(
             source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell

@@ -43,7 +43,7 @@ def report_session(
     """
     from biodance.pipeline.diagnosis import diagnosed
     from biodance.pipeline.lab_file import read_lab
-    from biodance.pipeline.load import with_weighed_load
+    from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
@@ -55,7 +55,7 @@ def report_session(
         found = None if stopped else diagnosed(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
-    result = with_weighed_load(result, found.diagnosis) if found else result
+    result = as_diagnosed(result, found.diagnosis) if found else result
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None, movement=moved)
     if for_subject:

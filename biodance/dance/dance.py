@@ -29,6 +29,7 @@ from biodance.threads import Sendable
 if TYPE_CHECKING:
     import pandas as pd
 
+_GIVE = "Give the dance.npz that biodance dance wrote, or its folder."
 _VERSION = 1
 _PERSON = ("mass", "stature", "sex", "age")
 """What is kept of the person for whom a dance was designed; an unknown age is not."""
@@ -275,7 +276,7 @@ class Dance(Sendable):
             more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored")}
             return cls(words["protocol"], body, seed=words["seed"], subject=who, **more, **feet, **arrays)
         except OSError as error:
-            raise FileRefused(f"{path}: cannot be read ({error.strerror or error}).") from error
+            raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). {_GIVE}") from error
         except FileRefused:
             raise
         except (BadZipFile, EOFError, ValueError, KeyError, TypeError) as error:

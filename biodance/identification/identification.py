@@ -284,12 +284,14 @@ def conclude(
 def _notes(known: tuple[Known, ...], fit: PhysicalFit) -> tuple[str, ...]:
     notes = []
     lost = [
-        f"{k.segment} {k.quantity}" for k in known if k.verdict == "cannot be known" and not k.quantity.startswith("I")
+        f"{k.segment.replace('_', ' ')} {k.quantity}"
+        for k in known
+        if k.verdict == "cannot be known" and not k.quantity.startswith("I")
     ]
     if lost:
         notes.append(f"Cannot be known from this session (the table's value stands): {', '.join(lost)}.")
     notes += [str(together) for together in known_together(fit.sip)]
-    moved = [name for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
+    moved = [name.replace("_", " ") for name, acts in zip(fit.sip.segments, fit.moved, strict=True) if acts]
     if moved:
         notes.append(f"At the edge of what a body can be: {', '.join(moved)}.")
     return tuple(notes)

@@ -133,7 +133,7 @@ class Together:
     first_sd: float
 
     def __str__(self) -> str:
-        first, *rest = self.segments
+        first, *rest = (name.replace("_", " ") for name in self.segments)
         return (
             f"{first} and {' and '.join(rest)} are known together, not apart: {self.mass:.1f} ± {SIGMAS * self.sd:.1f} "
             f"kg, of which {first} {self.first:.1f} ± {SIGMAS * self.first_sd:.1f} kg (mass at a joint belongs to "

@@ -13,7 +13,7 @@ from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import Gate
 from biodance.identification.load_words import size_and_segments
-from biodance.pipeline.finding_words import LOAD, alternatives_in_words, cause_of, in_words, listed
+from biodance.pipeline.finding_words import LOAD, alternatives_in_words, cause_of, explained, in_words, listed
 from biodance.pipeline.judged_trials import TOO_SHORT
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
@@ -180,7 +180,7 @@ def identified_attention(result: SessionResult, checks: Sequence[Gate]) -> tuple
 def _checked(check: Check, findings: Sequence[Finding]) -> Attention:
     """Return a check outside its limit as a sentence, with the finding that may explain it instead of advice."""
     cause = cause_of(check.what, findings)
-    then = f"{cause}, which was found, may explain it." if cause else check.advice
+    then = explained(cause) if cause else check.advice
     text = f"{check.value}{LIMIT_TOLD}{check.limit}. {then[:1].upper()}{then[1:]}".strip()
     return Attention("note" if cause else "warn", text, check.where, check.what)
 

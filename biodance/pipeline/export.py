@@ -31,7 +31,7 @@ _NO_TRIAL = (
 )
 MOTION_FORMATS = ("trc", "mot", "c3d", "opensim", "bids", "rerun")
 """Formats that need a recording beside the body."""
-_SEVERAL = ("opensim", "bids")
+FOLDERS = ("opensim", "bids")
 """Those of them that hold several trials."""
 
 
@@ -185,7 +185,7 @@ def _of_kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, st
     if trial is not None and trial not in names:
         raise UnknownName.of(f"trial in {folder}", trial, names)
     chosen = names if trial is None else (trial,)
-    if target.format not in _SEVERAL and len(chosen) != 1:
+    if target.format not in FOLDERS and len(chosen) != 1:
         raise TrialRefused(f"{folder}: holds the trials {', '.join(names)}. Choose one with --trial.")
     if target.format == "mot":
         return target.coordinates(kept.body, kept.motions[chosen[0]], chosen[0])
@@ -205,7 +205,7 @@ def _of_result(result: SessionResult, trial: str | None, target: _Target) -> tup
     body, words = body_of_result(result)
     if target.format not in MOTION_FORMATS:
         return target.body(body, words)
-    if target.format not in _SEVERAL:
+    if target.format not in FOLDERS:
         trial = _chosen(result.session, trial).name
     chosen = result.trials if trial is None else (result[trial],)
     return target.trials(replace(result.session, trials=tuple(one.trial for one in chosen)), chosen, body, words)

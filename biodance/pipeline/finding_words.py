@@ -78,6 +78,11 @@ def cause_of(checked: str, findings: Sequence[Finding]) -> str:
     return f"{cause_in_words(found.effect, found.target)}{_elsewhere(found)}" if found else ""
 
 
+def explained(cause: str) -> str:
+    """Return the sentence that points from a check or a doubt to a cause (`cause_of`) that was found."""
+    return f"{cause[:1].upper()}{cause[1:]}, which was found, may explain it."
+
+
 def listed(names: Sequence[str]) -> str:
     """Return names as a list in words, the fourth and later ones counted only."""
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

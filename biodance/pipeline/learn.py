@@ -23,6 +23,7 @@ from biodance.effects import gates
 from biodance.errors import SessionRefused
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
+from biodance.lab.session.recordings import recordings_in
 from biodance.pipeline.judged_trials import cases_of, chosen_looks
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
@@ -91,6 +92,9 @@ class LearnedLaboratory:
         return display.card(repr(self), None, tuple(f"{name}: {why}" for name, why in self.left_out.items()))
 
 
+_BESIDE = "recordings beside the session folders belong to none of them and are left out"
+
+
 def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> LearnedLaboratory:
     """Return the tolerances and norms of a laboratory, from all its sessions without fault.
 
@@ -128,7 +132,11 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
     """
     folder = Path(archive)
     found, left_out = [], {}
-    sessions = archive_folders(folder)[0]
+    sessions = [path for path in archive_folders(folder)[0] if path != folder]
+    if not sessions:
+        sessions = [folder]
+    elif recordings_in(folder):
+        tell(f"{folder.resolve().name}: {_BESIDE}")
     if len(sessions) < FEWEST:
         held = f"{len(sessions)} session{'s' * (len(sessions) != 1)}"
         raise SessionRefused(f"{folder}: holds {held}, at least {FEWEST} are needed to learn from.")

@@ -9,8 +9,13 @@ from biodance.diagnosis.witness_inference import UNPLACED_LOAD
 from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.checks import load_doubts
-from biodance.pipeline.finding_words import CAUSES_OF_WEIGHT, LOAD
+from biodance.pipeline.finding_words import CAUSES_OF_WEIGHT, LOAD, cause_of, explained
 from biodance.pipeline.results import SessionResult
+
+
+def as_diagnosed(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
+    """Return the session with what the ``diagnosis`` says of its load: told where it may be, else why not."""
+    return with_causes_of_doubt(with_weighed_load(result, diagnosis), diagnosis)
 
 
 def with_weighed_load(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
@@ -24,6 +29,22 @@ def with_weighed_load(result: SessionResult, diagnosis: Diagnosis) -> SessionRes
     plain, weighed = (set(load_doubts(result.all_checks, weighed=one)) for one in (False, True))
     search = replace(found.search, doubts=tuple(one for one in found.search.doubts if one not in plain - weighed))
     return replace(result, identification=replace(found, search=search)) if _likely(search) else result
+
+
+def with_causes_of_doubt(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
+    """Return the session whose doubt about a load points to the cause that the ``diagnosis`` found (none is a load) in
+    place of its advice: who knows that the plate reads too much is not asked to weigh again.
+    """
+    found, causes = result.identification, [one for one in diagnosis.findings if one.effect != LOAD]
+    if found is None or not found.search.doubts or not causes:
+        return result
+    pointed = {}
+    for check in result.all_checks:
+        for doubt in load_doubts([check], weighed=False):
+            cause = cause_of(check.what, causes)
+            pointed[doubt] = f"{doubt.removesuffix(check.advice)}{explained(cause)}" if cause else doubt
+    doubts = tuple(pointed.get(doubt, doubt) for doubt in found.search.doubts)
+    return replace(result, identification=replace(found, search=replace(found.search, doubts=doubts)))
 
 
 def with_load(one: Diagnosis, search: LoadSearch | None) -> Diagnosis:

@@ -9,6 +9,8 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
+_FEW = 4
+"""Trials of one check that are told one by one."""
 LIMIT_TOLD = ", should be "
 """Between the value of a check and its limit, in a sentence about it."""
 
@@ -65,5 +67,22 @@ def _together(rows: list[Attention]) -> Attention:
     """Return one sentence for all trials of ``rows``."""
     if len(rows) == 1:
         return rows[0]
-    values = ", ".join(f"{one.trial} {one.text.partition(LIMIT_TOLD)[0]}" for one in rows)
+    found = [(one.trial, one.text.partition(LIMIT_TOLD)[0]) for one in rows]
+    values = _range(found) if len(rows) > _FEW else ""
+    values = values or ", ".join(f"{trial} {value}" for trial, value in found)
     return replace(rows[0], text=f"{values}{LIMIT_TOLD}{rows[0].text.partition(LIMIT_TOLD)[2]}", trial="")
+
+
+def _range(found: list[tuple[str, str]]) -> str:
+    """Return the smallest and the largest of many values (trial, ``5.6 % of weight``) with their trials; "" where they
+    are no numbers of one unit.
+    """
+    parts = [(trial, *value.partition(" ")) for trial, value in found]
+    try:
+        low, high = (choose(parts, key=lambda part: float(part[1])) for choose in (min, max))
+    except ValueError:
+        return ""
+    units = {part[3] for part in parts}
+    if len(units) > 1:
+        return ""
+    return f"{len(found)} trials, {low[1]} ({low[0]}) to {high[1]} {high[3]} ({high[0]})"

@@ -10,6 +10,11 @@ def refuse_page(path: Path, *, force: bool) -> None:
     """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
     if path.exists() and not force:
         raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
+    refuse_missing_folder(path)
+
+
+def refuse_missing_folder(path: Path) -> None:
+    """Raise BiodanceError where the folder of a file to write is missing."""
     if not path.parent.is_dir():
         raise BiodanceError(f"{path.parent}: there is no such folder. Make it, or choose another --out.")
 

@@ -20,6 +20,7 @@ from biodance.cycles.curves import normal_toml
 from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.report.documents.plain import keyed
+from biodance.report.files import refuse_missing_folder
 from biodance.report.wording import format_number, millimetres
 from biodance.uncertainty.tolerances import shipped, to_toml
 
@@ -100,9 +101,12 @@ def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
 
 
 def refuse_existing(path: Path) -> None:
-    """Raise SessionRefused where ``path`` exists: before long work starts, and never over an existing file."""
+    """Raise SessionRefused where ``path`` exists, BiodanceError where it has no folder: before long work starts, and
+    never over an existing file.
+    """
     if path.exists():
         raise SessionRefused(f"{path}: exists already and is never overwritten. Choose another name, or move it away.")
+    refuse_missing_folder(path)
 
 
 def learned_document(found: LearnedLaboratory) -> dict[str, Any]:

@@ -13,7 +13,15 @@ from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, told_together, without_path
-from biodance.report.wording import format_number, millimetres, named, size_seen, sizes_in_words, trial_and_subject
+from biodance.report.wording import (
+    causes_by_effect,
+    format_number,
+    millimetres,
+    named,
+    size_seen,
+    sizes_in_words,
+    trial_and_subject,
+)
 
 
 def _line(console: Console, text: str) -> None:
@@ -182,15 +190,14 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
     for pair in found["confusions"]:
         if pair["log_bayes_factor"] is None or pair["log_bayes_factor"] < 3:
             console.print(f"will confuse: {escape(pair['cause'])} with {escape(pair['other'])}")
-    hidden = ", ".join(f"{row['effect']} {row['target']}".strip() for row in found["unobservable"])
+    hidden = causes_by_effect((row["effect"], row["target"]) for row in found["unobservable"])
     _line(console, f"cannot see: {hidden or 'nothing of what it looks for'}")
     _line(console, found["summary"])
     if found["care"]:
         _line(console, found["care"])
     for one in found["changes"]:
-        console.print(
-            f"to change: {escape(one['do'])} ({len({*one['unseen'], *one['confused']})} causes)", soft_wrap=True
-        )
+        count = len({*one["unseen"], *one["confused"]})
+        console.print(f"to change: {escape(one['do'])} ({count} cause{'s' * (count != 1)})", soft_wrap=True)
 
 
 def _print_accepted(found: dict[str, Any], console: Console) -> None:

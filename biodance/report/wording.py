@@ -1,13 +1,18 @@
 """How numbers and sentences are put before a person."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from biodance.display import SHOWN_UNITS
 from biodance.records.attention import Attention
 
-_ABSURD = 1000.0
+_ABSURD = 30.0
 """Typical sizes above which a size from which something is seen means never."""
+NEVER = "never"
+"""Said of such a size."""
+_NAMED = 6
+"""Targets of a cause that are listed by name."""
 
 
 def format_number(value: float | None, digits: int = 1) -> str:
@@ -18,17 +23,49 @@ def format_number(value: float | None, digits: int = 1) -> str:
     return text.replace("-", "−") if float(text) else text.lstrip("-")
 
 
+def signed(value: float, digits: int = 1) -> str:
+    """Return a number with its sign, nothing of which has one."""
+    text = format_number(value, digits)
+    return f"+{text}" if value > 0 and float(text) else text
+
+
 def millimetres(value: float | None, digits: int = 1) -> str:
     """Return metres as text in millimetres; templates choose the ``digits``: ``value|mm(0)``."""
     return format_number(None if value is None else 1000 * value, digits)
 
 
+def moment(created: str) -> str:
+    """Return a time (ISO 8601, UTC, to the second) as a person writes it: ``2026-11-25 18:51 UTC``."""
+    return f"{created[:10]} {created[11:16]} UTC"
+
+
 def sized(value: float, unit: str) -> str:
-    """Return a number with its unit as a person says it: 0.02 m is 20 mm."""
+    """Return a number with its unit as a person says it, with three significant digits at most: 0.02 m is 20 mm."""
     factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 2))
     if value == float("inf"):
         return "no size"
-    return f"{format_number(factor * value, digits)} {name}".strip()
+    shown = factor * value
+    large = math.floor(math.log10(abs(shown))) if shown and math.isfinite(shown) else 0
+    return f"{format_number(shown, max(0, min(digits, 2 - large)))} {name}".strip()
+
+
+def share_of(part: float) -> str:
+    """Return a share (0 to 1) in per cent; what is small is not said to be nothing."""
+    return "less than 1 %" if 0 < part < 0.01 else f"{format_number(100 * part, 0)} %"
+
+
+def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
+    """Return causes (effect, target) by effect, the first targets of each by name: ``marker misplaced (C7, CLAV and 3
+    more)``.
+    """
+    targets: dict[str, list[str]] = {}
+    for effect, target in causes:
+        targets.setdefault(effect.replace("_", " "), []).append(target.replace("_", " ").replace("->", "→"))
+    out = []
+    for effect, of in targets.items():
+        more = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
+        out.append(effect + (f" ({', '.join(of[:_NAMED])}{more})" if of[0] else ""))
+    return "; ".join(out)
 
 
 def named(effect: str, target: str) -> str:
@@ -56,7 +93,7 @@ def size_seen(row: dict[str, Any], key: str) -> str:
     """Return a size of a cause, ``limit``, ``told_from`` or ``typical``, as a person says it: 12 mm, or never."""
     value = row[key]
     if value is None or not value < _ABSURD * row["typical"]:
-        return "never"
+        return NEVER
     return sized(value, row["unit"])
 
 

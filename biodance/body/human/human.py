@@ -175,8 +175,8 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
     joint = trunk_joint(table)
     sex = {"F": "woman", "M": "man"}[subject.sex]
     notes = [
-        f"Prior SIP: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from the spread of tables; "
-        f"trunk joint at {joint}."
+        f"Segment parameters before the data: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from "
+        f"the spread of tables; trunk joint at {joint}."
     ]
     if table in measured_whole() and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
         groups = {study for sex in ("F", "M") for study, group in studies(sex).items() if group in ("child", "older")}

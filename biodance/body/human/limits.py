@@ -113,15 +113,16 @@ def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
     lower, upper = lower - free, upper + free
     low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
     notes = tuple(
-        f"Range of {name} widened to {round(np.degrees(low[i]))} to {round(np.degrees(high[i]))} degrees: "
-        f"{round(np.degrees(angle[i]))} degrees when standing."
+        f"Range of {name.replace('_', ' ')} widened to {round(np.degrees(low[i]))} to {round(np.degrees(high[i]))} "
+        f"degrees: {round(np.degrees(angle[i]))} degrees when standing."
         for i, name in enumerate(names)
         if low[i] < lower[i] or high[i] > upper[i]
     )
     lean = round(np.degrees(tilt))
+    way = "backwards" if lean < 0 else "forwards"
     tilted = (
-        f"Pelvis markers stand tilted {lean} degree{'s' * (abs(lean) != 1)} forwards: ranges of hip and trunk flexion "
-        f"are widened by as much."
+        f"Pelvis markers stand tilted {abs(lean)} degree{'s' * (abs(lean) != 1)} {way}: ranges of hip and trunk "
+        "flexion are widened by as much."
     )
     return replace(body.limits, lower=low, upper=high), (tilted, *notes)
 

@@ -94,7 +94,8 @@ def measure_static(subject: Subject, static: Trial) -> Scaling:
     centres = static_centres(
         posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"], flat=posture.still
     )
-    notes = (f"Scaled on static trial {static.name}; hip centres: {hip}.", *posture.notes, *sizes.notes, *centres.notes)
+    scaled = f"Scaled on static trial {static.name}; hip centres: {hip.capitalize()}."
+    notes = (scaled, *posture.notes, *sizes.notes, *centres.notes)
     return Scaling(subject, table, posture, sizes, centres, notes, static.settings.gravity)
 
 

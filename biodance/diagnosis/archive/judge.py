@@ -51,7 +51,7 @@ def said(quantity: str, value: float) -> str:
         PLATE_QUANTITIES[quantity].unit
     ]
     shown = round(factor * value, digits) + 0.0  # no minus before zero
-    return f"{shown:+.{digits}f} {unit}".replace("-", "−")
+    return f"{shown:{'+' if shown else ''}.{digits}f} {unit}".replace("-", "−")
 
 
 def changed_finding(change: Change, taken_off: float) -> PlateFinding:

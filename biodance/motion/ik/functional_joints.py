@@ -167,7 +167,7 @@ def _told(
     if moved:
         turns = {hinge: f" and {abs(np.degrees(angle)):.0f} deg" for hinge, angle in turned.items()}
         each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
-        fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} -> {1e3 * found.rms:.1f} mm"
+        fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
         notes.append(
             f"Joints placed by movement ({fits}), from the static trial's place, axis turned: {', '.join(each)}."
         )

@@ -92,7 +92,11 @@ def foresight_document(found: Foresight, *, seated: bool = False) -> dict[str, A
 def foresight_summary(found: Foresight) -> str:
     """Return in two sentences what a movement will see and confuse."""
     mixed = sum(pair.difference < TOLD for pair in found.confusions)
-    mixed_up = f"{mixed} of them look like another one" if mixed else "all of them are told from each other"
+    mixed_up = (
+        f"{mixed} of them {'looks' if mixed == 1 else 'look'} like another one"
+        if mixed
+        else "all of them are told from each other"
+    )
     return (
         f"Of {len(found.limits)} causes that a diagnosis looks for, this movement will see {len(found.seen)} at their "
         f"typical size; {mixed_up}."

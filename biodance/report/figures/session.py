@@ -118,7 +118,7 @@ def standing_figure(standing: QuietStanding) -> str:
     near = panel(x, y, [*axes, *_paths(x, y, standing)], "the middle, enlarged", frame=_SQUARE)
     words = ["black point: centre of pressure (plates)"]
     words += ["green ring: centre of mass (table)"] if tracked else []
-    words += ["blue points: right foot's markers", "red rings: left foot's"]
+    words += ["blue points: right foot's markers", "orange rings: left foot's"]
     legend = "".join(f"<span>{word}</span>" for word in words)
     return f'<div class="legend">{legend}</div><div class="cells">{wide}{near}</div>'
 

@@ -80,12 +80,18 @@ def around(values: NDArray[Any], *, least: float = 0.0, label: str = "") -> Axis
 
 
 def round_ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
-    """Return about ``count`` round values between ``low`` and ``high`` with their text."""
+    """Return about ``count`` round values between ``low`` and ``high`` with their text; two at least, for a single one
+    tells no scale.
+    """
     rough = (high - low) / max(count, 1)
     ten = 10.0 ** np.floor(np.log10(rough))
-    step = next(ten * k for k in (1, 2, 5, 10) if ten * k >= 0.999 * rough)
+    coarse = (10, 5, 2, 1, 0.5, 0.2, 0.1)
+    start = next(i for i in reversed(range(4)) if ten * coarse[i] >= 0.999 * rough)
+    for step in (ten * k for k in coarse[start:]):
+        first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+        if last > first:
+            break
     digits = max(0, -int(np.floor(np.log10(step) + 1e-9)))
-    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
     return [(k * step, format_number(k * step, digits)) for k in range(first, last + 1)]
 
 

@@ -24,7 +24,17 @@ from biodance.records.attention import told_together
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.wording import format_number, named, sized, trial_and_subject
+from biodance.report.wording import (
+    NEVER,
+    causes_by_effect,
+    format_number,
+    moment,
+    named,
+    share_of,
+    size_seen,
+    sized,
+    trial_and_subject,
+)
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -97,7 +107,8 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
         marks.append(segments(x, y, np.array([[value.min(), i], [value.max(), i]]), Stroke(GREY, "", 2.5)))
         marks.append(points(x, y, np.array([np.median(value)]), np.array([float(i)]), Stroke(BLUE)))
     about = "per kind of cause the smallest size that this session would have seen"
-    return panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
+    drawn = panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
+    return f'<div class="single">{drawn}</div>'
 
 
 @dataclass(frozen=True)
@@ -190,7 +201,11 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from markupsafe import Markup
 
     one = found.diagnosis
-    masses, made = [], f"biodance {provenance.versions['biodance']}, {provenance.created}"
+    witnesses = _witnesses(one.witnesses)
+    witnessed = {(row.effect, row.target) for row in witnesses["seen"]} if witnesses else set()
+    blind = [row for row in one.unobservable if (row.effect, row.target) not in witnessed]
+    unseen = [(row, size_seen(vars(row), "limit")) for row in blind]
+    masses, made = [], f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     if found.before and found.accepted:
         then, now = (
             dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
@@ -198,11 +213,20 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         masses = [(name.replace("_", " "), then.get(name, float("nan")), mass) for name, mass in now.items()]
     return render(
         "diagnosis.html.j2",
-        filters={"sized": sized, "estimated": estimated, "odds": odds, "first_upper": first_upper},
+        filters={
+            "sized": sized,
+            "estimated": estimated,
+            "odds": odds,
+            "share": share_of,
+            "first_upper": first_upper,
+        },
         scripts=[template_text("curves.js")],
         sheet=Markup(print_sheet(f"Session {result.session.folder.name}", provenance.visit, made)),
         named=named,
         words_of=words_of,
+        verdict=": ".join([one.told.partition(":")[0], *filter(None, [_causes(one)])]),
+        unseen=[(row, size) for row, size in unseen if size != NEVER],
+        never=causes_by_effect((row.effect, row.target) for row, size in unseen if size == NEVER),
         result=result,
         one=one,
         answer=answer(one),
@@ -215,12 +239,16 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         adequacy=Markup(adequacy_table(one.adequacy)) if one.adequacy else "",
         limits=Markup(limits_figure(one.limits)) if one.limits else "",
         gain=found.gain,
-        witnesses=_witnesses(one.witnesses),
+        witnesses=witnesses,
     )
 
 
+def _causes(one: Diagnosis) -> str:
+    return "; ".join(named(finding.effect, finding.target) for finding in one.findings)
+
+
 def _witnesses(evidence: WitnessEvidence | None) -> dict[str, Any] | None:
-    """Return the table causes x witnesses with its blind rows in words, and all observations; None without any."""
+    """Return the causes with the witnesses that see them, the blind rows in words, and all observations."""
     if evidence is None:
         return None
     rows = cause_visibilities(evidence)
@@ -229,7 +257,6 @@ def _witnesses(evidence: WitnessEvidence | None) -> dict[str, Any] | None:
         if not row.witnesses:
             blind.setdefault(" ".join(row.would), []).append(named(row.effect, row.target))
     return {
-        "names": list(dict.fromkeys(name for row in rows for name in row.witnesses)),
         "seen": [row for row in rows if row.witnesses],
         "blind": [("; ".join(causes), would) for would, causes in blind.items()],
         "observations": sorted(evidence.observations, key=lambda one: -abs(one.z)),

@@ -43,7 +43,7 @@ _PANELS = (("mass", 1.0, "mass (kg)"), ("com y", 1000.0, "centre of mass along t
 
 
 def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference, ...]") -> str:
-    """Return what changed in every segment, later less earlier, with 95 % intervals: red what is ``certain``, open
+    """Return what changed in every segment, later less earlier, with 95 % intervals: orange what is ``certain``, open
     where nothing is known.
     """
     names = list(dict.fromkeys(row.segment for row in changes))
@@ -114,7 +114,7 @@ _RANKED = 15
 
 def impact_figure(found: Sequence[Impact]) -> str:
     """Return the quantities with the largest impact: left the pull from the prior with what is left of its standard
-    deviation, right what that does to the moments of knee (blue) and hip (red ring).
+    deviation, right what that does to the moments of knee (blue) and hip (orange ring).
     """
     rows = list(found[:_RANKED])
     ticks = tuple(
@@ -137,7 +137,7 @@ def impact_figure(found: Sequence[Impact]) -> str:
     frame = Frame(height=_ROW * len(rows), left=138.0, above=4.0)
     drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
     drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
-    words = ("grey: one prior standard deviation", "blue point: knee flexion", "red ring: hip flexion")
+    words = ("grey: one prior standard deviation", "blue point: knee flexion", "orange ring: hip flexion")
     legend = "".join(f"<span>{word}</span>" for word in words)
     return f'<div class="legend">{legend}</div><div class="cells">{drawn}</div>'
 

@@ -121,7 +121,8 @@ def movement_section(moved: SessionMovement) -> str:
     compared = [one for one in moved if one.file_angles]
     if not parts and not compared:
         return ""
-    return render("movement.html.j2", parts=parts, compared=compared, moved=moved, filters={"milli": _milli})
+    filters = {"milli": _milli, "beside": _beside}
+    return render("movement.html.j2", parts=parts, compared=compared, moved=moved, filters=filters)
 
 
 def _part(one: TrialMovement, normal: Sequence[NormalCurve]) -> MovementPart:
@@ -158,3 +159,8 @@ def _value(name: str, found: dict[str, tuple[float, float, int]]) -> str:
 
 def _milli(value: float) -> str:
     return format_number(1000 * value, 0)
+
+
+def _beside(late: float) -> str:
+    """Return how much later than the file's ours are: ``6 ms earlier``."""
+    return f"{_milli(abs(late))} ms {'later' if late > 0 else 'earlier'}"

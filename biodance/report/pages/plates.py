@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.diagnosis.archive.changes import ALL, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
@@ -16,7 +17,8 @@ from biodance.report.documents.plain import plain_values, to_text
 from biodance.report.documents.plates import plates_document
 from biodance.report.figures.style import figure, look, svg_address
 from biodance.report.files import write_files
-from biodance.report.pages.template import render, template_text
+from biodance.report.pages.template import print_sheet, render, template_text
+from biodance.report.wording import moment
 from biodance.version import __version__
 
 if TYPE_CHECKING:
@@ -37,20 +39,34 @@ QUANTITY_TITLES = {
 
 
 def plate_figure(plate: str, histories: tuple[History, ...]) -> "Figure":
-    """Draw every quantity of one plate over the visits, with its level and its changes."""
+    """Draw every quantity of one plate over the visits, with its level and its changes, in two columns; a quantity that
+    is the same at every visit (an offset that the reader took off) has nothing to draw.
+    """
     own = [one for one in histories if plate in one.series.plates]
+    own = [one for one in own if np.ptp(one.series.value[_rows(plate, one)]) > 0] or own
+    columns = min(2, len(own))
+    rows = -(-len(own) // columns)
     with look():
-        drawn = figure(1.5 * len(own) + 0.4)
-        for axes, one in zip(np.atleast_1d(drawn.subplots(len(own), 1, sharex=True)), own, strict=True):
+        drawn = figure(1.35 * rows + 0.4)
+        grid = drawn.subplots(rows, columns, sharex=True, squeeze=False).T.ravel()
+        for axes, one in zip(grid, own, strict=False):
             _draw(axes, plate, one)
-        _label(axes, own[-1])
+        for axes in grid[len(own) :]:
+            axes.remove()
+        for k in {min((c + 1) * rows, len(own)) - 1 for c in range(columns)}:
+            _label(grid[k], own[k])
     return drawn
+
+
+def _rows(plate: str, one: History) -> NDArray[np.bool_]:
+    """Return which values of a quantity are of ``plate``."""
+    return np.asarray(one.series.design[:, one.series.plates.index(plate)] != 0)
 
 
 def _draw(axes: "Axes", plate: str, one: History) -> None:
     """Draw one quantity: points with 95 % of the visit's own error, steps of the level, people who stand out."""
     series, (factor, unit) = one.series, _SHOWN[PLATE_QUANTITIES[one.series.quantity].unit]
-    rows = series.design[:, series.plates.index(plate)] != 0
+    rows = _rows(plate, one)
     at, value, sd = series.visit[rows], factor * series.value[rows], factor * series.sd[rows]
     axes.errorbar(at, value, 1.96 * sd, fmt="o", color=BLUE, markersize=3.5, linewidth=0.8)
     strange = [i for i, v in enumerate(at) if any(s.visit == series.visits[v].name for s in one.strangers)]
@@ -69,7 +85,8 @@ def _draw(axes: "Axes", plate: str, one: History) -> None:
 def _label(axes: "Axes", one: History) -> None:
     """Write dates, else names, of as many visits as fit."""
     visits = one.series.visits
-    chosen = np.unique(np.linspace(0, len(visits) - 1, min(len(visits), 9)).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(visits) - 1, min(len(visits), 6)).round().astype(int))
+    axes.tick_params(labelbottom=True)
     axes.set_xticks(chosen, [visits[i].date[:10] or visits[i].name[-12:] for i in chosen], rotation=25, ha="right")
 
 
@@ -78,7 +95,7 @@ def condition_figure(one: ConditionEffect) -> "Figure":
     factor, unit = _SHOWN[PLATE_QUANTITIES[one.quantity].unit]
     names = [visit.person for visit in one.visits]
     with look():
-        drawn = figure(0.9 + 0.22 * len(names), width=5.4)
+        drawn = figure(0.9 + 0.22 * len(names))
         axes = drawn.subplots()
         axes.errorbar(
             factor * one.shared.own, range(len(names)), xerr=1.96 * factor * one.shared.own_sd, fmt="o", color=BLUE
@@ -98,13 +115,13 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
     from markupsafe import Markup
 
     judged = found.judgement
-    count = len(judged.findings)
+    count, made, title = len(judged.findings), now(), f"The plates of {document['archive']}"
     return render(
         "plates.html.j2",
-        style=Markup(template_text("page.css")),
+        style=Markup(template_text("page.css") + print_sheet(title, {}, f"biodance {__version__}, {moment(made)}")),
         name=document["archive"],
         version=__version__,
-        created=now(),
+        created=made,
         answer=f"{count} finding{'s' if count != 1 else ''}" if count else "nothing wrong to be seen",
         judged=judged,
         dates=_dates(found),

@@ -4,6 +4,7 @@ First what a person needs, on two printed pages: the verdict, what needs somebod
 folded, everything by trial.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ from biodance.report.figures.still import still_figure
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.replay import replay_data, replay_scripts
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.wording import format_number, millimetres, trial_and_subject
+from biodance.report.wording import format_number, millimetres, moment, trial_and_subject
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
 
@@ -111,12 +112,13 @@ class TrialPart:
 
     @property
     def channels(self) -> list[tuple[str, str, float, float]]:
-        """Channel, unit, RMS and correlation of the wrench comparison."""
+        """Channel, unit, RMS and correlation of the wrench comparison; no correlation where nobody moves."""
         comparison = self.result.comparison
         if comparison is None:
             return []
         units = ("N",) * 3 + ("N·m",) * 3
-        return list(zip(CHANNELS, units, comparison.rms.tolist(), comparison.correlation.tolist(), strict=True))
+        alike = [math.nan] * 6 if self.result.trial.role == "static" else comparison.correlation.tolist()
+        return list(zip(CHANNELS, units, comparison.rms.tolist(), alike, strict=True))
 
 
 def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -> TrialPart:
@@ -168,7 +170,7 @@ def page(
     identified = identification_section(found) if found else ""
     worst = result.more_stills[0] if result.more_stills else result.still
     others = [still for still in (result.still, *result.more_stills) if still is not None and still is not worst]
-    name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {provenance.created}"
+    name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     return render(
         "page.html.j2",
         filters={"place": place_words, "apart": _apart},

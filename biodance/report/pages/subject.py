@@ -2,6 +2,7 @@
 
 from base64 import b64encode
 from collections.abc import Mapping
+from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -17,26 +18,37 @@ from biodance.report.pages.template import render, template_text
 
 _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}
 """rad: arms and legs a little away from the body, so that no part hides another."""
-_COLUMN, _STEP, _HALF = 620, 130, 1350
-"""mm from the middle to the labels, between two of them, and to the picture's edge (a body of 1.75 m)."""
-_LETTERS = 50
-"""mm, the size of the letters."""
 
 
-def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str]) -> str:
+@dataclass(frozen=True)
+class Room:
+    """mm (of a body of 1.75 m) from the middle to the ``column`` of labels, between two of them, to the picture's edge
+    (``half``), and the size of the ``letters``.
+    """
+
+    column: float = 620
+    step: float = 130
+    half: float = 1350
+    letters: float = 50
+
+
+_WIDE, _PHONE = Room(), Room(430, 110, 1150, 85)
+
+
+def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str], *, room: Room = _WIDE) -> str:
     """Draw ``body`` from the front, its right side on the left, as SVG text; ``labels`` (segment -> lines of text)
-    beside it; segments in ``measured`` are filled, the others white with a broken outline.
+    beside it, in the ``room`` they have; segments in ``measured`` are filled, the others white with a broken outline.
     """
     outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline in _outlines(body)]
     marks = [_part(outline, known=segment in measured) for segment, outline in outlines]
     middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
     for right in (True, False):
-        marks += _labels({name: at for name, at in middles.items() if name in labels}, labels, right=right)
+        marks += _labels({name: at for name, at in middles.items() if name in labels}, labels, room, right=right)
     heights = np.concatenate([outline[:, 1] for _, outline in outlines])
-    low, high = heights.min() - _LETTERS, heights.max() + _LETTERS
+    low, high, half, letters = heights.min() - room.letters, heights.max() + room.letters, room.half, room.letters
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{-_HALF} {low:g} {2 * _HALF} {high - low:g}" '
-        f'width="{2 * _HALF}" height="{high - low:g}" font-family="sans-serif" font-size="{_LETTERS}">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{-half} {low:g} {2 * half} {high - low:g}" '
+        f'width="{2 * half}" height="{high - low:g}" font-family="sans-serif" font-size="{letters}">'
         f"{''.join(marks)}</svg>"
     )
 
@@ -65,17 +77,17 @@ def _outlines(body: Body) -> list[tuple[str, Array]]:
     return found
 
 
-def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], *, right: bool) -> list[str]:
+def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: Room, *, right: bool) -> list[str]:
     """Return the labels of one side of the body in a column, from the top down, each with a line to its part."""
     own = [name for name in middles if (name.startswith("right") or name == "trunk_head") is right]
     own.sort(key=lambda name: middles[name][1])
-    x, anchor, last, found = (-_COLUMN if right else _COLUMN), "end" if right else "start", -np.inf, []
+    x, anchor, last, found = (-room.column if right else room.column), "end" if right else "start", -np.inf, []
     for name in own:
-        last = max(float(middles[name][1]), last + _STEP)
+        last = max(float(middles[name][1]), last + room.step)
         to, lines = middles[name], labels[name].split("\n")
         found.append(f'<path d="M{x * 0.98:g} {last:g}L{to[0]:g} {to[1]:g}" stroke="{GREY}" stroke-width="4"/>')
         for k, line in enumerate(lines):
-            down = last + _LETTERS * (1.15 * (k - len(lines) / 2) + 0.9)
+            down = last + room.letters * (1.15 * (k - len(lines) / 2) + 0.9)
             found.append(f'<text x="{x}" y="{down:g}" text-anchor="{anchor}">{escape(line)}</text>')
     return found
 
@@ -138,20 +150,22 @@ def subject_page(account: SubjectAccount) -> str:
             if value
         ],
         parts=[(_name(part), kilograms(part), part) for part in account.parts],
-        picture=_picture(account),
+        picture=_picture(account, _WIDE),
+        small_picture=_picture(account, _PHONE),
         weight=_between(*account.weight) if np.isfinite(account.weight[0]) else "",
         together=(_name(account.together), kilograms(account.together)) if account.together else None,
         reasons=plain_reasons(account.withheld),
     )
 
 
-def _picture(account: SubjectAccount) -> str:
-    """Return the address of the picture, "" without a body."""
+def _picture(account: SubjectAccount, room: Room) -> str:
+    """Return the address of the picture, "" without a body; on a phone the parts have no names: the table has."""
     if account.body is None or not account.parts:
         return ""
-    labels = {p.segments[0]: f"{_name(p)}\n{kilograms(p)}" for p in account.parts}
+    named = room is _WIDE
+    labels = {p.segments[0]: f"{_name(p)}\n{kilograms(p)}" if named else kilograms(p) for p in account.parts}
     measured = frozenset(p.segments[0] for p in account.parts if p.measured)
-    drawn = subject_drawing(account.body, labels, measured)
+    drawn = subject_drawing(account.body, labels, measured, room=room)
     return "data:image/svg+xml;base64," + b64encode(drawn.encode()).decode("ascii")
 
 

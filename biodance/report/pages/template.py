@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biodance.errors import BiodanceError
-from biodance.report.wording import format_number, millimetres
+from biodance.report.wording import format_number, millimetres, moment
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -61,7 +61,8 @@ def render(
     """Return a template filled with ``values`` as HTML text; the same arguments give the same characters.
 
     Every template knows ``style`` (of the analyst's page, unless another one is among the values), ``policy`` (what its
-    page may do: nothing of the network, and only ``scripts``), ``scripts``, and the filters ``number`` and ``mm``.
+    page may do: nothing of the network, and only ``scripts``), ``scripts``, and the filters ``number``, ``mm``
+    and ``moment``.
     """
     from markupsafe import Markup
 
@@ -83,7 +84,7 @@ def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
         loader=FunctionLoader(template_text),
         bytecode_cache=FileSystemBytecodeCache(str(kept)) if os.access(kept, os.W_OK) else None,
     )
-    environment.filters.update(number=format_number, mm=millimetres, **dict(filters))
+    environment.filters.update(number=format_number, mm=millimetres, moment=moment, **dict(filters))
     return environment.get_template(name)
 
 

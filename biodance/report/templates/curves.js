@@ -22,9 +22,13 @@
     return out;
   }
 
-  function ticks(low, high, count) {
+  function ticks(low, high, count) { // two at least, for a single one tells no scale
     const rough = (high - low) / count, ten = 10 ** Math.floor(Math.log10(rough));
-    const step = [1, 2, 5, 10].map((k) => k * ten).find((k) => k >= 0.999 * rough);
+    const inside = (step) => Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1;
+    const steps = [0.1, 0.2, 0.5, 1, 2, 5, 10].map((k) => k * ten);
+    let at = steps.findIndex((step) => step >= 0.999 * rough);
+    while (at > 0 && inside(steps[at]) < 2) at -= 1;
+    const step = steps[at];
     const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), out = [];
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
       out.push([k * step, shown(k * step, digits)]);
@@ -46,6 +50,7 @@
       this.words = svg.querySelector(".words");
       [this.x, this.y] = [numbers(svg.dataset.x), numbers(svg.dataset.y)];
       this.lines = [...svg.querySelectorAll("path.line")];
+      this.drawn = [...svg.querySelectorAll("path.line, path.each, path.band")];
       this.cursor = this.plot.appendChild(element("path", { class: "cursor off" }));
       this.drag = this.plot.appendChild(element("rect", { class: "drag off", y: -9 * STEPS, height: 19 * STEPS }));
       this.view = [0, STEPS];
@@ -60,7 +65,7 @@
       this.view = view;
       let [low, high] = [0, STEPS];
       if (view[1] - view[0] < STEPS) {
-        const seen = this.lines.filter((line) => !line.classList.contains("off"))
+        const seen = this.drawn.filter((line) => !line.classList.contains("off"))
           .flatMap((line) => this.data(line).filter(([x]) => x >= view[0] && x <= view[1]).map(([, y]) => y));
         if (seen.length) {
           [low, high] = [seen.reduce((a, b) => Math.min(a, b)), seen.reduce((a, b) => Math.max(a, b))];

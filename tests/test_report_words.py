@@ -1,0 +1,128 @@
+"""How sizes, times, causes and many trials are put before a person: no senseless digits, no sign before nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identified_sessions import session_result
+from test_one_load import GAIN, NOTHING, OWN, found
+from test_report_page import full_session, html_of
+
+from biodance.identification.load_words import say_load
+from biodance.pipeline.load import as_diagnosed
+from biodance.pipeline.trial_result import Check
+from biodance.records.attention import Attention, told_together
+from biodance.report.figures.vector import round_ticks
+from biodance.report.pages.movement import _beside
+from biodance.report.wording import causes_by_effect, moment, share_of, signed, size_seen, sized
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (100.0, "N", "100 N"),
+        (11.159, "N", "11.2 N"),
+        (0.354, "kg", "0.35 kg"),
+        (0.0, "kg", "0.00 kg"),
+        (0.2, "m", "200 mm"),
+        (float("inf"), "m", "no size"),
+    ],
+)
+def test_a_size_has_three_significant_digits_at_most(value, unit, text):
+    assert sized(value, unit) == text
+
+
+def test_a_size_beyond_what_occurs_is_never_seen():
+    row = {"limit": 0.29, "typical": 0.01, "unit": "m"}
+    assert size_seen(row, "limit") == "290 mm"
+    assert size_seen({**row, "limit": 35.387}, "limit") == "never"
+    assert size_seen({**row, "limit": None}, "limit") == "never"
+
+
+def test_small_shares_are_not_nothing_and_nothing_has_no_sign():
+    assert [share_of(part) for part in (0.0, 0.004, 0.24, 1.0)] == ["0 %", "less than 1 %", "24 %", "100 %"]
+    assert [signed(value) for value in (0.04, -0.04, 1.26, -1.26)] == ["0.0", "0.0", "+1.3", "−1.3"]
+    assert moment("2026-11-25T18:51:33Z") == "2026-11-25 18:51 UTC"
+    assert [_beside(late) for late in (-0.0062, 0.002)] == ["6 ms earlier", "2 ms later"]
+
+
+def test_causes_are_told_by_effect_and_counted_beyond_the_sixth():
+    causes = [("plate_crosstalk", f"F{k}->Mz") for k in range(8)] + [("clock_drift", "")]
+    said = causes_by_effect(causes)
+    assert said.startswith("plate crosstalk (F0→Mz, F1→Mz")
+    assert said.endswith("and 2 more); clock drift")
+
+
+def test_many_trials_of_one_check_are_told_by_their_range():
+    values = ["5.6", "5.5", "6.7", "5.9", "10.2"]
+    rows = [
+        Attention("warn", f"{value} % of weight, should be at most 5 %.", f"walk_{k}", "force")
+        for k, value in enumerate(values)
+    ]
+    (one,) = told_together(rows)
+    assert one.text == "5 trials, 5.5 (walk_1) to 10.2 % of weight (walk_4), should be at most 5 %."
+    (four,) = told_together(rows[:4])
+    assert four.text.startswith("walk_0 5.6 % of weight, walk_1 5.5 % of weight")
+    groups = [replace(row, text=row.text.replace("% of weight", f"mm, part {k}")) for k, row in enumerate(rows)]
+    (every,) = told_together(groups)
+    assert every.text.count("mm, part") == 5
+
+
+@pytest.mark.parametrize(("low", "high"), [(-13.0, 12.0), (-0.9, 0.4), (3.0, 9.6), (-41.0, -17.0), (0.99, 1.99)])
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_an_axis_has_two_numbers_at_least(low, high, count):
+    ticks = round_ticks(low, high, count)
+    assert 2 <= len(ticks) <= 8
+    assert len({text for _, text in ticks}) == len(ticks)
+    assert all(low <= value <= high for value, _ in ticks)
+    assert [float(text.replace("−", "-")) for _, text in ticks] == pytest.approx([value for value, _ in ticks])
+
+
+def test_standing_still_has_no_correlation_on_the_page():
+    result = full_session()
+    still = replace(result.trials[0], trial=replace(result.trials[0].trial, role="static"))
+    moving, standing = (
+        html_of(replace(result, trials=(trial, *result.trials[1:]))).split(">correlation</th>")[1]
+        for trial in (result.trials[0], still)
+    )
+    assert standing.partition("</tr>")[0].count(">–<") == 6
+    assert moving.partition("</tr>")[0].count(">–<") == 0
+
+
+def test_a_doubt_about_a_load_points_to_the_cause_that_was_found():
+    heavy = Check(
+        "mass on the plates against declared",
+        "static",
+        "5.6 %",
+        "at most 2 %",
+        False,
+        "Weigh again, or check the zero.",
+    )
+    doubt = f"{heavy.what}, static: 5.6 % (at most 2 %). {heavy.advice}"
+    result = session_result()
+    search = found(("left_foot", 0.9), doubts=(doubt, "Markers are far."))
+    session = replace(result, checks=(heavy,), identification=replace(result.identification, search=search))
+    assert as_diagnosed(session, NOTHING) is session
+    told = say_load(as_diagnosed(session, replace(NOTHING, findings=(GAIN,))).identification.search)
+    assert "5.6 % (at most 2 %). Plate gain Fz, which was found, may explain it." in told
+    assert "Weigh again" not in told
+    assert "Markers are far." in told
+    assert "which was found" not in say_load(
+        as_diagnosed(session, replace(NOTHING, findings=(OWN,))).identification.search
+    )
+
+
+def test_pelvis_markers_lean_backwards_by_a_positive_angle():
+    from human_cases import human_case
+
+    from biodance.body.human.limits import standing_tilt, widen_limits
+
+    body = human_case().body
+    q = np.array(body.neutral)
+    notes = {}
+    for turn in (-0.35, 0.35):
+        leaning = q.copy()
+        leaning[3:7] = [0.0, np.sin(turn / 2), 0.0, np.cos(turn / 2)]
+        notes[np.sign(standing_tilt(leaning))] = widen_limits(body, leaning)[1][0]
+    assert "20 degrees forwards" in notes[1.0]
+    assert "20 degrees backwards" in notes[-1.0]
