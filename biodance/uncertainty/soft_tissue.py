@@ -46,7 +46,7 @@ class Slide(_WithAngles):
 
     patterns: tuple[Array, ...]
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Every pattern of a segment, times every angle beside it."""
         count = zip(self.body.segments, self.patterns, _near(self.body), strict=True)
@@ -105,7 +105,7 @@ class Slide(_WithAngles):
 class Sag(ErrorSource):
     """Markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²)."""
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Every segment that wears markers."""
         return tuple(f"sag {kind_of(self.body.segments[s])}" for s in self._worn)
@@ -150,7 +150,7 @@ class Flesh(_WithAngles):
     (m/rad).
     """
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Three axes of every segment, times every angle beside it."""
         pairs = zip(self.body.segments, _near(self.body), strict=True)
