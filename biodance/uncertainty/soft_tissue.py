@@ -28,11 +28,13 @@ class _WithAngles(ErrorSource):
 
     def transpose(self, trial: Response, back: Array) -> Array:
         """Return the same sums as of any error, the angles last: there are many, and few slopes."""
-        found, size = [], back.shape[2]
-        for value, near in self._slopes(trial):
-            weight = np.swapaxes(value, 1, 2) @ back
-            summed = trial.angles[:, near].T @ weight.reshape(len(weight), -1)
-            found.append(np.swapaxes(summed.reshape(near.size, -1, size), 0, 1).reshape(-1, size))
+        slopes, found, first, size = list(self._slopes(trial)), [], 0, back.shape[2]
+        weight = np.swapaxes(np.concatenate([value for value, _ in slopes], axis=2), 1, 2) @ back
+        for value, near in slopes:
+            own = weight[:, first : first + value.shape[2]].reshape(len(weight), -1)
+            summed = (trial.angles[:, near].T @ own).reshape(near.size, -1, size)
+            found.append(np.swapaxes(summed, 0, 1).reshape(-1, size))
+            first += value.shape[2]
         return np.concatenate(found)
 
 
@@ -61,9 +63,9 @@ class Slide(_WithAngles):
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of every pattern, times the squared angles."""
-        parts = self._left(trial)
-        found = [3 * np.mean(part**2, axis=1).T @ trial.angles[:, near] ** 2 / len(part) for part, near in parts]
-        return np.concatenate([part.ravel() for part in found])
+        count = len(self.body.markers.names) * len(trial.place)
+        parts = ((np.einsum("frp,frp->fp", left, left), near) for left, near in self._left(trial))
+        return np.concatenate([(square.T @ trial.angles[:, near] ** 2 / count).ravel() for square, near in parts])
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, on, rows, near in self._parts:
