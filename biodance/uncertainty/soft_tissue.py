@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
+from biodance.motion.ik.compiled.derivatives import FOUR, add_products
 from biodance.records import Array, Index
 from biodance.spatial import cross
 from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares, neighbours
@@ -28,13 +29,12 @@ class _WithAngles(ErrorSource):
 
     def transpose(self, trial: Response, back: Array) -> Array:
         """Return the same sums as of any error, the angles last: there are many, and few slopes."""
-        slopes, found, first, size = list(self._slopes(trial)), [], 0, back.shape[2]
-        weight = np.swapaxes(np.concatenate([value for value, _ in slopes], axis=2), 1, 2) @ back
-        for value, near in slopes:
-            own = weight[:, first : first + value.shape[2]].reshape(len(weight), -1)
-            summed = (trial.angles[:, near].T @ own).reshape(near.size, -1, size)
-            found.append(np.swapaxes(summed, 0, 1).reshape(-1, size))
-            first += value.shape[2]
+        found, size = [], back.shape[2]
+        work, back = np.empty((FOUR, size)), np.ascontiguousarray(back)
+        for value, near in self._slopes(trial):
+            sums = np.zeros((value.shape[2], near.size, size))
+            add_products(np.ascontiguousarray(value), trial.angles.take(near, axis=1), back, work, sums)
+            found.append(sums.reshape(-1, size))
         return np.concatenate(found)
 
 
