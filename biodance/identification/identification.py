@@ -19,7 +19,7 @@ from biodance.identification.information import Information
 from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
-from biodance.identification.mismatch import Mismatch, Sizes, mismatch
+from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import Posterior, posterior
@@ -228,11 +228,12 @@ def conclude_trials(
     dilution that cannot be given back, `dilution.gains_move_masses`), that band is left out.
     """
     room = with_unknown_load(body, prior or widened(body.sip, body.joint_errors))
+    softer = softness(body, fits, total.layout.bands)
 
     def concluded(some: Statistics) -> Identification:
         noise, _ = learn_noise(some, room)
         names = tuple(fit.name for fit in fits)
-        return conclude(body, some, names, noise=noise, found=mismatch(body, fits, noise), prior=prior)
+        return conclude(body, some, names, noise=noise, found=mismatch(body, fits, noise, softer=softer), prior=prior)
 
     found = concluded(total)
     if not found.diluted:

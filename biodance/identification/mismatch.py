@@ -8,6 +8,7 @@ under which the session's own b is most probable given the table (evidence). Wha
 for the parameters is H (...)^-1 H in place of H.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,15 +21,16 @@ from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Sip
+from biodance.records import Array, Index, Sip
+from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.caution import shift_slope
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sources
-from biodance.uncertainty.response import ErrorSource, Response
+from biodance.uncertainty.response import Response
 from biodance.uncertainty.sources import deviations, of_markers, transpose
 
 EVERY = 8
-"""Frames: one of so many is enough to predict the size of the marker residuals from."""
+"""Frames: one of so many (two at least) is enough to predict the size of the marker residuals from."""
 SHORTEST = 8
 """Frames: shorter runs have no accelerations worth the name."""
 KINEMATICS = (0.7, 1.0, 1.4, 2.0, 2.8)
@@ -55,33 +57,50 @@ class Sizes:
     noise: float
 
 
-def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise) -> Mismatch:
+def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float | None = None) -> Mismatch:
     """Return the scores of kinematics and plates over all trials.
 
-    Skin and flesh slide as much as the table says, or more where the markers' residuals are larger than that predicts.
+    Skin and flesh slide ``softer`` times as much as the table says, by default as the markers show (`softness`).
     """
     whole, shares = parts_as_segments(body), share_errors(body)
     found, sources, plates = nothing(body), of_markers(whole), plate_sources()
-    sd, scores, plate_scores = deviations(sources[0].body, sources), np.array(found.kinematics), np.array(found.plates)
-    predicted, observed = 0.0, 0.0
-    for fit in fits:
-        white = noise.at(fit.motion.rate)
-        for pick in noise.bands.runs(fit.use, fit.motion.rate):
-            if pick.size < SHORTEST:
-                continue
-            motion = fit.motion.at(pick)
-            links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
-            W = links if body.sharing is None else links @ body.sharing
-            weight = white.weighted(W)
-            scores += transpose(sources, trial, weight).T
-            wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
-            plate_scores += np.tensordot(weight, np.concatenate([wrong, links @ shares], axis=2), axes=((0, 1), (0, 1)))
-            if fit.motion.residual.shape[1] and np.isfinite(fit.motion.residual[pick]).any():
-                predicted += float(sd**2 @ _marker_squares(trial, sources)) * pick.size
-                observed += float(np.nanmean(fit.motion.residual[pick] ** 2)) * pick.size
+    scores, plate_scores = np.array(found.kinematics), np.array(found.plates)
+    for fit, pick in _runs(fits, noise.bands):
+        motion = fit.motion.at(pick)
+        links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
+        W = links if body.sharing is None else links @ body.sharing
+        weight = noise.at(fit.motion.rate).weighted(W)
+        scores += transpose(sources, trial, weight).T
+        wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
+        plate_scores += np.tensordot(weight, np.concatenate([wrong, links @ shares], axis=2), axes=((0, 1), (0, 1)))
     soft = np.array([not joint for source in sources for joint in source.joints])
-    more = np.sqrt(max(1.0, observed / predicted)) if predicted > 0 else 1.0
-    return Mismatch(scores * np.where(soft, more, 1.0) * sd, plate_scores)
+    more = softness(body, fits, noise.bands) if softer is None else softer
+    return Mismatch(scores * np.where(soft, more, 1.0) * deviations(whole, sources), plate_scores)
+
+
+def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
+    """Return how many times the skin slides what the table says: by how much the markers' residuals are larger than
+    that predicts, 1 where they are not.
+    """
+    whole = parts_as_segments(body)
+    sources = of_markers(whole)
+    variance, predicted, observed = deviations(whole, sources) ** 2, 0.0, 0.0
+    for fit, pick in _runs(fits, bands):
+        residual = fit.motion.residual[pick]
+        if residual.shape[1] and np.isfinite(residual).any():
+            few = pick[:: min(EVERY, max(1, pick.size // 2))]
+            trial = Response.of(whole, fit.motion.at(few))
+            predicted += float(variance @ np.concatenate([source.squares(trial) for source in sources])) * pick.size
+            observed += float(np.nanmean(residual**2)) * pick.size
+    return float(np.sqrt(max(1.0, observed / predicted))) if predicted > 0 else 1.0
+
+
+def _runs(fits: tuple[Fit, ...], bands: Bands) -> Iterator[tuple[Fit, Index]]:
+    """Yield every run of used frames that is long enough, with its trial."""
+    for fit in fits:
+        for pick in bands.runs(fit.use, fit.motion.rate):
+            if pick.size >= SHORTEST:
+                yield fit, pick
 
 
 def nothing(body: Body) -> Mismatch:
@@ -117,14 +136,6 @@ def _part_errors(name: str, phi: Array) -> Array:
     """
     off = error_size("part_com", "head" if name == "head" else "other")
     return np.column_stack([error_size("segment_mass", "floor") * phi, off * shift_slope(phi)])
-
-
-def _marker_squares(trial: Response, sources: tuple[ErrorSource, ...]) -> Array:
-    """Return (K,) mean square distance (m²) between markers and model that every error of unit size leaves, over one
-    of `EVERY` frames (two at least).
-    """
-    few = trial.at(slice(None, None, min(EVERY, max(1, trial.motion.time.size // 2))))
-    return np.concatenate([source.squares(few) for source in sources])
 
 
 def covariance(H: Array, found: Mismatch, sizes: Sizes) -> Array:

@@ -1,6 +1,9 @@
 """Joint centres that lie elsewhere and hinges whose axis is tilted."""
 
+from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,117 +12,127 @@ from biodance.body.human.skeleton import kind_of
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import Array, Index
 from biodance.spatial import skew
-from biodance.uncertainty.response import ErrorSource, Response, centres_of_mass, mean_local, mean_squares
+from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares
 
 
 @dataclass(frozen=True, eq=False)
-class Centre(ErrorSource):
+class _Carried(ErrorSource):
+    """Errors of joints that displace what hangs on them: segments, and their markers with them."""
+
+    @abstractmethod
+    def _own(self, trial: Response) -> Iterator[Array]:
+        """Yield joint by joint the functionals (F, 9, P) of the segments that hang on it."""
+
+    @abstractmethod
+    def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
+        """Yield joint by joint how the model's markers that hang on it move, (F, R, P) m, and their rows among 3M."""
+
+    def functional(self, trial: Response) -> Array:
+        """Return the functionals of the segments, and of the coordinates that follow their markers."""
+        parts = zip(self._own(trial), self._moved(trial), strict=True)
+        found = [own + trial.of_markers(moved, rows) for own, (moved, rows) in parts]
+        return np.concatenate(found or [np.empty((len(trial.place), 9, 0))], axis=2)
+
+    def residual(self, trial: Response) -> Array:
+        """Return the residuals of the markers that are carried along."""
+        return mean_local(trial, self._left(trial), np.ones((len(trial.place), 1)))
+
+    def squares(self, trial: Response) -> Array:
+        """Return the squared residuals of the markers that are carried along."""
+        return mean_squares(self._left(trial))
+
+    def _left(self, trial: Response) -> Array:
+        """Return what is left of all markers (F, 3M, K) m."""
+        found = [trial.left(moved, rows) for moved, rows in self._moved(trial)]
+        return np.concatenate(found or [np.empty((*trial.J.shape[:2], 0))], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Centre(_Carried):
     """A joint centre that lies elsewhere, along the axes of its parent (m).
 
     All that hangs on the joint is carried by R_parent - R_child C, with C = child_R_parent of the neutral posture,
     where the static trial has calibrated it away.
     """
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Three axes of every anatomical joint."""
         return tuple(f"joint_centre {kind_of(name)}" for name in self.joints)
 
-    @property
+    @cached_property
     def joints(self) -> tuple[str, ...]:
         """Every anatomical joint three times."""
         return tuple(joint_of(self.body, chain) for chain in chains(self.body) for _ in range(3))
 
-    def functional(self, trial: Response) -> Array:
-        """Return the functionals of what hangs on displaced centres, and of its markers that are carried along."""
-        value = trial.of_markers(self._moved(trial))
-        for k, (on, drift) in enumerate(self._drifts(trial)):
-            value[:, :, 3 * k : 3 * k + 3] += trial.place[:, on].sum(axis=1) @ drift
-        return value
+    def _own(self, trial: Response) -> Iterator[Array]:
+        for (on, _), drift in self._drifts(trial):
+            yield trial.place[:, on].sum(axis=1) @ drift
 
-    def residual(self, trial: Response) -> Array:
-        """Return the residuals of the markers that are carried along."""
-        left = trial.left(self._moved(trial))
-        return mean_local(trial, left, np.ones((len(left), 1)))
+    def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
+        for (_, rows), drift in self._drifts(trial):
+            yield np.tile(drift, (1, rows.size // 3, 1)), rows
 
-    def squares(self, trial: Response) -> Array:
-        """Return the squared residuals of the markers that are carried along."""
-        return mean_squares(trial.left(self._moved(trial)))
-
-    def _moved(self, trial: Response) -> Array:
-        """Return the displacements (F, 3M, K) m of the markers that are carried along."""
-        worn = np.array(self.body.markers.segment)
-        moved = np.zeros((len(trial.J), worn.size, 3, len(self.groups)))
-        for k, (on, drift) in enumerate(self._drifts(trial)):
-            moved[:, np.isin(worn, on), :, 3 * k : 3 * k + 3] = drift[:, None]
-        return moved.reshape(len(moved), 3 * worn.size, -1)
-
-    def _drifts(self, trial: Response) -> list[tuple[Index, Array]]:
-        """Return for every anatomical joint the segments on it and (F, 3, 3) m of their drift, lab, per metre along
-        the parent's axes.
+    def _drifts(self, trial: Response) -> Iterator[tuple[tuple[Index, Index], Array]]:
+        """Yield for every anatomical joint what hangs on it and (F, 3, 3) m of its drift, lab, per metre along the
+        parent's axes.
         """
-        rest, hangs, found = poses(self.body, self.body.neutral), below(self.body), []
-        for chain in chains(self.body):
-            turn, still = (_above(self.body, at, chain[0]) for at in (trial.pose, rest))
+        for chain, hanging, neutral in self._still:
             child = self.body.joints[chain[-1]].segment
-            drift = turn - trial.pose.rotation[:, child] @ (rest.rotation[0, child].T @ still[0])
-            found.append((np.flatnonzero(hangs[chain[0]]), drift))
-        return found
+            yield hanging, _above(self.body, trial.pose, chain[0]) - trial.pose.rotation[:, child] @ neutral
+
+    @cached_property
+    def _still(self) -> tuple[tuple[tuple[int, ...], tuple[Index, Index], Array], ...]:
+        """Axes of every anatomical joint, what hangs on it, and child_R_parent (3, 3) of the neutral posture."""
+        rest, found = poses(self.body, self.body.neutral), []
+        for chain in chains(self.body):
+            child = self.body.joints[chain[-1]].segment
+            neutral = rest.rotation[0, child].T @ _above(self.body, rest, chain[0])[0]
+            found.append((chain, _hanging(self.body, chain[0]), neutral))
+        return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
-class Tilt(ErrorSource):
+class Tilt(_Carried):
     """The axis of a hinge that is tilted against the bone's own, about two directions square to it (rad)."""
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Two directions of every hinge."""
         return tuple(f"tilt {kind_of(name)}" for name in self.joints)
 
-    @property
+    @cached_property
     def joints(self) -> tuple[str, ...]:
         """Every hinge twice."""
-        return tuple(joint_of(self.body, chain) for chain in chains(self.body) if len(chain) == 1 for _ in range(2))
+        return tuple(joint_of(self.body, (joint,)) for joint, _, _ in self._hinges for _ in range(2))
 
-    def functional(self, trial: Response) -> Array:
-        """Return the functionals of what hangs on a hinge, turned and displaced by the angle times the tilt."""
-        value, com = trial.of_markers(self._moved(trial)), centres_of_mass(self.body, trial.pose)
-        for k, (joint, on, rho) in enumerate(self._turns(trial)):
-            origin = trial.pose.joint_position[:, joint]
-            for s in on:
-                arm = skew(com[:, s] - origin)
-                value[:, :, 2 * k : 2 * k + 2] += trial.turn[:, s] @ rho - trial.place[:, s] @ (arm @ rho)
-        return value
+    def _own(self, trial: Response) -> Iterator[Array]:
+        for joint, (on, _), turn in self._turns(trial):
+            arm = skew(trial.com[:, on] - trial.pose.joint_position[:, joint, None])
+            yield (trial.turn[:, on] - trial.place[:, on] @ arm).sum(axis=1) @ turn
 
-    def residual(self, trial: Response) -> Array:
-        """Return the residuals of the markers that are turned along."""
-        left = trial.left(self._moved(trial))
-        return mean_local(trial, left, np.ones((len(left), 1)))
+    def _moved(self, trial: Response) -> Iterator[tuple[Array, Index]]:
+        for joint, (_, rows), turn in self._turns(trial):
+            arm = trial.markers[:, rows[::3] // 3] - trial.pose.joint_position[:, joint, None]
+            yield -(skew(arm) @ turn[:, None]).reshape(len(arm), rows.size, 2), rows
 
-    def squares(self, trial: Response) -> Array:
-        """Return the squared residuals of the markers that are turned along."""
-        return mean_squares(trial.left(self._moved(trial)))
+    def _turns(self, trial: Response) -> Iterator[tuple[int, tuple[Index, Index], Array]]:
+        """Yield for every hinge its joint, what hangs on it, and (F, 3, 2) rad of its turn, lab, per radian of tilt."""
+        for joint, hanging, across in self._hinges:
+            yield joint, hanging, trial.angles[:, joint, None, None] * (trial.pose.joint_rotation[:, joint] @ across)
 
-    def _moved(self, trial: Response) -> Array:
-        """Return the displacements (F, 3M, K) m of the markers that are turned along."""
-        worn = np.array(self.body.markers.segment)
-        marker = trial.pose.points(list(worn), self.body.markers.position)
-        moved = np.zeros((len(marker), worn.size, 3, len(self.groups)))
-        for k, (joint, on, rho) in enumerate(self._turns(trial)):
-            carried, origin = np.flatnonzero(np.isin(worn, on)), trial.pose.joint_position[:, joint, None]
-            moved[:, carried, :, 2 * k : 2 * k + 2] = -skew(marker[:, carried] - origin) @ rho[:, None]
-        return moved.reshape(len(marker), 3 * worn.size, -1)
+    @cached_property
+    def _hinges(self) -> tuple[tuple[int, tuple[Index, Index], Array], ...]:
+        """Every hinge: its joint, what hangs on it, and two unit vectors (3, 2) square to its axis."""
+        alone = [chain[0] for chain in chains(self.body) if len(chain) == 1]
+        return tuple((j, _hanging(self.body, j), np.array(_across(self.body.joints[j].axis)).T) for j in alone)
 
-    def _turns(self, trial: Response) -> list[tuple[int, Index, Array]]:
-        """Return for every hinge its joint, the segments on it, and (F, 3, 2) rad of their turn, lab, per radian of
-        tilt.
-        """
-        hangs, found = below(self.body), []
-        for (joint,) in (chain for chain in chains(self.body) if len(chain) == 1):
-            across = np.array(_across(self.body.joints[joint].axis)).T
-            rho = trial.angles[:, joint, None, None] * (trial.pose.joint_rotation[:, joint] @ across)
-            found.append((joint, np.flatnonzero(hangs[joint]), rho))
-        return found
+
+def _hanging(body: Body, joint: int) -> tuple[Index, Index]:
+    """Return the segments that hang on a joint, and the rows of their markers among 3M."""
+    hangs = below(body)[joint] > 0
+    markers = np.flatnonzero(hangs[list(body.markers.segment)])
+    return np.flatnonzero(hangs), (3 * markers[:, None] + np.arange(3)).ravel()
 
 
 def joint_of(body: Body, chain: tuple[int, ...]) -> str:

@@ -69,17 +69,24 @@ class Response:
             yield some, self.at(some)
 
     @cached_property
+    def markers(self) -> Array:
+        """(F, M, 3) m: where the model has its markers, lab."""
+        return self.pose.points(self.body.markers.segment, self.body.markers.position)
+
+    @cached_property
+    def com(self) -> Array:
+        """(F, N, 3) m: centres of mass of the segments, lab."""
+        return self.pose.points(list(range(len(self.body.segments))), self.body.sip.com)
+
+    @cached_property
     def J(self) -> Array:
         """(F, 3M, nv): markers per coordinate."""
-        segment = list(self.body.markers.segment)
-        points = self.pose.points(segment, self.body.markers.position)
-        return place_jacobian(self.body, self.pose, segment, points)
+        return place_jacobian(self.body, self.pose, list(self.body.markers.segment), self.markers)
 
     @cached_property
     def tangent(self) -> Array:
         """(F, 9, nv): the functionals of the coordinates."""
-        com = centres_of_mass(self.body, self.pose)
-        return tangent_of(self.body, self.pose, com, self.place, self.turn)
+        return tangent_of(self.body, self.pose, self.com, self.place, self.turn)
 
     @cached_property
     def follow(self) -> Array:
@@ -199,11 +206,6 @@ def _lengthened(rows: Array, count: int) -> csr_array:
     first.resize((_REACH, count))
     last = hstack([csr_array((_REACH, more)), last])
     return csr_array(vstack([first, middle, last]))
-
-
-def centres_of_mass(body: Body, pose: Poses) -> Array:
-    """Return the centres of mass (F, N, 3) m of the segments, lab."""
-    return pose.points(list(range(len(body.segments))), body.sip.com)
 
 
 def functionals(body: Body, motion: Motion) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
+from biodance.motion.ik.compiled.derivatives import FOUR, add_products
 from biodance.records import Array, Index
 from biodance.spatial import cross
 from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares, neighbours
@@ -29,10 +30,11 @@ class _WithAngles(ErrorSource):
     def transpose(self, trial: Response, back: Array) -> Array:
         """Return the same sums as of any error, the angles last: there are many, and few slopes."""
         found, size = [], back.shape[2]
+        work, back = np.empty((FOUR, size)), np.ascontiguousarray(back)
         for value, near in self._slopes(trial):
-            weight = np.swapaxes(value, 1, 2) @ back
-            summed = trial.angles[:, near].T @ weight.reshape(len(weight), -1)
-            found.append(np.swapaxes(summed.reshape(near.size, -1, size), 0, 1).reshape(-1, size))
+            sums = np.zeros((value.shape[2], near.size, size))
+            add_products(np.ascontiguousarray(value), trial.angles.take(near, axis=1), back, work, sums)
+            found.append(sums.reshape(-1, size))
         return np.concatenate(found)
 
 
@@ -46,7 +48,7 @@ class Slide(_WithAngles):
 
     patterns: tuple[Array, ...]
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Every pattern of a segment, times every angle beside it."""
         count = zip(self.body.segments, self.patterns, _near(self.body), strict=True)
@@ -61,9 +63,9 @@ class Slide(_WithAngles):
 
     def squares(self, trial: Response) -> Array:
         """Return the squared residuals of every pattern, times the squared angles."""
-        parts = self._left(trial)
-        found = [3 * np.mean(part**2, axis=1).T @ trial.angles[:, near] ** 2 / len(part) for part, near in parts]
-        return np.concatenate([part.ravel() for part in found])
+        count = len(self.body.markers.names) * len(trial.place)
+        parts = ((np.einsum("frp,frp->fp", left, left), near) for left, near in self._left(trial))
+        return np.concatenate([(square.T @ trial.angles[:, near] ** 2 / count).ravel() for square, near in parts])
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
         for s, on, rows, near in self._parts:
@@ -105,7 +107,7 @@ class Slide(_WithAngles):
 class Sag(ErrorSource):
     """Markers on flesh that yields to its own weight and acceleration, segment by segment (s²: m per m/s²)."""
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Every segment that wears markers."""
         return tuple(f"sag {kind_of(self.body.segments[s])}" for s in self._worn)
@@ -150,7 +152,7 @@ class Flesh(_WithAngles):
     (m/rad).
     """
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Three axes of every segment, times every angle beside it."""
         pairs = zip(self.body.segments, _near(self.body), strict=True)

@@ -3,6 +3,7 @@ sole.
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from itertools import combinations
 
 import numpy as np
@@ -46,7 +47,8 @@ def inside(plate: Plate, points: Array) -> Array:
     after = np.concatenate([corners[1:], corners[:1]])
     (x, y), (u, v) = corners.T, (after - corners).T
     inward = np.sign(x @ after[:, 1] - y @ after[:, 0]) * np.array([-v, u]) / np.hypot(u, v)
-    return np.asarray(np.min(points[..., :2] @ inward - (x * inward[0] + y * inward[1]), axis=-1))
+    within = points[..., :2] @ inward - (x * inward[0] + y * inward[1])
+    return np.asarray(reduce(np.minimum, np.moveaxis(within, -1, 0)))
 
 
 def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: Mask) -> Footing:

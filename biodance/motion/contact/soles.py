@@ -1,6 +1,7 @@
 """Where the soles of the feet are: from the heel and toe markers, or from the tracked body."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,10 +33,12 @@ class Soles:
     def __post_init__(self) -> None:
         freeze(self, "Soles", time=(None,), outline=(np.size(self.time), 2, None, 3))
 
-    @property
+    @cached_property
     def centre(self) -> Array:
-        """(T, 2, 3) m, mean of the outline's points; right foot first."""
-        return self.outline.mean(axis=2)
+        """(T, 2, 3) m, mean of the outline's points; right foot first; read-only."""
+        centre = self.outline.mean(axis=2)
+        centre.setflags(write=False)
+        return centre
 
 
 def soles_from_markers(markers: Markers, marker_set: MarkerSet) -> Soles:

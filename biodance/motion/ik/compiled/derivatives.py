@@ -76,3 +76,32 @@ def fill_tangent(hangs, joints, com, place, turn, tangent):
                     moved = cross_of(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
                     for f in range(P.shape[0]):
                         tangent[t, f, roots + j] += dot_of(three_of(P[f]), moved) + dot_of(three_of(D[f]), a)
+
+
+NINE, FOUR = 9, 4
+"""Functionals of a frame, and frames taken together: known beforehand, so that their loops are unrolled."""
+
+
+@compiled
+def add_products(value, angle, back, work, out):
+    """Add to out (R, n, p) the sum over time and functionals of ``value`` (T, 9, R) times ``angle`` (T, n) times
+    ``back`` (T, 9, p); ``work`` (4, p) is scratch.
+    """
+    frames, _, size = back.shape
+    for first in range(0, frames, FOUR):
+        for r in range(value.shape[2]):
+            for t in range(FOUR):
+                if first + t < frames:
+                    for j in range(size):
+                        total = 0.0
+                        for f in range(NINE):
+                            total += value[first + t, f, r] * back[first + t, f, j]
+                        work[t, j] = total
+                else:
+                    work[t] = 0.0
+            for n in range(angle.shape[1]):
+                for j in range(size):
+                    total = 0.0
+                    for t in range(FOUR):
+                        total += angle[min(first + t, frames - 1), n] * work[t, j]
+                    out[r, n, j] += total
