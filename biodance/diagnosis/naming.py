@@ -2,7 +2,9 @@
 the columns that depend on it, and repeat.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.special import chdtri, ndtr
@@ -53,6 +55,11 @@ class Round:
         best = self.suspects[0]
         near = [min(best.score - one.score, best.log_bayes_factor - one.log_bayes_factor) for one in self.suspects]
         return tuple(one.alias for one, far in zip(self.suspects, near, strict=True) if far <= TOGETHER)
+
+    @property
+    def measured(self) -> Mapping[tuple[str, str], tuple[float, float]]:
+        """By effect and target the size of the first parameter and its standard deviation (`ScoredCandidate.sd`)."""
+        return MappingProxyType({one.names: (float(one.start[0]), one.sd) for one in self.suspects})
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,9 +133,11 @@ def diagnose_session(
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
-    whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=found.examined is not None)
-    if found.examined:
-        whole = with_repairs(whole, found.examined.naming.found.problem.cases, tolerances or shipped(), effects)
+    naming = found.examined.naming if found.examined else None
+    measured = naming.screening.measured if naming else {}
+    whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
+    if naming:
+        whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
     if mended:
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
@@ -148,7 +150,6 @@ def diagnose_session(
 
 def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
     """Return the diagnosis of a copy with the labels exchanged, these named first."""
-    failed = checks
     note = (
         "The labels named were exchanged in a copy, and everything else was found in that copy. "
         "The recordings themselves are as they were."
@@ -156,8 +157,8 @@ def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagn
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*(failed_check(gate) for gate in failed), *diagnosis.findings),
-        gates=(*failed, *diagnosis.gates),
+        findings=(*(failed_check(gate) for gate in checks), *diagnosis.findings),
+        gates=(*checks, *diagnosis.gates),
         notes=(note, *diagnosis.notes),
     )
 
