@@ -61,7 +61,10 @@ def combine_findings(
         if (
             alike is None
             and judged
-            and (_simulation_disagrees(finding, checked, evidence) or _movement_shows_none(finding, checked, evidence, measured))
+            and (
+                _simulation_disagrees(finding, checked, evidence)
+                or _movement_shows_none(finding, checked, evidence, measured)
+            )
         ):
             doubtful.append(finding)
         else:
