@@ -124,21 +124,20 @@ def _runs(body: Body, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> I
 
 def _left(every: _Runs, marker: int) -> Array:
     """Return (2, B, 3): waves and swing of one marker, per axis and coefficient; zero for one that was not seen in half
-    of the time.
+    of the time. How far it lags is measured below the fastest band, where markers show the cameras.
     """
     out, seen = np.zeros((2, len(BANDS), 3)), np.isfinite(every.local[:, marker]).all(axis=1)
     if seen.mean() < 0.5:
         return out
     angles, specific, place = every.angles[seen], every.specific[seen, marker], every.local[seen, marker]
-    first = np.linalg.qr(angles[:, angles.any(axis=0)])[0]
-    beside = specific - first @ (first.T @ specific)
-    told = np.linalg.norm(beside, axis=0) > _EXPLAINED * np.linalg.norm(specific, axis=0)
-    second = np.linalg.qr(beside[:, told])[0]
-    rest = place - first @ (first.T @ place)
-    swing = second @ (second.T @ rest)
-    free = 1 - np.sum(first**2, axis=1) - np.sum(second**2, axis=1)
     speed = 2 * np.pi * every.frequency[seen]
     band = np.searchsorted(BANDS.edges, every.frequency[seen], side="right") - 1
+    basis = np.linalg.qr(angles[:, angles.any(axis=0)])[0]
+    rest, beside = (one - basis @ (basis.T @ one) for one in (place, specific))
+    told = np.linalg.norm(beside, axis=0) > _EXPLAINED * np.linalg.norm(specific, axis=0)
+    slow, beside = band < len(BANDS) - 1, beside[:, told]
+    swing = beside @ np.linalg.lstsq(beside[slow], rest[slow], rcond=None)[0]
+    free = 1 - np.sum(basis**2, axis=1)
     for b in range(len(BANDS)):
         here = band == b
         if free[here].sum() >= _FEWEST:

@@ -53,14 +53,14 @@ class InstrumentNoise:
         (B,) m per axis and coefficient, by band: what markers do on the body that no movement explains
         (`SkinUnrest.waves`).
     swing : tuple of float
-        (B,) m, the same of what they lag behind the acceleration (`SkinUnrest.swing`; six own sessions without fault).
+        (B,) m, the same of what they lag behind the acceleration (`SkinUnrest.swing`; the most of six own sessions).
     """
 
     camera: float = 1.0e-4
     plate: tuple[float, ...] = (0.0077, 0.0077, 0.0304, 0.0068, 0.0099, 0.0032)
     marker_distance: float = float("nan")
     skin: tuple[float, ...] = (3.8e-3, 3.8e-3, 1.8e-3, 5.0e-4, 1.6e-4)
-    swing: tuple[float, ...] = (3.6e-4, 4.3e-4, 3.8e-4, 2.9e-4, 7.8e-5)
+    swing: tuple[float, ...] = (3.4e-4, 4.9e-4, 5.1e-4, 3.9e-4, 1.04e-4)
 
     @property
     def distance(self) -> float:
