@@ -91,6 +91,7 @@ NONE = float("nan")
         (PLACE, "foot_across", 0.009, (0.0077, 0.0017), (0.069, 0.0018), True),  # its look-alike is what moves
         (PLACE, "foot_across", 0.080, (0.0077, 0.0017), (0.001, 0.0018), True),  # the movement would not show it
         (PLACE, "foot_across", 0.009, (0.0077, NONE), (0.001, 0.0018), True),  # nor measures it
+        (PLACE, "foot_across", 0.009, (0.0001, 0.018), (0.001, 0.0018), True),  # or worse than the feet
         (LATE, "force_end", 0.005, (0.001, 0.001), (0.0, NONE), False),
         (LATE, "force_end", 0.005, (0.055, 0.001), (0.0, NONE), True),
     ],
@@ -124,6 +125,15 @@ def test_two_sizes_of_one_cause_that_agree_must_be_more_than_laboratories_have()
             simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured={NAMES: moved}
         )
         assert bool(one.findings) is named
+
+
+def test_standing_alone_excludes_no_size() -> None:
+    """Forces are 62 ms late at every step; in the three seconds that could be compared nobody moved."""
+    evidence = heard(("time_delay", ""), "force_onset", 0.062, 0.01)
+    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable("time_delay", "", 0.03, "s"),), doubt="standing")
+    measured = {("time_delay", ""): (0.002, 0.005)}
+    one = combine_findings(simulation, WitnessFindings((LATE,), evidence), evidence, judged=True, measured=measured)
+    assert one.findings == (LATE,)
 
 
 def test_exchanged_labels_explain_nothing_that_plates_infer_causes() -> None:

@@ -137,9 +137,9 @@ def _movement_shows_none(
 ) -> bool:
     """Return whether a movement in which nothing is wrong, and that would show a cause of this size, measures no such
     size: not of the cause, and not of any look-alike of it. People may stand off centre on a plate that is in its
-    place, and forces that fit the movement throughout are not late.
+    place, and forces that fit the movement throughout are not late. Standing alone excludes nothing.
     """
-    if one.verdict != "nothing wrong" or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
+    if one.verdict != "nothing wrong" or one.doubt or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
         return False
     alike = [_names(alias) for alias in finding.set if _names(alias) != _names(finding) and _names(alias) in measured]
     said = {names: size for names in alike if (size := size_from_witnesses(evidence, names))}
@@ -154,14 +154,14 @@ def _fits_the_movement(
 ) -> bool:
     """Return whether the size of a cause that the witnesses ``said`` and the one that the simulation measured are one
     size, and that is more than laboratories have without a fault; a cause has only one. A size that the simulation did
-    not measure (standard deviation NaN) fits.
+    not measure (standard deviation NaN), or measures worse than the witnesses, fits.
     """
     (a, b), (size, sd) = said, moved
-    if not sd > 0:
+    if not sd < b:
         return True
     if abs(a - size) > _FAR * np.hypot(b, sd):
         return False
-    weight = np.array([max(b, 1e-12) ** -2, sd**-2])
+    weight = np.array([b**-2, sd**-2])
     return is_beyond_usual(evidence, names, float(weight @ [a, size] / weight.sum()), float(weight.sum() ** -0.5))
 
 
