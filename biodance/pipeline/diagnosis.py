@@ -130,7 +130,8 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
-    measured = naming.screening.measured if naming else {}
+    suspects = naming.screening.suspects if naming else ()
+    measured = {one.names: (float(one.start[0]), one.sd) for one in suspects}
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
