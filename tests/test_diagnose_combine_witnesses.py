@@ -42,37 +42,72 @@ def test_a_witness_is_believed_where_the_simulation_is_blind_or_finds_nothing_wr
     assert [f.effect for f in one.findings] == ["body_mass"]
 
 
+def heard(names: tuple[str, str], witness: str, value: float, sd: float) -> witness_evidence.WitnessEvidence:
+    """Return one observation that shows a cause of size ``value``, and its look-alike `OTHER` one to one."""
+    step, unit = (0.004, "s") if names[0] == "time_delay" else (0.005, "m")
+    there = Observation(witness, "somewhere", "static", value, sd, 0.0, unit)
+    causes = {one: Alteration(*one, "size", unit, step, lambda seen, size: seen) for one in (names, OTHER)}
+    return witness_evidence.WitnessEvidence((there,), causes, dict.fromkeys(causes, np.ones(1)))
+
+
+OTHER = ("plate_position", "plate2:y")
+PLACE = replace(finding(*NAMES, 0.071, "m", OTHER), parameters=(Estimate("shift", 0.071, 0.017, "m"),))
+LATE = replace(finding("time_delay", "", 0.062, "s"), parameters=(Estimate("delay", 0.062, 0.01, "s"),))
+NONE = float("nan")
+
+
 @pytest.mark.parametrize(
-    ("witness", "bayes", "named"),
-    [("standing_place", -1.6, False), ("standing_place", 1.6, True), ("foot_across", -1.6, True)],
+    ("said", "witness", "limit", "moved", "other", "named"),
+    [
+        (PLACE, "standing_place", 0.009, (0.0077, 0.0017), (0.001, 0.0018), False),
+        (PLACE, "foot_across", 0.009, (0.0077, 0.0017), (0.001, 0.0018), False),
+        (PLACE, "foot_across", 0.009, (0.060, 0.0017), (0.001, 0.0018), True),  # both show it
+        (PLACE, "foot_across", 0.009, (0.0077, 0.0017), (0.069, 0.0018), True),  # its look-alike is what moves
+        (PLACE, "foot_across", 0.080, (0.0077, 0.0017), (0.001, 0.0018), True),  # the movement would not show it
+        (PLACE, "foot_across", 0.009, (0.0077, NONE), (0.001, 0.0018), True),  # nor measures it
+        (PLACE, "foot_across", 0.009, (0.0001, 0.018), (0.001, 0.0018), True),  # or worse than the feet
+        (LATE, "force_end", 0.005, (0.001, 0.001), (0.0, NONE), False),
+        (LATE, "force_end", 0.005, (0.055, 0.001), (0.0, NONE), True),
+    ],
 )
-def test_who_stands_beside_the_middle_has_no_plate_beside_its_place(witness: str, bayes: float, named: bool) -> None:
-    """The movement, which sees 8 mm, shows nothing wrong and nothing of 21 mm; feet have their own say."""
-    cause = Alteration(*NAMES, "shift", "m", 0.005, lambda seen, size: seen)
-    there = Observation(witness, "pressure to the left", "static", 0.021, 0.003, 0.0, "m")
-    said = witness_evidence.WitnessEvidence((there,), {NAMES: cause}, {NAMES: np.ones(1)})
-    limits, candidates = (Unobservable(*NAMES, 0.008, "m"),), (Alias(*NAMES, bayes),)
-    simulation = Diagnosis("nothing wrong", (), limits=limits, candidates=candidates)
-    place = finding(*NAMES, 0.021, "m")
-    one = combine_findings(simulation, WitnessFindings((place,), said), said, judged=True)
-    assert one.findings == ((place,) if named else ())
+def test_a_size_that_the_movement_excludes_is_not_named(
+    said: Finding,
+    witness: str,
+    limit: float,
+    moved: tuple[float, float],
+    other: tuple[float, float],
+    named: bool,
+) -> None:
+    """A person who stands off centre, feet that are lifted: the movement measures the same cause, eight times surer."""
+    names, own = (said.effect, said.target), said.parameters[0]
+    evidence = heard(names, witness, own.value, own.sd)
+    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*names, limit, own.unit),))
+    measured = {names: moved, OTHER: other}
+    one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
+    assert one.findings == ((said,) if named else ())
     assert one.verdict == ("named, complete" if named else "nothing wrong")
-    assert any("plate position of plate1:y" in note for note in one.notes) is not named
+    assert any("the movement, which would show it" in note for note in one.notes) is not named
 
 
-@pytest.mark.parametrize(("bayes", "named"), [(-1.6, False), (1.6, True)])
-def test_forces_that_fit_the_whole_movement_come_not_late_at_one_step(bayes: float, named: bool) -> None:
-    """The movement, which sees 5 ms, shows nothing wrong and nothing of 62 ms."""
-    clock = ("time_delay", "")
-    cause = Alteration(*clock, "delay", "s", 0.004, lambda seen, size: seen)
-    there = Observation("force_end", "left foot on plate2 at 0.5 s", "stand", 0.038, 0.01, -0.024, "s")
-    said = witness_evidence.WitnessEvidence((there,), {clock: cause}, {clock: np.ones(1)})
-    limits, candidates = (Unobservable(*clock, 0.005, "s"),), (Alias(*clock, bayes),)
-    simulation = Diagnosis("nothing wrong", (), limits=limits, candidates=candidates)
-    late = finding(*clock, 0.062, "s")
-    one = combine_findings(simulation, WitnessFindings((late,), said), said, judged=True)
-    assert one.findings == ((late,) if named else ())
-    assert any("look like a time delay;" in note for note in one.notes) is not named
+def test_two_sizes_of_one_cause_that_agree_must_be_more_than_laboratories_have() -> None:
+    """Feet say 18 ± 5 mm and the movement 6 ± 1.5 mm: together 7 mm, which laboratories have without a fault."""
+    said = replace(PLACE, parameters=(Estimate("shift", 0.018, 0.005, "m"),), set=PLACE.set[:1])
+    evidence = heard(NAMES, "foot_across", 0.018, 0.005)
+    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*NAMES, 0.009, "m"),))
+    for moved, named in (((0.006, 0.0015), False), ((0.016, 0.0015), True)):
+        one = combine_findings(
+            simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured={NAMES: moved}
+        )
+        assert bool(one.findings) is named
+
+
+def test_standing_alone_excludes_no_size() -> None:
+    """Forces are 62 ms late at every step; in the three seconds that could be compared nobody moved."""
+    evidence = heard(("time_delay", ""), "force_onset", 0.062, 0.01)
+    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable("time_delay", "", 0.03, "s"),), doubt="standing")
+    measured = {("time_delay", ""): (0.002, 0.005)}
+    one = combine_findings(simulation, WitnessFindings((LATE,), evidence), evidence, judged=True, measured=measured)
+    assert one.findings == (LATE,)
 
 
 def test_exchanged_labels_explain_nothing_that_plates_infer_causes() -> None:

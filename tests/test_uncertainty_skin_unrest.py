@@ -6,7 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 from diagnosed_sessions import CORNERS, body, known, looks, motion, noise
+from scipy.interpolate import make_interp_spline
 
+from biodance.body.parts import GRAVITY
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.own_tolerances import own_tolerances
@@ -18,7 +20,7 @@ from biodance.records import Array, Markers, Motion, Wrench
 from biodance.spatial import wrench_about_origin, wrench_about_point
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import of_marker_errors
-from biodance.uncertainty.skin_unrest import excess_unrest, skin_unrest
+from biodance.uncertainty.skin_unrest import SkinUnrest, skin_unrest
 
 GENTLE = 0.3
 """Share of the synthetic movement that tracking follows from its own start."""
@@ -50,6 +52,17 @@ def filmed(look: Look, local: Array) -> Look:
     return replace(one, motion=track(body(), one.trial))
 
 
+def lagging(moving: Motion, lag: Array) -> Array:
+    """Return (T, K, 3) m: markers that yield to the specific force at their place by ``lag`` (K,) s², as far as it
+    changes.
+    """
+    pose, segment = poses(body(), moving.q), list(body().markers.segment)
+    place = pose.points(segment, body().markers.position)
+    force = GRAVITY - make_interp_spline(moving.time, place, k=5).derivative(2)(moving.time)
+    local = np.einsum("tkij,tki->tkj", pose.rotation[:, segment], force)
+    return np.asarray(lag[:, None] * (local - local.mean(axis=0)))
+
+
 @cache
 def restless(size: float = 0.0016) -> tuple[Look, ...]:
     """Return a session of a person who moves gently and whose skin waves by ``size`` m; nothing else is wrong."""
@@ -66,8 +79,13 @@ def restless(size: float = 0.0016) -> tuple[Look, ...]:
     return tuple(found)
 
 
-def seen(some: tuple[Look, ...]) -> Array:
+def unrest(some: tuple[Look, ...]) -> SkinUnrest:
     return skin_unrest(body(), ((one.trial, one.motion, one.use) for one in some))
+
+
+def seen(some: tuple[Look, ...]) -> Array:
+    """Return (B, 3): the waves of the middle marker."""
+    return np.median(unrest(some).waves, axis=2)
 
 
 def test_what_goes_with_the_movement_is_no_unrest() -> None:
@@ -87,21 +105,28 @@ def test_what_goes_with_the_movement_is_no_unrest() -> None:
 
 def test_markers_that_nobody_sees_and_trials_too_short_tell_nothing() -> None:
     one = restless()[0]
-    assert not skin_unrest(body(), []).any()
-    assert not seen((replace(one, trial=replace(one.trial, markers=None)),)).any()
-    assert not seen((replace(one, use=np.arange(one.use.size) < 40),)).any()
+    silent = (replace(one, trial=replace(one.trial, markers=None)), replace(one, use=np.arange(one.use.size) < 40))
+    for some in ((), silent[:1], silent[1:]):
+        assert not unrest(some).waves.any()
+        assert not unrest(some).excess((0.0,) * len(BANDS), (0.0,) * len(BANDS)).any()
     fewer = tuple(
         replace(some, trial=replace(some.trial, markers=some.trial.markers.select(some.trial.markers.names[:-3])))
         for some in restless()
     )
-    np.testing.assert_allclose(seen(fewer)[2], seen(restless())[2], rtol=0.1)
+    assert not unrest(fewer).waves[:, :, -3:].any()
+    np.testing.assert_array_equal(unrest(fewer).waves[:, :, :-3], unrest(restless()).waves[:, :, :-3])
+    np.testing.assert_allclose(unrest(fewer).sizes()[0][2], unrest(restless()).sizes()[0][2], rtol=0.1)
 
 
-def test_the_unrest_of_the_skin_reaches_the_forces_as_it_does_in_truth() -> None:
-    """A body that stands still under waving markers: what tracking makes of it, in forces and moments."""
+@pytest.mark.parametrize("loud", [(), ("RTHI", "LTHI", "RKNE", "LKNE")])
+def test_the_unrest_of_the_skin_reaches_the_forces_as_it_does_in_truth(loud: tuple[str, ...]) -> None:
+    """A body that stands still under waving markers, all alike or some three times as loud: what tracking makes of it,
+    in forces and moments.
+    """
     one, look = body(), looks(3, trials=1)[0]
     quiet = replace(motion(3), q=np.tile(one.neutral, (600, 1)), v=np.zeros((600, one.nv)), a=np.zeros((600, one.nv)))
-    found = [filmed(replace(look, motion=quiet), waves(quiet.time, k, 0.004)) for k in range(4)]
+    size = np.where(np.isin(one.markers.names, loud), 0.006, 0.002 if loud else 0.004)[:, None]
+    found = [filmed(replace(look, motion=quiet), size * waves(quiet.time, k, 1.0)) for k in range(4)]
     about = np.array([0.0, 0.0, 0.0])
     square, count = np.zeros(6), 0
     for some in found:
@@ -109,7 +134,7 @@ def test_the_unrest_of_the_skin_reaches_the_forces_as_it_does_in_truth() -> None
         rows = BANDS.coefficients(wrench_about_point(wrench, about)[::2])
         here = BANDS.of(len(rows)) == 2
         square, count = square + np.sum(rows[here] ** 2, axis=0), count + here.sum()
-    power = seen(tuple(found))
+    power = unrest(tuple(found)).excess((0.0,) * len(BANDS), (0.0,) * len(BANDS))
     expected = np.diag(of_marker_errors(one, one.neutral[None], about, power)[2])
     ratio = np.sqrt(expected / (square / count))
     assert ratio.min() > 0.7, ratio
@@ -122,10 +147,26 @@ def test_only_more_unrest_than_usual_makes_the_forces_louder() -> None:
     more = np.array([np.diag(b) for b in here.noise - calm.noise])
     assert (more[2] > 0.005).all()
     assert np.abs(more[4]).max() < 1e-12
-    power = np.array([[1e-4, 1.0, 1.0]] * len(BANDS))
-    assert not excess_unrest(power, (0.011,) * len(BANDS)).any()
-    share = excess_unrest(power, (0.008,) * len(BANDS))[:, 0] / 1e-4
-    np.testing.assert_allclose(share, [0.36, 0.36, 0.36, 0.36, 0.0])
+    power = np.repeat(np.array([[1e-4, 1.0, 1.0]] * len(BANDS))[:, :, None], 5, axis=2)
+    power[:, :, 0], power[:, :, 1] = 0.0, 1e3 * power[:, :, 1]  # one that nobody sees, one that is wrong
+    both = SkinUnrest(power, power)
+    assert not both.excess((0.011,) * len(BANDS), (0.011,) * len(BANDS)).any()
+    share = both.excess((0.008,) * len(BANDS), (0.011,) * len(BANDS))[:, 0] / 1e-4
+    np.testing.assert_allclose(share[:, 2], [0.36, 0.36, 0.36, 0.36, 0.0])
+    np.testing.assert_allclose(share[:4, :2], [[0.0, 9 * 0.36]] * 4)
+    lagging = both.excess((0.011,) * len(BANDS), (0.008,) * len(BANDS))[:, 0] / 1e-4
+    np.testing.assert_allclose(lagging[:, 2], [0.36] * 5)
+
+
+def test_flesh_that_lags_behind_is_swing_and_no_wave() -> None:
+    """Markers displaced by 1, 2 or 3 times 1e-3 s² times the specific force, beside what the joint angles explain."""
+    session = looks(3, trials=6)
+    lag = 1e-3 * (1 + np.arange(len(body().markers.names)) % 3)
+    found = unrest(tuple(dressed(look, lagging(look.motion, lag)) for look in session))
+    assert found.sizes()[0][3] < 0.3 * found.sizes()[1][3]
+    assert unrest(session).sizes()[1].max() < 1e-6
+    size = np.sqrt(found.swing[3, 0])
+    assert size[lag == 0.003].mean() / size[lag == 0.001].mean() == pytest.approx(3.0, rel=0.3)
 
 
 def test_restless_skin_is_no_alarm() -> None:

@@ -5,14 +5,16 @@ whole body. The size of a cause that both name is their precision-weighted mean.
 its look-alikes from the simulation, and a size that the witnesses exclude is withdrawn.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
-from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
+from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, is_beyond_usual, size_from_witnesses
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
@@ -20,23 +22,25 @@ _PLAIN = 3.0
 """Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
 _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
-_STANDING = {"standing_place"}
-"""Witnesses of a habit: no law says where over their feet people stand."""
-_INSTANTS = {"force_onset", "force_end"}
-"""Witnesses of single instants: a clock that runs late moves the forces of the whole movement, too."""
 _WEIGHING = {"standing_force", "stride_force"}
 """Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
-_NOT_MOVED = "Standing and single steps alone look like a {}; the movement, which would show it, shows none."
+_NOT_MOVED = "Feet, clocks and weights alone look like a {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
 
 
 def combine_findings(
-    one: Diagnosis, by_witnesses: WitnessFindings, evidence: WitnessEvidence, *, judged: bool
+    one: Diagnosis,
+    by_witnesses: WitnessFindings,
+    evidence: WitnessEvidence,
+    *,
+    judged: bool,
+    measured: Mapping[tuple[str, str], tuple[float, float]] = MappingProxyType({}),
 ) -> Diagnosis:
     """Return the diagnosis combined with the findings of the witnesses; ``judged``: whether the simulation was
-    available.
+    available; ``measured``: by effect and target the size of the first parameter in the simulation, with its standard
+    deviation, where nothing was named (`screening.ScoredCandidate`).
     """
     one = replace(one, witnesses=evidence if evidence.observations else None)
     raw = any(finding.effect in _RAW for finding in one.findings)
@@ -57,7 +61,10 @@ def combine_findings(
         if (
             alike is None
             and judged
-            and (_simulation_disagrees(finding, checked, evidence) or _movement_shows_none(finding, checked, evidence))
+            and (
+                _simulation_disagrees(finding, checked, evidence)
+                or _movement_shows_none(finding, checked, evidence, measured)
+            )
         ):
             doubtful.append(finding)
         else:
@@ -122,15 +129,40 @@ def _same_size(finding: Finding, other: Finding) -> bool:
     return bool(abs(kept_findings.value - its.value) <= _FAR * np.hypot(kept_findings.sd, its.sd))
 
 
-def _movement_shows_none(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
-    """Return whether a finding rests only on where the person stands over the feet, or only on single instants, while
-    a movement that would show a cause of this size shows none: people may stand off centre on a plate that is in its
-    place, and forces that fit the movement throughout are not late.
+def _movement_shows_none(
+    finding: Finding,
+    one: Diagnosis,
+    evidence: WitnessEvidence,
+    measured: Mapping[tuple[str, str], tuple[float, float]],
+) -> bool:
+    """Return whether a movement in which nothing is wrong, and that would show a cause of this size, measures no such
+    size: not of the cause, and not of any look-alike of it. People may stand off centre on a plate that is in its
+    place, and forces that fit the movement throughout are not late. Standing alone excludes nothing.
     """
-    by = set(evidence.seen_by(_names(finding))) if _names(finding) in evidence.causes else {""}
-    alone = by <= _STANDING or by <= _INSTANTS
-    seen = alone and one.verdict == "nothing wrong" and _size_over_limit(finding, one) > 1.0
-    return seen and _evidence(finding, one) <= 0.0
+    if one.verdict != "nothing wrong" or one.doubt or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
+        return False
+    alike = [_names(alias) for alias in finding.set if _names(alias) != _names(finding) and _names(alias) in measured]
+    said = {names: size for names in alike if (size := size_from_witnesses(evidence, names))}
+    said[_names(finding)] = finding.parameters[0].value, finding.parameters[0].sd
+    return _names(finding) in measured and not any(
+        _fits_the_movement(names, size, measured[names], evidence) for names, size in said.items()
+    )
+
+
+def _fits_the_movement(
+    names: tuple[str, str], said: tuple[float, float], moved: tuple[float, float], evidence: WitnessEvidence
+) -> bool:
+    """Return whether the size of a cause that the witnesses ``said`` and the one that the simulation measured are one
+    size, and that is more than laboratories have without a fault; a cause has only one. A size that the simulation did
+    not measure (standard deviation NaN), or measures worse than the witnesses, fits.
+    """
+    (a, b), (size, sd) = said, moved
+    if not sd < b:
+        return True
+    if abs(a - size) > _FAR * np.hypot(b, sd):
+        return False
+    weight = np.array([b**-2, sd**-2])
+    return is_beyond_usual(evidence, names, float(weight @ [a, size] / weight.sum()), float(weight.sum() ** -0.5))
 
 
 def _size_over_limit(finding: Finding, one: Diagnosis) -> float:

@@ -13,7 +13,7 @@ from biodance.identification.statistics import standing_point
 from biodance.records import Array, Trial
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import added_noise, of_marker_errors, of_zeros, with_own_noise, with_zeros
-from biodance.uncertainty.skin_unrest import excess_unrest, skin_unrest
+from biodance.uncertainty.skin_unrest import SkinUnrest, skin_unrest
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
 _POSTURES = 4
@@ -70,7 +70,7 @@ def own_tolerances(
             f"taken for so many times as large, and a fault must be larger to be seen. Tolerances learned on sessions "
             f"of your own laboratory without fault (biodance learn) hold for it."
         )
-    restless = excess_unrest(skin_of(body, chosen), found.instruments.skin)
+    restless = skin_of(body, chosen).excess(found.instruments.skin, found.instruments.swing)
     if restless.any():
         found = with_own_noise(found, of_marker_errors(body, postures, about, restless), mass)
     standing = tuple(look for look in chosen if look.trial.role == "static" and look.seconds > 0)
@@ -107,8 +107,8 @@ def soft_tissue(chosen: tuple[Look, ...]) -> float:
     return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
 
 
-def skin_of(body: Body, chosen: tuple[Look, ...]) -> Array:
-    """Return the `skin_unrest` (B, 3) of the trials of people who move."""
+def skin_of(body: Body, chosen: tuple[Look, ...]) -> SkinUnrest:
+    """Return the `skin_unrest` of the trials of people who move."""
     return skin_unrest(body, ((one.trial, one.motion, one.use) for one in chosen if one.trial.role != "static"))
 
 

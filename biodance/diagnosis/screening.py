@@ -17,7 +17,8 @@ from biodance.records import Array
 @dataclass(frozen=True, eq=False)
 class ScoredCandidate:
     """One cause in one round: its ``score`` is the log Bayes factor less the logarithm of its number of targets;
-    ``start`` (p,) parameters; ``visible`` share. Its columns are not kept.
+    ``start`` (p,) parameters, ``sd`` of the first of them (NaN where it was not measured in proportion to the cause);
+    ``visible`` share. Its columns are not kept.
     """
 
     effect: Effect
@@ -25,6 +26,7 @@ class ScoredCandidate:
     score: float
     start: Array
     visible: float
+    sd: float = float("nan")
 
     @property
     def names(self) -> tuple[str, str]:
@@ -47,7 +49,9 @@ def screen(found: Model, causes: tuple[Candidate, ...]) -> tuple[ScoredCandidate
         tried = [(here.log_bayes_factor, one.start(here.mean)), *_at_sizes(found, one.effect)]
         value, begin = max(tried, key=lambda pair: pair[0])
         score = value - float(np.log(targets[one.names[0]]))
-        suspects.append(ScoredCandidate(one.effect, value, score, begin, here.visible))
+        measured = begin is tried[0][1] and not one.silent[0]
+        sd = SCALE * one.effect.typical[0] * here.covariance[0, 0] ** 0.5 if measured else float("nan")
+        suspects.append(ScoredCandidate(one.effect, value, score, begin, here.visible, float(sd)))
     return tuple(sorted(suspects, key=lambda suspect: -suspect.score))
 
 

@@ -213,15 +213,24 @@ def _typical(effect: str, target: str) -> float:
 
 
 def _exceeds_usual(evidence: WitnessEvidence, one: Hypothesis) -> bool:
-    """Return whether the last cause of a fit is significant and larger than laboratories have it without a fault."""
+    """Return whether the last cause of a fit is significant and larger than laboratories have it without a fault; the
+    sign of a channel has no size.
+    """
     if one.names not in evidence.causes:
         return True
-    cause, size = evidence.causes[one.names], abs(float(one.found.theta[-1]))
+    return is_beyond_usual(evidence, one.names, float(one.found.theta[-1]), float(one.found.covariance[-1, -1] ** 0.5))
+
+
+def is_beyond_usual(evidence: WitnessEvidence, names: tuple[str, str], size: float, sd: float) -> bool:
+    """Return whether the ``size`` of a cause with standard deviation ``sd`` is significant and larger than laboratories
+    have it without a fault.
+    """
+    cause = evidence.causes[names]
     usual = _USUAL.get((cause.effect, cause.unit), 0.0)
     if cause.effect == "plate_offset" and cause.target.endswith("Fz"):
         usual = _VERTICAL
-    sd = float(np.hypot(one.found.covariance[-1, -1] ** 0.5, _ALIKE.get(cause.effect, 0.0)))
-    return size > usual + sd and size > _SURE * sd
+    whole = float(np.hypot(sd, _ALIKE.get(cause.effect, 0.0)))
+    return abs(size) > usual + whole and abs(size) > _SURE * whole
 
 
 def _findings(

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from biodance import display
-from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
@@ -22,6 +21,7 @@ from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
+from biodance.pipeline.another_body import beside_another_body
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
@@ -37,10 +37,6 @@ if TYPE_CHECKING:
 
 _FAR = "its markers move more on the body than where tolerances were learned"
 """Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
-_MORE_JOINTS = "the body moves at joints ({}) for which nobody has learned yet what is usual"
-"""Why what is left of a body with optional joints may be theirs."""
-_FEWER_JOINTS = "no marker shows what moves at {}, and the plates measure it all the same"
-"""Why what is left of a part of a body may be the forces of the other part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +129,12 @@ def diagnose_session(
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
-    whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=found.examined is not None)
-    if found.examined:
-        whole = with_repairs(whole, found.examined.naming.found.problem.cases, tolerances or shipped(), effects)
+    naming = found.examined.naming if found.examined else None
+    suspects = naming.screening.suspects if naming else ()
+    measured = {one.names: (float(one.start[0]), one.sd) for one in suspects}
+    whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
+    if naming:
+        whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
     if mended:
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
@@ -148,7 +147,6 @@ def diagnose_session(
 
 def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
     """Return the diagnosis of a copy with the labels exchanged, these named first."""
-    failed = checks
     note = (
         "The labels named were exchanged in a copy, and everything else was found in that copy. "
         "The recordings themselves are as they were."
@@ -156,8 +154,8 @@ def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagn
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*(failed_check(gate) for gate in failed), *diagnosis.findings),
-        gates=(*failed, *diagnosis.gates),
+        findings=(*(failed_check(gate) for gate in checks), *diagnosis.findings),
+        gates=(*checks, *diagnosis.gates),
         notes=(note, *diagnosis.notes),
     )
 
@@ -202,21 +200,10 @@ def _diagnosed(
     if not own.believed:
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
-    doubt = _other_body(result.body, tuple(one.name for one in result.shown_joints.gains if one.taken))
-    if doubt and examined.diagnosis.verdict == "unexplained" and not examined.diagnosis.doubt:
-        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=doubt))
+    joints = tuple(one.name for one in result.shown_joints.gains if one.taken)
+    examined = beside_another_body(examined, result.body, joints)
     tell("measuring what the findings change")
     return _with_gains(result, examined)
-
-
-def _other_body(body: Body, joints: tuple[str, ...]) -> str:
-    """Return why what is left may be that of a body that moves otherwise than where tolerances were learned: at more
-    ``joints``, or at joints that no marker shows; "" where it does not.
-    """
-    hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
-    if hidden:
-        return _FEWER_JOINTS.format(", ".join(name.replace("_", " ") for name in hidden))
-    return _MORE_JOINTS.format(", ".join(joints)) if joints else ""
 
 
 def standing_notes(result: SessionResult) -> tuple[str, ...]:

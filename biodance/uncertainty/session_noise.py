@@ -80,17 +80,17 @@ def plate_noise(plates: Iterable[Plate]) -> Array:
 
 
 def carried(body: Body, q: Array, about: Array) -> Array:
-    """Return (3, 6, 6): covariance of the wrench about ``about`` (3,) m per m² of independent noise of all markers in
-    the posture ``q`` (nq,): of what is displaced and has weight; per (rad/s)², of that beside what is accelerated
-    (negative: a place and its second derivative are opposite); per (rad/s)⁴, of what is accelerated.
+    """Return (3, M, 6, 6): covariance of the wrench about ``about`` (3,) m that each of the M markers adds in the
+    posture ``q`` (nq,), per m² of independent noise: of what is displaced and has weight; per (rad/s)², of that beside
+    what is accelerated (negative: a place and its second derivative are opposite); per (rad/s)⁴, of what is
+    accelerated.
     """
     pose = poses(body, q[None])
     segment = list(body.markers.segment)
     points = pose.points(segment, body.markers.position)
     place = place_jacobian(body, pose, segment, points)
     weighted = np.repeat(np.asarray(body.markers.weight), 3)[:, None] * place[0]
-    inverse = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv))
-    spread = inverse @ weighted.T @ weighted @ inverse
+    followed = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv)) @ weighted.T
     turn = np.eye(body.nv)
     if body.n_root:
         to_root = quaternion_matrix(q[None, 3:7])[0].T
@@ -99,9 +99,9 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     still = Motion(np.arange(len(rows)) / 100.0, np.tile(q, (len(rows), 1)), np.zeros_like(rows), rows)
     value = predict_wrench(body, still).value
     moved = Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
-    hung = _hung(body, pose)
-    both = moved @ spread @ hung.T
-    return np.stack([hung @ spread @ hung.T, -(both + both.T), moved @ spread @ moved.T])
+    hung, moved = ((one @ followed).reshape(6, -1, 3).swapaxes(0, 1) for one in (_hung(body, pose), moved))
+    both = hung @ moved.swapaxes(1, 2)
+    return np.stack([hung @ hung.swapaxes(1, 2), -(both + both.swapaxes(1, 2)), moved @ moved.swapaxes(1, 2)])
 
 
 def _hung(body: Body, pose: Poses) -> Array:
@@ -114,10 +114,11 @@ def _hung(body: Body, pose: Poses) -> Array:
 
 def of_marker_errors(body: Body, postures: Array, about: Array, power: Array) -> Array:
     """Return (B, 6, 6): covariance of one coefficient per band that markers add to the wrench residual which err by
-    ``power`` (B, 3) per axis: m² times the powers 0, 2 and 4 of the angular frequency; mean over the ``postures``
-    (n, nq).
+    ``power`` (B, 3), or (B, 3, M) each by its own, per axis: m² times the powers 0, 2 and 4 of the angular frequency;
+    mean over the ``postures`` (n, nq).
     """
-    return np.einsum("bk,kij->bij", power, np.mean([carried(body, q, about) for q in postures], axis=0))
+    each = power.reshape(*power.shape[:2], -1) * np.ones(len(body.markers.names))
+    return np.einsum("bkm,kmij->bij", each, np.mean([carried(body, q, about) for q in postures], axis=0))
 
 
 def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate: float) -> Array:

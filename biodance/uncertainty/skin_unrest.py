@@ -1,9 +1,9 @@
-"""How restless the skin of a session is: what its markers do on the body that no joint angle, weight or acceleration
-explains.
+"""How restless the skin of a session is: what its markers do on the body that no joint angle explains.
 
-Errors of soft tissue that go with the movement are looked for one by one (`soft_tissue`). What goes its own way (waves
-of flesh, clothes, a strap that works loose) follows no column: it can only be noise, and the markers show how much of
-it there is, and how fast it is.
+Errors of soft tissue that go with the movement are looked for one by one (`soft_tissue`), all markers of a segment
+alike. What goes its own way (waves of flesh, clothes, a strap that works loose) follows no column, and neither does
+flesh that lags behind the acceleration where every marker of a segment lags otherwise: both can only be noise, and the
+markers show how much of it there is, where, and how fast it is.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,6 +22,36 @@ _RATE = 50.0
 """Hz at which markers are looked at: second differences of what is slower than 6 Hz are good to 10 %."""
 _FEWEST = 10.0
 """Coefficients per band and axis, beside those that the movement explains, below which nothing is measured."""
+_LOUDEST = 9.0
+"""Times the power of the middle marker (three times its size) beyond which a marker is wrong rather than restless."""
+_EXPLAINED = 1e-6
+"""Share of a specific force beside the joint angles below which these explain it."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinUnrest:
+    """What the markers do on the body per axis and coefficient, in every band: (B, 3, M) m², m²/s², m²/s⁴, the power
+    times the powers 0, 2 and 4 of its angular frequency; zero in bands where too little is left to tell and for markers
+    that tell nothing (weight zero, seen in less than half of the time).
+
+    ``waves`` what neither joint angles nor the specific force at the marker explain; ``swing`` what the specific force
+    explains beside the angles: flesh that lags behind the acceleration.
+    """
+
+    waves: Array
+    swing: Array
+
+    def sizes(self) -> tuple[Array, Array]:
+        """Return (B,) m of the waves and of the swing: the middle marker, as one that is wrong tells nothing."""
+        return tuple(np.sqrt(_middle(one)[:, 0]) for one in (self.waves, self.swing))  # type: ignore[return-value]
+
+    def excess(self, waves: tuple[float, ...], swing: tuple[float, ...]) -> Array:
+        """Return (B, 3, M): power that is more than usual, where (B,) m of ``waves`` and ``swing`` are; of the waves
+        none in the fastest band, where markers show the cameras.
+        """
+        own = _excess(self.waves, waves)
+        own[-1] = 0.0
+        return own + _excess(self.swing, swing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,31 +66,34 @@ class _Runs:
     frequency: Array
 
 
-def skin_unrest(body: Body, moved: Iterable[tuple[Trial, Motion, NDArray[np.bool_]]]) -> Array:
-    """Return (B, 3) m², m²/s², m²/s⁴: what is left of a marker's place on the body per axis and coefficient, times the
-    powers 0, 2 and 4 of its angular frequency, in every band; the median over the markers that count, as a marker that
-    is wrong tells nothing of the skin.
+def skin_unrest(body: Body, moved: Iterable[tuple[Trial, Motion, NDArray[np.bool_]]]) -> SkinUnrest:
+    """Return what the markers of ``body`` do on it in ``moved`` trials, with its motion and the frames (T,) to look at.
 
-    ``moved`` trials with the motion of ``body`` in them and the frames (T,) to look at. Least squares take off what the
-    joint angles and the specific force at the marker explain, with the same coefficients in all trials; zero in bands
-    where too little is left to tell.
+    Least squares take off what the joint angles explain, then what the specific force at the marker does, with the same
+    coefficients in all trials.
     """
     found = [one for trial, motion, use in moved for one in _runs(body, trial, motion, use)]
-    if not found:
-        return np.zeros((len(BANDS), 3))
-    every = _Runs(*(np.concatenate([getattr(one, part) for one in found]) for part in _Runs.__dataclass_fields__))
-    left = [_left(every, k) for k, weight in enumerate(body.markers.weight) if weight > 0]
-    seen = [one for one in left if one is not None]
-    return np.median(seen, axis=0) if seen else np.zeros((len(BANDS), 3))
+    out = np.zeros((2, len(BANDS), 3, len(body.markers.names)))
+    if found:
+        every = _Runs(*(np.concatenate([getattr(one, part) for one in found]) for part in _Runs.__dataclass_fields__))
+        for k in np.flatnonzero(np.asarray(body.markers.weight) > 0):
+            out[..., k] = _left(every, int(k))
+    return SkinUnrest(*out)
 
 
-def excess_unrest(power: Array, usual: tuple[float, ...]) -> Array:
-    """Return what of the unrest ``power`` (B, 3) (`skin_unrest`) is more than ``usual`` (B) m; none in the fastest
-    band, where markers show the cameras.
+def _middle(power: Array) -> Array:
+    """Return (B, 3): the median of ``power`` (B, 3, M) over the markers that tell anything."""
+    told = power[:, :, power.any(axis=(0, 1))]
+    return np.median(told, axis=2) if told.size else np.zeros(power.shape[:2])
+
+
+def _excess(power: Array, usual: tuple[float, ...]) -> Array:
+    """Return (B, 3, M): the share of the ``power`` of every marker by which the middle one exceeds what is ``usual``
+    (B,) m.
     """
-    share = 1 - np.square(usual) / np.maximum(power[:, 0], 1e-12)
-    share[-1] = 0.0
-    return power * np.maximum(share, 0.0)[:, None]
+    middle = _middle(power)
+    share = np.maximum(1 - np.square(usual) / np.maximum(middle[:, 0], 1e-12), 0.0)
+    return np.asarray(share[:, None, None] * np.minimum(power, _LOUDEST * middle[:, :, None]))
 
 
 def _runs(body: Body, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> Iterator[_Runs]:
@@ -89,22 +122,26 @@ def _runs(body: Body, trial: Trial, motion: Motion, use: NDArray[np.bool_]) -> I
         yield _Runs(cut[0], cut[1], cut[2], frequency[kept])
 
 
-def _left(every: _Runs, marker: int) -> Array | None:
-    """Return (B, 3): what is left of one marker, per axis and coefficient that nothing explains; None for one that was
-    not seen in half of the time.
+def _left(every: _Runs, marker: int) -> Array:
+    """Return (2, B, 3): waves and swing of one marker, per axis and coefficient; zero for one that was not seen in half
+    of the time. How far it lags is measured below the fastest band, where markers show the cameras.
     """
-    seen = np.isfinite(every.local[:, marker]).all(axis=1)
+    out, seen = np.zeros((2, len(BANDS), 3)), np.isfinite(every.local[:, marker]).all(axis=1)
     if seen.mean() < 0.5:
-        return None
-    explaining = np.column_stack([every.angles, every.specific[:, marker]])[seen]
-    basis, place = np.linalg.qr(explaining[:, explaining.any(axis=0)])[0], every.local[seen, marker]
-    rest, free = place - basis @ (basis.T @ place), 1 - np.sum(basis**2, axis=1)
+        return out
+    angles, specific, place = every.angles[seen], every.specific[seen, marker], every.local[seen, marker]
     speed = 2 * np.pi * every.frequency[seen]
     band = np.searchsorted(BANDS.edges, every.frequency[seen], side="right") - 1
-    out = np.zeros((len(BANDS), 3))
+    basis = np.linalg.qr(angles[:, angles.any(axis=0)])[0]
+    rest, beside = (one - basis @ (basis.T @ one) for one in (place, specific))
+    told = np.linalg.norm(beside, axis=0) > _EXPLAINED * np.linalg.norm(specific, axis=0)
+    slow, beside = band < len(BANDS) - 1, beside[:, told]
+    swing = beside @ np.linalg.lstsq(beside[slow], rest[slow], rcond=None)[0]
+    free = 1 - np.sum(basis**2, axis=1)
     for b in range(len(BANDS)):
         here = band == b
         if free[here].sum() >= _FEWEST:
-            square = np.mean(rest[here] ** 2, axis=1)
-            out[b] = [np.sum(square * speed[here] ** power) / free[here].sum() for power in (0, 2, 4)]
+            for which, (one, count) in enumerate(((rest - swing, free[here].sum()), (swing, here.sum()))):
+                square = np.mean(one[here] ** 2, axis=1)
+                out[which, b] = [np.sum(square * speed[here] ** power) / count for power in (0, 2, 4)]
     return out

@@ -51,13 +51,16 @@ class InstrumentNoise:
         of sizes.
     skin : tuple of float
         (B,) m per axis and coefficient, by band: what markers do on the body that no movement explains
-        (`skin_unrest`).
+        (`SkinUnrest.waves`).
+    swing : tuple of float
+        (B,) m, the same of what they lag behind the acceleration (`SkinUnrest.swing`; the most of six own sessions).
     """
 
     camera: float = 1.0e-4
     plate: tuple[float, ...] = (0.0077, 0.0077, 0.0304, 0.0068, 0.0099, 0.0032)
     marker_distance: float = float("nan")
     skin: tuple[float, ...] = (3.8e-3, 3.8e-3, 1.8e-3, 5.0e-4, 1.6e-4)
+    swing: tuple[float, ...] = (3.4e-4, 4.9e-4, 5.1e-4, 3.9e-4, 1.04e-4)
 
     @property
     def distance(self) -> float:
@@ -201,6 +204,7 @@ def _instruments(raw: Mapping[str, Any]) -> InstrumentNoise:
         tuple(map(float, raw.get("plate_n_per_root_hz", usual.plate))),
         float(raw.get("marker_distance_m", usual.marker_distance)),
         tuple(map(float, raw.get("skin_m", usual.skin))),
+        tuple(map(float, raw.get("swing_m", usual.swing))),
     )
 
 
@@ -233,6 +237,7 @@ def _instruments_text(found: InstrumentNoise, prefix: str) -> list[str]:
         f"plate_n_per_root_hz = [{', '.join(f'{x:.4g}' for x in found.plate)}]",
         *([f"marker_distance_m = {found.marker_distance:.4g}"] if known else []),
         f"skin_m = [{', '.join(f'{x:.4g}' for x in found.skin)}]",
+        f"swing_m = [{', '.join(f'{x:.4g}' for x in found.swing)}]",
     ]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from biodance.diagnosis.archive.conditions import pool
 from biodance.records import Array, Trial
 from biodance.uncertainty.session_noise import camera_noise, plate_noise
+from biodance.uncertainty.skin_unrest import SkinUnrest
 from biodance.uncertainty.tolerances import InstrumentNoise
 from biodance.witnesses import observe, recording
 
@@ -43,25 +44,28 @@ def sway(cop: Array) -> float:
     return float(np.sqrt(np.var(cop, axis=0).sum()))
 
 
-def noise_of_instruments(trials: Sequence[Trial], distance: float, skin: Array) -> InstrumentNoise:
+def noise_of_instruments(trials: Sequence[Trial], distance: float, skin: SkinUnrest) -> InstrumentNoise:
     """Return how quiet the recordings of a session are; ``distance`` m of a typical marker to the moving body, NaN
-    where nothing moved; ``skin`` (B, 3) its `skin_unrest`.
+    where nothing moved; ``skin`` its `skin_unrest`.
     """
     markers = [one.markers for one in trials if one.markers is not None and one.markers.time.size > 1]
     density = plate_noise(plate for one in trials for plate in one.plates)
     far = distance if distance > 0 else float("nan")
-    return InstrumentNoise(camera_noise(markers), tuple(density.tolist()), far, tuple(np.sqrt(skin[:, 0]).tolist()))
+    waves, swing = (tuple(one.tolist()) for one in skin.sizes())
+    return InstrumentNoise(camera_noise(markers), tuple(density.tolist()), far, waves, swing)
 
 
 def usual_noise(found: Sequence[InstrumentNoise]) -> InstrumentNoise:
     """Return the middle of several sessions; what none shows is that which comes with biodance."""
     usual = InstrumentNoise()
-    plates, skins = zip(*(one.plate for one in found), strict=True), zip(*(one.skin for one in found), strict=True)
+    parts = ([getattr(one, part) for one in found] for part in ("plate", "skin", "swing"))
+    plates, skins, swings = (zip(*part, strict=True) for part in parts)
     return InstrumentNoise(
         _middle([one.camera for one in found], usual.camera),
         tuple(map(_middle, plates, usual.plate)),
         _middle([one.marker_distance for one in found], usual.marker_distance),
         tuple(map(_middle, skins, usual.skin)),
+        tuple(map(_middle, swings, usual.swing)),
     )
 
 

@@ -1,0 +1,35 @@
+"""A body that moves otherwise than where tolerances were learned: at more joints, or at joints that no marker shows.
+
+What is left of the forces may be its own. So nothing is told beside it while anything is left.
+"""
+
+from dataclasses import replace
+
+from biodance.body.body import Body
+from biodance.diagnosis.engine import Examined, without_names
+
+_MORE_JOINTS = "the body moves at joints ({}) for which nobody has learned yet what is usual"
+"""Why what is left of a body with optional joints may be theirs."""
+_FEWER_JOINTS = "no marker shows what moves at {}, and the plates measure it all the same"
+"""Why what is left of a part of a body may be the forces of the other part."""
+_LEFT = ("unexplained", "named, incomplete")
+"""Verdicts beside which something is left."""
+
+
+def beside_another_body(examined: Examined, body: Body, joints: tuple[str, ...]) -> Examined:
+    """Return a diagnosis of ``body`` that says why it cannot tell what is left, where that may be the body's own, with
+    its names as no more than what is resembled; ``joints`` are those that it moves at beside the usual ones.
+    """
+    doubt = _doubt(body, joints)
+    if not doubt or examined.diagnosis.verdict not in _LEFT or examined.diagnosis.doubt:
+        return examined
+    found = without_names(examined, examined.diagnosis.gates) if examined.diagnosis.findings else examined
+    return replace(found, diagnosis=replace(found.diagnosis, doubt=doubt))
+
+
+def _doubt(body: Body, joints: tuple[str, ...]) -> str:
+    """Return why what is left may be the body's own; "" where it moves as usual."""
+    hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
+    if hidden:
+        return _FEWER_JOINTS.format(", ".join(name.replace("_", " ") for name in hidden))
+    return _MORE_JOINTS.format(", ".join(joints)) if joints else ""
