@@ -191,7 +191,7 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
 
 
 def test_a_foot_that_touches_is_named_though_the_mean_of_a_trial_is_hidden() -> None:
-    """What a foot lifts on average looks like the plate's zero and the body's weight: only what comes and goes tells."""
+    """What a foot lifts on average looks like the plate's zero and the body's weight: the rest tells."""
     one = body()
     index = one.segment_index("left_foot")
     low, high = one.boxes[index]
