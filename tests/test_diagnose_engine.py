@@ -13,7 +13,8 @@ from scipy.signal import butter, filtfilt
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.evidence import evidence
-from biodance.diagnosis.naming import build_model
+from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.naming import build_model, is_possible
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import screen
 from biodance.diagnosis.transient_contact import with_transient_contact
@@ -21,6 +22,7 @@ from biodance.effects import Case, Effect, Parameter, effect
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.statistics import standing_point
 from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip
 
 FAST = (
@@ -149,7 +151,6 @@ def test_an_absent_culprit_is_never_complete() -> None:
 
 def test_a_load_is_named_with_mass_and_place() -> None:
     from biodance.identification.loads import compact_load
-    from biodance.motion.regressor import predict_wrench
 
     index = body().segment_index("left_forearm_hand")
     place = body().sip.com[index] + [0.0, -0.05, 0.03]
@@ -159,6 +160,14 @@ def test_a_load_is_named_with_mass_and_place() -> None:
     finding = diagnosis.findings[0]
     assert (finding.effect, finding.target) == ("added_mass", "left_forearm_hand")
     assert finding.parameters[0].value == pytest.approx(2.4, abs=0.35)
+
+
+@pytest.mark.parametrize(("sloshing", "sd", "itself"), [(0.04, 0.01, False), (0.5, 0.4, False), (0.5, 0.1, True)])
+def test_a_load_in_which_nothing_sloshes_is_no_sloshing_load(sloshing: float, sd: float, itself: bool) -> None:
+    some, _ = build_model(problem(body(), looks(1, trials=1)), known(), ("sloshing_load",))
+    carried = replace(effect("sloshing_load"), target="trunk_head")
+    one = NamedCause(carried, np.array([5.0, sloshing, -0.2, -0.05]), np.diag([0.1, sd, 0.01, 0.01]) ** 2)
+    assert is_possible(some, one) is itself
 
 
 def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:

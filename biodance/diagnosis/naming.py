@@ -9,6 +9,7 @@ from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
+from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding
 from biodance.diagnosis.problem import Problem
@@ -156,7 +157,17 @@ def is_significant(found: Model, one: NamedCause) -> bool:
     alike = found.tolerances.size(key_of(*cause_key(one))) * one.effect.typical / one.effect.typical[0]
     sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
     sure = bool(np.sum((one.theta / sd) ** 2) >= chdtri(sd.size, 2 * ndtr(-SURE)))
-    return sure and one.effect.possible_in(found.problem.cases[0], one.theta)
+    return sure and is_possible(found, one)
+
+
+def is_possible(found: Model, one: NamedCause) -> bool:
+    """Return whether a cause can be what its name says in this session: in the person and laboratory, and by the
+    parameter that tells it from a simpler cause (`Effect.told_by`), which is `SURE` standard deviations and matters.
+    """
+    told = [p.name == one.effect.told_by for p in one.effect.parameters]
+    sd, own = np.sqrt(np.diag(one.covariance)[told]), np.abs(one.theta[told])
+    itself = np.all(own >= np.maximum(SURE * sd, least(one.effect).get(one.effect.told_by, 0.0)))
+    return bool(itself and one.effect.possible_in(found.problem.cases[0], one.theta))
 
 
 def _without(found: Model, index: int) -> Model:
@@ -233,8 +244,7 @@ def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model
     with it named.
     """
     settled = settle(found, (*found.named, NamedCause(one.effect, one.start, np.empty((0, 0)))))
-    last = settled.named[-1]
-    possible = last.effect.possible_in(found.problem.cases[0], last.theta)
+    possible = is_possible(found, settled.named[-1])
     bayes = log_bayes_factor_between(settled, found) if possible else -np.inf
     return replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled
 
