@@ -180,6 +180,24 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
     assert added[look.motion.time == 5.0, 2] == pytest.approx(15.0, abs=3.0)
 
 
+def test_a_foot_that_touches_is_named_though_the_mean_of_a_trial_is_hidden() -> None:
+    """What a foot lifts on average looks like the plate's zero and the body's weight: the rest tells."""
+    one = body()
+    index = one.segment_index("left_foot")
+    low, high = one.boxes[index]
+    ball = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+
+    def touched(wrench, session, moving):
+        point = poses(one, moving.q).points([index], ball[None])[:, 0]
+        strength = np.where(np.abs(moving.time % 4.0 - 2.0) < 0.8, 6.0, 0.0)
+        force = strength[:, None] * np.array([0.0, 0.3, 1.0])
+        return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
+
+    diagnosis = found(touched, chosen=(*FAST, "external_contact")).diagnosis
+    assert [(f.effect, f.target) for f in diagnosis.findings] == [("external_contact", "left_foot")]
+    assert diagnosis.findings[0].parameters[2].value == pytest.approx(6.0, abs=1.5)
+
+
 def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkeypatch) -> None:
     def quick(seed):
         """A fifth of the way, three times as fast."""

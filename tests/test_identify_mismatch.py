@@ -70,6 +70,15 @@ def test_neighbours_are_at_the_ends() -> None:
     assert sum(len(chain) for chain in chains(body)) == len(body.joints)
 
 
+def test_a_part_has_its_own_joints_beside_it() -> None:
+    body = with_optional(human(Subject(70.0, 1.75, "M", 30.0)), "neck", {})
+    table, head = neighbours(body), len(body.segments)
+    own = [i for i, joint in enumerate(body.joints) if joint.parent >= 0 and joint.name.startswith(("neck", "head"))]
+    assert table.shape == (len(body.joints), head + 1)
+    assert own
+    np.testing.assert_array_equal(np.flatnonzero(table[:, head]), own)
+
+
 def test_without_disturbance_nothing_is_discounted() -> None:
     rng = np.random.default_rng(0)
     data = Information(np.triu(rng.normal(size=(41, 41))) + 5 * np.eye(41), 100)

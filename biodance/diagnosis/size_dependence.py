@@ -4,12 +4,20 @@ with the load, a cross-talk fitted to an offset decreases with it.
 
 The trace of the cause is multiplied by each of these signals, and the score test (`evidence`) tests whether the product
 is present in the residual, with all tolerances and the sizes of all named causes free to adapt.
+
+The trace of a cause in proportion to the wrench that the movement needs (`Effect.in_proportion`) has the movement's
+errors in it, and so has the residual, with the other sign: in a fast band, where they are a good part of the wrench,
+the size comes out too small (errors in variables). With whitened errors e of the movement and the proportion L, the
+score is E[(L e)' (-e)] = -trace(L) too low per coefficient, whatever their covariance, if the movement makes all of
+what sessions without fault leave, and not at all if it makes none: between the two nothing is known, and the score
+nearest to zero counts.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
@@ -74,6 +82,8 @@ def _of_one(found: Model, named: NamedCause) -> Iterator[SizeDependence]:
     Z = found.white(np.stack(columns, axis=1))
     half = found.posterior.half(found.posterior.X.T @ Z)
     s, alone = Z.T @ found.posterior.residual, np.sum(Z**2, axis=0) - np.sum(half**2, axis=0)
+    other = s + _lost_to_errors(found, named, over)
+    s = np.where(s * other > 0, np.where(np.abs(s) < np.abs(other), s, other), 0.0)
     unlike = max(_UNLIKE, found.tolerances.model_error(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
     seen = alone - np.sum(absorbed(found, Z, half) ** 2, axis=0)
@@ -90,12 +100,28 @@ def _traces(put: Problem, named: NamedCause) -> Iterator[tuple[str, Array]]:
         samples = tuple((part * signal[:, None])[:, :, None] for part, signal in zip(whole, signals, strict=True))
         yield name, put.padded(put.spectrum.rows(samples)[:, :, 0])
     rows = put.spectrum.rows(tuple(part[:, :, None] for part in whole))[:, :, 0]
+    for name, pick in _picks(put).items():
+        yield name, put.padded(np.where(pick, rows, 0.0))
+
+
+def _picks(put: Problem) -> dict[str, NDArray[np.bool_]]:
+    """Return the rows of the plates, (n, 6) or what broadcasts to it, of every channel, band and trial."""
     names = [case.trial.name for case in put.cases]
     picks = {channel: np.arange(6)[None, :] == c for c, channel in enumerate(CHANNELS)}
     picks |= {_band(b): (put.spectrum.band == b)[:, None] for b in range(len(BANDS))}
-    picks |= {name: (put.spectrum.trial == t)[:, None] for t, name in enumerate(names)} if len(names) > 1 else {}
-    for name, pick in picks.items():
-        yield name, put.padded(np.where(pick, rows, 0.0))
+    return picks | (
+        {name: (put.spectrum.trial == t)[:, None] for t, name in enumerate(names)} if len(names) > 1 else {}
+    )
+
+
+def _lost_to_errors(found: Model, named: NamedCause, over: tuple[str, ...]) -> Array:
+    """Return (k,): by how much the score of each trace is too low if the movement makes all of what sessions without
+    fault leave; those of signals about their mean lose nothing.
+    """
+    put = found.problem
+    share = named.effect.in_proportion(put.cases[0], named.theta) * found.tolerances.energy[put.spectrum.band]
+    picks = _picks(put)
+    return np.array([np.sum(share, where=np.broadcast_to(picks.get(name, False), share.shape)) for name in over])
 
 
 def _band(index: int) -> str:

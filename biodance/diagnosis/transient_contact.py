@@ -91,7 +91,7 @@ def _with(
         return None
     if suspects[0].score < max(base.tolerances.threshold, than, required_evidence(base, best.visible)):
         return None
-    if not one_sided(best.found.mean.reshape(-1, len(best.effect.parameters))):
+    if not one_sided(best.size * beside_rest(base, best.effect, best.found.mean)):
         return None
     effect, white = _placed(base, best)
     wide = white.scaled(SIZES[-1])  # widest: the most probable one would shrink short peaks
@@ -121,6 +121,21 @@ def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_TransientContact |
     price = float(np.log(max(len(found), 1)))
     found.sort(key=lambda one: -one.score)
     return best, tuple(replace(one, score=one.score - price) for one in found)
+
+
+def beside_rest(base: Model, effect: Effect, course: Array) -> Array:
+    """Return (n, p) the values over time of a contact's ``course`` (k,) beside what they are most of the time in their
+    trial: a touch comes and goes, and its mean over a trial is nearly that of the plate's zero and the body's weight,
+    which take it.
+    """
+    count, parts, start = len(effect.parameters), [], 0
+    for case in base.problem.cases:
+        columns = effect.local(case)
+        stop = start + (0 if columns is None else columns.shape[2])
+        values = course[start:stop].reshape(-1, count)
+        parts.append(values - np.median(values, axis=0) if len(values) else values)
+        start = stop
+    return np.concatenate(parts)
 
 
 def one_sided(course: Array) -> bool:
@@ -209,7 +224,7 @@ def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact)
         width = 0 if columns is None else columns.shape[2]
         parts[case.trial.name] = course[start : start + width]
         start += width
-    steps = sized.size * sized.found.mean.reshape(-1, count)
+    steps = sized.size * beside_rest(base, sized.effect, sized.found.mean)
     spread = sized.size**2 * np.diag(sized.found.covariance).reshape(-1, count)
     square = np.sum(steps**2, axis=1)
     order = np.argsort(square)

@@ -5,6 +5,8 @@ Signature: the whole residual is a share of the whole wrench, in all channels al
 person on the plate and on a scale.
 """
 
+import numpy as np
+
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.records import Array
@@ -24,6 +26,10 @@ class BodyMass(Effect):
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""
         return (case.predicted / case.phi[::10].sum())[:, :, None]
+
+    def in_proportion(self, case: Case, theta: Array) -> Array:
+        """Return the share of the body's mass, of every channel."""
+        return np.full(6, theta[0] / case.phi[::10].sum())
 
     def possible_in(self, case: Case, theta: Array) -> bool:
         """Return whether a scale or a form can be so wrong: by at most `_WRONG` of the person's mass."""

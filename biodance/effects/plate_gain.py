@@ -5,6 +5,8 @@ mass, exactly; the gain of Fz alone re-fits into the segment masses and leaves t
 the scale's weight and by differences between channels.
 """
 
+import numpy as np
+
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
@@ -24,6 +26,10 @@ class PlateGain(ChannelEffect):
     def in_channel(self, case: Case) -> Array:
         """Return the predicted channel itself."""
         return case.predicted_on(self.plate_of(case))[:, self.channel]
+
+    def in_proportion(self, case: Case, theta: Array) -> Array:
+        """Return the gain of its channel."""
+        return theta[0] * np.eye(6)[self.channel]
 
 
 EFFECT = PlateGain

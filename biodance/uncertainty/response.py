@@ -274,8 +274,8 @@ class ErrorSource(ABC):
 
 
 def neighbours(body: Body) -> Array:
-    """Return (n, N) 1 where an anatomical joint (all its axes) is at an end of a segment."""
-    table = np.zeros((len(body.joints), len(body.segments)))
+    """Return (n, N + P) 1 where an anatomical joint (all its axes) is at an end of one of the `Body.links`."""
+    table = np.zeros((len(body.joints), len(body.links)))
     for chain in chains(body):
         child, above = body.joints[chain[-1]].segment, body.joints[chain[0]].parent
         table[np.ix_(chain, (child, 0 if above < 0 else body.joints[above].segment))] = 1.0
