@@ -1,5 +1,5 @@
-"""The plan of the house, checked on the source alone: one meaning per public name, no import circle, few floors, short
-files, short functions, short lines (docs/architecture.md, CONTRIBUTING.md).
+"""The shape of the package, checked on the source alone: one meaning per public name, no import circle, few floors,
+short files, short functions, short lines (docs/architecture.md, CONTRIBUTING.md).
 """
 
 import ast
@@ -186,10 +186,10 @@ def test_no_line_is_long() -> None:
 
 
 TINY = {
-    "house.a": "from house.b import two\n\none = 1\n",
-    "house.b": "two = 2\n\n\ndef f():\n    from house.room.c import one\n",
-    "house.room.c": "import house.a\n\none = 3\nNAME: str = 'c'\n",
-    "house.room.d": "from house.room import c\n\nNAME = 'd'\n_hidden = 1\n",
+    "package.a": "from package.b import two\n\none = 1\n",
+    "package.b": "two = 2\n\n\ndef f():\n    from package.room.c import one\n",
+    "package.room.c": "import package.a\n\none = 3\nNAME: str = 'c'\n",
+    "package.room.d": "from package.room import c\n\nNAME = 'd'\n_hidden = 1\n",
 }
 
 
@@ -199,11 +199,11 @@ def tiny() -> dict[str, ast.Module]:
 
 
 def test_the_checks_see_what_is_wrong(tiny: dict[str, ast.Module]) -> None:
-    assert homonyms(tiny, {"house.room": {"NAME"}}) == {"one": ["house.a", "house.room.c"]}
+    assert homonyms(tiny, {"package.room": {"NAME"}}) == {"one": ["package.a", "package.room.c"]}
     assert set(homonyms(tiny, {})) == {"NAME", "one"}
     graph = imports(tiny)
-    assert circles(graph) == [["house.a", "house.b", "house.room.c"]]
-    assert floors(graph, "house.room") == 2
-    assert floors(graph, "house") == 3  # a, b and the folder room, in a circle
+    assert circles(graph) == [["package.a", "package.b", "package.room.c"]]
+    assert floors(graph, "package.room") == 2
+    assert floors(graph, "package") == 3  # a, b and the folder room, in a circle
     assert floors({"h.a": {"h.b.x"}, "h.b.x": {"h.b.y"}, "h.b.y": set(), "h.c": {"h.a"}}, "h") == 3
     assert bodies(ast.parse('def f():\n    """Doc."""\n    a = 1\n    return a\n')) == [("f", 2)]

@@ -73,7 +73,9 @@ def test_a_body_that_the_camera_does_not_know_is_not_followed(dance: Dance) -> N
 @pytest.mark.skipif(not BUILT, reason="`make bundle` could not reach npm")
 def test_the_bundle_is_that_of_the_lock_file() -> None:
     folder = Path(write.__file__).parent / "bundle"
-    for line in SUMS.read_text().splitlines():
+    lines = SUMS.read_text().splitlines()
+    assert lines
+    for line in lines:
         digest, name = line.split()
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest, f"{name}: run make clean bundle"
 

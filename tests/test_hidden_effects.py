@@ -97,7 +97,6 @@ def standing(data: Path, folder: Path, name: str, text: str = "") -> Path:
     return folder
 
 
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HC030A", "HC032A"])
 def test_real_standing_is_not_accused_of_a_plate_fault(
     name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -107,7 +106,6 @@ def test_real_standing_is_not_accused_of_a_plate_fault(
     assert any("centre of mass lies" in note for note in clean.notes)
 
 
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["HC030A", "HC032A"])
 @pytest.mark.parametrize("text", ["plate_gain:target=plate1:Fz,gain=0.08", "plate_offset:target=plate1:Fz,offset=30"])
 def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
@@ -130,14 +128,12 @@ def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
     assert diagnosis.doubt == "standing alone tells no cause"
 
 
-@pytest.mark.filterwarnings("ignore")
 def test_a_real_walk_gets_no_name_that_feet_and_clocks_exclude(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     diagnosis = found(data / "adl_gait", monkeypatch)
     assert diagnosis.verdict == "unexplained"
     assert not diagnosis.findings
 
 
-@pytest.mark.filterwarnings("ignore")
 def test_exchanged_wrist_labels_of_a_real_recording_are_told(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -72,7 +72,9 @@ def test_plates_of_other_laboratories(data):
     "pattern", ["biomechzoo/*/*.c3d", "adl_gait/*_C1_*.c3d", "c3d_parser/*/*.c3d", "pycgm/Movement*.c3d"]
 )
 def test_every_load_lies_under_a_foot(data, pattern):
-    for path in sorted(data.glob(pattern)):
+    paths = sorted(data.glob(pattern))
+    assert paths
+    for path in paths:
         for plate in read_c3d(path).plates:
             said = [text for text in plate.decisions if "from the feet" in text]
             if "Never loaded" not in plate.decisions[-1]:

@@ -129,7 +129,9 @@ def test_a_session_on_belts_is_followed_and_hardly_a_frame_is_lost(recorded: dic
 
 def test_the_flight_of_a_runner_is_found(recorded: dict) -> None:
     """Frames without any load count as measured: the plates say truly that nothing carries."""
-    for one in recorded["run"].trials[1:]:
+    runs = recorded["run"].trials[1:]
+    assert runs
+    for one in runs:
         empty = one.comparison.measured[:, 2] < 20
         assert 0.15 < empty.mean() < 0.4
         assert one.comparison.used[empty].mean() > 0.97

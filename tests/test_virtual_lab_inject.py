@@ -82,7 +82,6 @@ REAL = (
 )
 
 
-@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", REAL)
 def test_real_recordings_of_four_laboratories_take_faults(name: str, data: Path, tmp_path: Path) -> None:
     path = data / name
