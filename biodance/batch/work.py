@@ -269,9 +269,7 @@ def _vertical(wrench: dict[str, Any] | None, body: str) -> float | None:
 
 
 def _moved(one: dict[str, Any]) -> dict[str, Any]:
-    """Return what moved in a trial: how many repetitions and events, speed, and the largest angle of the mean curves of
-    both sides.
-    """
+    """Return what moved in a trial: repetitions, events, speed, the largest angle of both sides' mean curves."""
     kinds = [cycle["kind"] for cycle in one["cycles"]]
     speeds = [row["mean"] for row in one["spatiotemporal"] if (row["quantity"], row["side"]) == ("speed", "both")]
     row: dict[str, Any] = {column: kinds.count(kind) for kind, column in _KINDS.items()}

@@ -87,10 +87,14 @@ def write_motion(folder: Path, stem: str, channels: BidsChannels, *, task: str, 
     counts = {f"{kind}ChannelCount": types.count(kind) for kind in dict.fromkeys(types)}
     rate, frames = rate_of(channels.time), channels.time.size
     told = {
-        **{"TaskName": task, "SamplingFrequency": rate, "MotionChannelCount": len(types)},
+        "TaskName": task,
+        "SamplingFrequency": rate,
+        "MotionChannelCount": len(types),
         **counts,
-        **{"TrackedPointsCount": len({row[3] for row in channels.rows}), "RecordingType": "continuous"},
-        **{"RecordingDuration": float(frames / rate) if frames > 1 else 0.0, "MissingValues": "n/a"},
+        "TrackedPointsCount": len({row[3] for row in channels.rows}),
+        "RecordingType": "continuous",
+        "RecordingDuration": float(frames / rate) if frames > 1 else 0.0,
+        "MissingValues": "n/a",
     }
     _json(folder / f"{stem}_motion.json", told | dict(about))
 

@@ -22,6 +22,10 @@ from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.records import Markers, Plate, Trial
 from biodance.settings import COP_FORCE
 
+_KEYS = (
+    "file status reason format frames rate_hz analog_rate_hz markers marker_set marker_map gaps_percent subjects "
+    "plates mean_vertical_n mass_on_plates_kg declared_mass_kg declared_height_m history warnings"
+)
 SHORTEST_STEP = 0.05
 """Seconds under load from which on a plate has a centre of pressure; less is noise."""
 
@@ -143,13 +147,8 @@ def _guessed(trial: Trial) -> tuple[Trial, list[str]]:
 
 def _refused(path: Path, reason: str) -> dict[str, Any]:
     """Return the record of a file that cannot be read, with all keys."""
-    return {
-        **{"file": str(path), "status": "refused", "reason": reason},
-        **dict.fromkeys(("format", "frames", "rate_hz", "analog_rate_hz")),
-        **{"markers": [], "marker_set": None, "marker_map": None, "gaps_percent": None, "subjects": [], "plates": []},
-        **dict.fromkeys(("mean_vertical_n", "mass_on_plates_kg", "declared_mass_kg", "declared_height_m")),
-        **{"history": [], "warnings": []},
-    }
+    empty: dict[str, Any] = {name: [] for name in ("markers", "subjects", "plates", "history", "warnings")}
+    return {**dict.fromkeys(_KEYS.split()), **empty, "file": str(path), "status": "refused", "reason": reason}
 
 
 def _subjects(path: Path) -> list[str]:

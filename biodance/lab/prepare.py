@@ -59,9 +59,7 @@ def prepare(trial: Trial) -> Trial:
 
 
 def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
-    """Return the markers within the time that all plates recorded (one analog sample of tolerance), and what was cut
-    off.
-    """
+    """Return the markers within the time of all plates (one analog sample of tolerance), and what was cut off."""
     times = [plate.wrench.time for plate in trial.plates if plate.wrench.time.size]
     if not times:
         return markers, []
@@ -130,9 +128,7 @@ def at_marker_times(plate: Plate, markers: Markers | None, low_pass: LowPass) ->
 
 
 def _sample(wrench: Wrench, time: Array) -> tuple[Array, str]:
-    """Return the wrench (T, 6) at marker times: exact where samples lie there, otherwise by a cubic spline (NaN
-    beside unknown samples).
-    """
+    """Return the wrench (T, 6) at marker times, by a cubic spline where no samples lie there; how it was found."""
     after = np.clip(np.searchsorted(wrench.time, time), 0, wrench.time.size - 1)
     before = np.maximum(after - 1, 0)
     nearest = np.where(time - wrench.time[before] < wrench.time[after] - time, before, after)

@@ -127,9 +127,7 @@ def read_enf(path: str | Path) -> EclipseNotes:
 
 
 def _in_si(values: dict[str, float]) -> dict[str, float]:
-    """Return the lengths in m and the masses in kg under the names of the PROCESSING group, without angles, flags
-    and zeros.
-    """
+    """Return lengths (m) and masses (kg) by the names of the PROCESSING group, no angles, flags and zeros."""
     measures: dict[str, float] = {}
     for name, value in values.items():
         short = _SIDE.sub(lambda side: side[1][0], name)

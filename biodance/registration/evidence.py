@@ -89,9 +89,7 @@ def plate_steps(
 
 
 def _foot(trial: Trial, contact: Contact, soles: Soles, number: int, time: Array) -> int | None:
-    """Return the foot (0 right, 1 left) that stands on a plate alone and whole in the middle of a step; None
-    otherwise.
-    """
+    """Return the foot (0 right, 1 left) that stands alone and whole on a plate in the middle of a step, or None."""
     length = time[-1] - time[0]
     middle = (contact.time > time[0] + 0.25 * length) & (contact.time < time[0] + 0.75 * length)
     over = contact.on_plate[middle, :, number].mean(axis=0)

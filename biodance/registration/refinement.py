@@ -149,9 +149,7 @@ def _contact(body: Body, look: Look, soles: Soles) -> Contact:
 
 
 def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Look, Soles, Array]:
-    """Return the trial under a pose with the frames that are fully measured, the soles, and the mean centre of
-    pressure.
-    """
+    """Return the trial under a pose, its fully measured frames in use; the soles; the mean centre of pressure."""
     there, cut = with_forces_at(trial, motion, forces, pose)
     soles = soles_from_body(body, cut)
     look = Look(there, cut, np.zeros(cut.time.size, dtype=bool), 0.0, 1.0)

@@ -167,9 +167,7 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
 
 
 def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
-    """Return the factors (6,) from ADC counts to lbf and in·lbf: 1e6 / (sensitivity * gain * excitation * counts per
-    volt).
-    """
+    """Return (6,) lbf, in·lbf a count: 1e6 / (sensitivity * gain * excitation * counts per volt)."""
     product = np.prod(
         [header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0
     )

@@ -57,9 +57,7 @@ def amti_plate(
 
 
 def _zeroed(channels: Array, rate: float) -> tuple[Array, str]:
-    """Return the channels with the reading of the empty plate taken off where it is more than the maker's own zero
-    leaves.
-    """
+    """Return the channels without the empty plate's reading where it is more than the maker's zero leaves."""
     zero = find_baseline(channels[:, 2], zero=None, rate=rate)
     if zero.stop <= zero.start:
         return channels, "Zero: the maker's own was kept; the plate is never seen unloaded."

@@ -109,9 +109,7 @@ def _numbers(cells: list[str]) -> list[float] | None:
 
 
 def _header_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
-    """Return column names and units from a header such as ``Time (s), Fx (N), ...``; nothing unless all six channels
-    are named.
-    """
+    """Return columns and units of a header ``Time (s), Fx (N), ...``; nothing unless it names all six channels."""
     columns, units = [], {}
     for cell in header:
         match = re.match(r"\s*\"?([A-Za-z]+)[^\[(]*(?:[\[(]\s*([^\])]+)[\])])?", cell)

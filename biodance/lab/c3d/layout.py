@@ -55,19 +55,20 @@ def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[
     """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if
     missing or text.
     """
-    found = parameters.get(group, {})
-    family = [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
+    family = _continued(parameters, group, name)
     arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
     return np.concatenate(arrays) if arrays else np.empty(0)
 
 
 def texts(parameters: Parameters, group: str, name: str) -> list[str]:
     """Return a text parameter, continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or numeric."""
+    return [text for value in _continued(parameters, group, name) if isinstance(value, list) for text in value]
+
+
+def _continued(parameters: Parameters, group: str, name: str) -> list[ParameterValue]:
+    """Return the values of a parameter and of its continuations NAME2, NAME3 ..."""
     found = parameters.get(group, {})
-    family: list[ParameterValue] = [
-        found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found
-    ]
-    return [text for value in family if isinstance(value, list) for text in value]
+    return [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
 
 
 def scalar(parameters: Parameters, group: str, name: str) -> float:
@@ -141,9 +142,7 @@ def _field(parameters: Parameters, name: str) -> float:
 
 
 def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:
-    """Return the believable pairs (channels, samples per frame): those that at most one of the file's statements
-    contradicts.
-    """
+    """Return the pairs (channels, samples per frame) that at most one statement of the file contradicts."""
     used, values, samples = scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
     ratio = scalar(parameters, "ANALOG", "RATE") / (scalar(parameters, "POINT", "RATE") or math.nan)
     ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
@@ -153,30 +152,21 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
         return [(0, 0), (int(used), int(ratio))] if math.isfinite(ratio) else [(0, 0)]
     channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
     rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
-    votes = {
-        (c, s): sum(
-            w
-            for w in (
-                c != used and not math.isnan(used),
-                s != samples,
-                s != ratio and not math.isnan(ratio),
-                c * s != values,
-            )
-        )
-        for c, s in product(channels, rows)
-        if c * s > 0
-    }
+
+    def against(c: int, s: int) -> int:
+        contradicted = (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio))
+        return sum(contradicted) + (c * s != values)
+
+    votes = {(c, s): against(c, s) for c, s in product(channels, rows) if c * s > 0}
     least = min(votes.values(), default=0)
     none = [(0, 0)] if used == 0 or values == 0 else []  # one statement says that there are no analog data
-    return none + [pair for pair, against in votes.items() if against == least and against <= 1]
+    return none + [pair for pair, count in votes.items() if count == least and count <= 1]
 
 
 def _counts(
     size: int, header: Header, parameters: Parameters, word: int, where: str, notes: list[str]
 ) -> tuple[int, int, int, int, int]:
-    """Return (start byte, points, channels, samples per frame, frames); says in ``notes`` when statements had to be
-    overruled.
-    """
+    """Return (start byte, points, channels, samples per frame, frames); ``notes`` say what was overruled."""
     starts = _distinct(
         [header.data_start, (scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
     )
@@ -216,9 +206,7 @@ def _counts(
 
 
 def _all_told_twice(header: Header, parameters: Parameters) -> bool:
-    """Return whether header and parameters both tell every count, without contradiction: then bytes behind the data
-    are padding.
-    """
+    """Return whether header and parameters agree on every count: bytes behind the data are then padding."""
     points = not header.points or "USED" in parameters.get("POINT", {})
     channels = scalar(parameters, "ANALOG", "USED")
     analog = (header.analog_values > 0) == (channels > 0)
@@ -226,9 +214,7 @@ def _all_told_twice(header: Header, parameters: Parameters) -> bool:
 
 
 def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str]) -> tuple[float, float]:
-    """Return point and analog rate in Hz; the value that two of header, POINT:RATE and ANALOG:RATE / samples tell,
-    NaN if none is > 0.
-    """
+    """Return point and analog rate in Hz, as two of the three places in the file tell them; NaN if none is > 0."""
     analog = scalar(parameters, "ANALOG", "RATE")
     witnesses = {"POINT:RATE": scalar(parameters, "POINT", "RATE"), "the header": header.rate}
     witnesses["ANALOG:RATE / samples per frame"] = analog / samples if samples else math.nan
@@ -248,9 +234,7 @@ def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str
 def _analog_transform(
     parameters: Parameters, channels: int, unsigned: bool, where: str, notes: list[str]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return gain (C,) and offset (C,) of the analog channels; a channel without a scale has gain NaN, and so no
-    numbers.
-    """
+    """Return gain (C,) and offset (C,) of the analog channels; the gain of a channel without a scale is NaN."""
     general, gain, offset = (parameter_numbers(parameters, "ANALOG", name) for name in ("GEN_SCALE", "SCALE", "OFFSET"))
     if channels and not general.size:
         general = np.ones(1)

@@ -184,9 +184,7 @@ def text_rows(content: bytes, header: Header, where: str, *, group: str, name: s
 
 
 def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, int, str, ParameterValue | None]:
-    """Return position of the next record (0 = none), group number, name and value (None = a group) of the record at
-    ``at``.
-    """
+    """Return the next record's place (0 = none), group number, name and value (None = a group) of one record."""
     length, group = (int(byte) for byte in np.frombuffer(section[at : at + 2], dtype=np.int8))
     body = at + 2 + abs(length)
     name = section[at + 2 : body].decode("utf-8", "replace").strip().upper()

@@ -22,12 +22,15 @@ from biodance.lab.plain_text import refuse_huge
 from biodance.records import Array, any_coordinate, spread_frames
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
-SPELLINGS = {
-    "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
-    "cm": ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
-    "dm": ("dm", "decimeter", "decimeters", "decimetre", "decimetres"),
-    "m": ("m", "meter", "meters", "metre", "metres"),
-    "in": ("in", "inch", "inches"),
+_PREFIXES = {"mm": "milli", "cm": "centi", "dm": "deci", "m": ""}
+_SPELLINGS = {
+    **{
+        f"{prefix}{metre}": unit
+        for unit, prefix in _PREFIXES.items()
+        for metre in ("meter", "meters", "metre", "metres")
+    },
+    **{unit: unit for unit in _METRES},
+    **dict.fromkeys(("inch", "inches"), "in"),
 }
 GUESSES = ("mm", "cm", "m")
 PERSON = 1.5
@@ -59,7 +62,7 @@ def metres_per_unit(
         The unit is missing and neither markers nor plates tell it.
     """
     written = next(iter(texts(parameters, "POINT", "UNITS")), "")
-    unit = next((unit for unit, spellings in SPELLINGS.items() if written.strip(" .").casefold() in spellings), "")
+    unit = _SPELLINGS.get(written.strip(" .").casefold(), "")
     size, expected, what = _size(parameters, points)
     if unit and (math.isnan(size) or BELIEVABLE[0] <= size * _METRES[unit] <= BELIEVABLE[1]):
         return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
@@ -236,20 +239,15 @@ def point_labels(parameters: Parameters, layout: Layout) -> tuple[str, ...]:
 def _smells(
     numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
 ) -> tuple[tuple[str, ...], str]:
-    """Have suspicious numbers judged by a second reader; return what it says and who agrees; refuse the file if it
-    reads others.
-    """
+    """Have suspicious numbers judged by a second reader; return its judgement and who agrees, or refuse."""
     no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
     markers = [column for column in range(layout.points) if column not in no_markers]
     leaps = _leaps(numbers[0], markers, parameters)
     if not leaps and not layout.notes:
         return (), "biodance"
     opinion = second_opinion(path, numbers, layout)
-    smell = (
-        f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places"
-        if leaps
-        else "Header and parameters disagree"
-    )
+    jump = f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places"
+    smell = jump if leaps else "Header and parameters disagree"
     if opinion == "refuted":
         raise FileRefused(
             f"{path}: {smell[0].lower()}{smell[1:]}, and ezc3d reads other numbers than biodance. {RESAVE}"

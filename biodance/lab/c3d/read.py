@@ -1,17 +1,27 @@
-"""Read a C3D file into a Trial: metres, z up, markers of one subject, plates as wrenches, every decision said."""
+"""Read a C3D file into a Trial: metres, z up (plates, person and POINT:Y_SCREEN may say which way that is), markers of
+one subject, plates as wrenches, every decision said.
+"""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.lab.c3d.layout import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
-from biodance.lab.c3d.vertical import turn_to_z_up
 from biodance.lab.markers.sets import recognise
-from biodance.records import Array, Markers, Plate, Role, Source, Trial
+from biodance.lab.markers.upright import axis_to_head, clear_axis
+from biodance.lab.plates.corners import is_rectangle
+from biodance.records import Array, Markers, Plate, Role, Source, Trial, spread_frames
+
+_CLOUD = 6
+"""Markers that show how a body lies."""
+_LONGER = 1.5
+_AXES = "XYZ"
 
 
 def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None) -> Trial:
@@ -56,27 +66,12 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     measures, measure_history, measure_warnings = measurements_of(raw)
     plates, plate_warnings = _plates(raw, metres, turn, markers, measures.get("Bodymass"))
     marker_set = recognise(markers.names) if markers is not None else None
-    warnings = (
-        *raw.warnings,
-        *([poses] if poses else []),
-        *labels.warnings,
-        *axes_warnings,
-        *measure_warnings,
-        *plate_warnings,
-    )
-    return Trial(
-        name=raw.path.stem,
-        role=role,
-        markers=markers,
-        plates=plates,
-        source=Source(
-            raw.path, raw.sha256, "C3D", raw.rate if markers is not None else math.nan, raw.analog_rate, raw.first_frame
-        ),
-        marker_set=marker_set.name if marker_set is not None else "",
-        measurements=measures,
-        history=(*_read(raw), *labels.history, *axes_history, *_gaps(markers), *measure_history),
-        warnings=warnings,
-    )
+    rate, worn = raw.rate if markers is not None else math.nan, marker_set.name if marker_set is not None else ""
+    source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
+    history = (*_read(raw), *labels.history, *axes_history, *_gaps(markers), *measure_history)
+    odd = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *axes_warnings)
+    warnings = (*odd, *measure_warnings, *plate_warnings)
+    return Trial(raw.path.stem, role, markers, plates, source, worn, measures, history, warnings)
 
 
 def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array]:
@@ -98,7 +93,7 @@ def _in_lab(raw: RawC3d, labels: MarkerLabels) -> tuple[Markers | None, float, A
     points = raw.points if all_in_order else raw.points[:, list(labels.columns)]
     metres, units, doubts = metres_per_unit(raw.parameters, points, where=str(raw.path))
     own = _markers(raw, labels, points)
-    turn, axes, doubtful = turn_to_z_up(raw, own)
+    turn, axes, doubtful = _turn_to_z_up(raw, own)
     markers = None if own is None else replace(own, xyz=_turned(own.xyz, metres * turn))
     return markers, metres, turn, (*units, *axes), (*doubts, *doubtful)
 
@@ -115,13 +110,9 @@ def _turned(points: Array, axes: Array) -> Array:
 
 def _read(raw: RawC3d) -> tuple[str, ...]:
     rate = f" at {raw.rate:g} Hz" if math.isfinite(raw.rate) else ""
-    analog = (
-        f", {raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
-        if raw.analog.size
-        else ", no analog channels"
-    )
+    channels = f"{raw.analog.shape[1]} analog channels at {raw.analog_rate:g} Hz"
     frames = f"{len(raw.points)} frames{rate} from frame {raw.first_frame} on"
-    return (f"Read {frames}, {raw.points.shape[1]} points{analog}.",)
+    return (f"Read {frames}, {raw.points.shape[1]} points, {channels if raw.analog.size else 'no analog channels'}.",)
 
 
 def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None:
@@ -152,3 +143,102 @@ def _gaps(markers: Markers | None) -> tuple[str, ...]:
     never = [name for name, seen in zip(markers.names, np.any(markers.seen, axis=0), strict=True) if not seen]
     missing = f"; never seen: {', '.join(never)}" if never else ""
     return (f"{len(markers.names)} markers, {100 * share:.2g} % of their samples not seen{missing}.",)
+
+
+def _turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+    """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings; the identity if it does
+    already.
+
+    ``markers`` are still in file axes. The floor of the plates decides the axis, the side on which the markers are its
+    sign; without plates the upright person overrules Y_SCREEN, unless Y_SCREEN says +Z (the person may lie down). x
+    stays where it is not the vertical itself.
+    """
+    floor, declared = _floor(raw, markers), _declared(raw, markers)
+    body = axis_to_head(markers) if markers else None
+    witnesses = {"the plates": floor, "the markers from feet to head": body, "POINT:Y_SCREEN": declared}
+    if floor is None and declared is not None and declared[2] == 1:
+        witnesses = {name: witnesses[name] for name in ("POINT:Y_SCREEN", "the markers from feet to head")}
+    by, chosen = next(((name, axis) for name, axis in witnesses.items() if axis is not None), ("", np.eye(3)[2]))
+    if not by:
+        _refuse_lying(markers, raw)
+        history, warnings = ["Nothing says which way is up; z assumed."], ["Nothing says which way is up; z assumed."]
+    else:
+        says = "says" if by == "POINT:Y_SCREEN" else "say"
+        history, warnings = [f"Up is {_name(chosen)} in the file, as {by} {says}."], []
+    for who, direction in witnesses.items():
+        if direction is not None and not np.array_equal(direction, chosen):
+            line = (
+                f"Up is {_name(chosen)} by {by}, but {_name(direction)} by {who}; the former was taken. Look at "
+                f"the person in the report."
+            )
+            (history if who == "POINT:Y_SCREEN" else warnings).append(line)
+    turn = _turn(chosen)
+    if not np.array_equal(turn, np.eye(3)):
+        history.append(f"Everything was turned so that z points up: {_name(chosen)} of the file became +Z.")
+    return turn, tuple(history), tuple(warnings)
+
+
+def _refuse_lying(markers: Markers | None, raw: RawC3d) -> None:
+    """Refuse a file in which nothing says which way is up and the markers are far longer along x or y than along z."""
+    if markers is None or len(markers.names) < _CLOUD:
+        return
+    frames = markers.xyz[markers.seen.sum(axis=1) >= _CLOUD]
+    if not len(frames):
+        return
+    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    longest = int(np.argmax(extent))
+    if longest != 2 and extent[longest] > _LONGER * extent[2]:
+        raise FileRefused(
+            f"{raw.path}: nothing says which way is up (no plates, no POINT:Y_SCREEN, no labels of head and feet), and "
+            f"along {_AXES[longest]} the markers are {extent[longest] / extent[2]:.1f} times as long as along Z. Write "
+            f"the upward axis into POINT:Y_SCREEN (for example +{_AXES[longest]}), or name the markers' set with "
+            f"--markers FILE."
+        )
+
+
+def _name(axis: Array) -> str:
+    i = int(np.argmax(np.abs(axis)))
+    return ("+" if axis[i] > 0 else "-") + _AXES[i]
+
+
+def _turn(up: Array) -> Array:
+    """Return the rotation whose third row is ``up``; its first row is x where possible."""
+    first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
+    return np.stack([first, np.cross(up, first), up]) + 0.0
+
+
+def _declared(raw: RawC3d, markers: Markers | None) -> Array | None:
+    """Return the axis that POINT:Y_SCREEN, the upward direction of the recording's screen, names.
+
+    Its sign is not believed (labs with z up write -Z): up is the side of the lab origin on which the markers are.
+    """
+    text = next(iter(texts(raw.parameters, "POINT", "Y_SCREEN")), "").upper().replace(" ", "")
+    if not re.fullmatch(r"[+-]?[XYZ]", text):
+        return None
+    i = _AXES.index(text[-1])
+    below = markers is not None and bool(markers.seen.any()) and _middle(markers, i) < 0
+    return np.eye(3)[i] * (-1.0 if below else 1.0)
+
+
+def _floor(raw: RawC3d, markers: Markers | None) -> Array | None:
+    """Return the normal of the plates on the side of the markers; None without plates that lie in a coordinate
+    plane. Corners that make no plate have no vote.
+    """
+    corners = parameter_numbers(raw.parameters, "FORCE_PLATFORM", "CORNERS")
+    plates = corners[: corners.size // 12 * 12].reshape(-1, 4, 3)
+    plates = plates[[is_rectangle(one) for one in plates]]
+    if not len(plates):
+        return None
+    normals = np.abs(np.cross(plates[:, 1] - plates[:, 0], plates[:, 3] - plates[:, 0])).sum(axis=0)
+    axis = clear_axis(normals)
+    if axis is None or markers is None or not markers.seen.any():
+        return axis
+    i = int(np.argmax(axis))
+    above = _middle(markers, i) - float(plates[..., i].mean())
+    return axis * (1.0 if above >= 0 else -1.0)
+
+
+def _middle(markers: Markers, axis: int) -> float:
+    """Return the median coordinate of the markers along an axis, by spread frames where these show any."""
+    some = spread_frames(markers.xyz)[..., axis]
+    return float(np.nanmedian(some if np.isfinite(some).any() else markers.xyz[..., axis]))

@@ -54,12 +54,8 @@ _PATIENCE = 300.0
 _NEAR = 0.1
 """s: an event that the file has already within this time is not written again."""
 Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
-_UNITS = {
-    "ANGLES": ("ANGLE_UNITS", "deg"),
-    "FORCES": ("FORCE_UNITS", "N"),
-    "MOMENTS": ("MOMENT_UNITS", "Nm"),
-    "POWERS": ("POWER_UNITS", "W"),
-}
+_UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"}
+"""Unit of a kind of results where the parameter of POINT (`_unit_name`) declares none."""
 PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0, "W": 1.0}
 """How many of a file's unit one SI unit is."""
 
@@ -124,21 +120,14 @@ def write_results_c3d(
     metres, turn = file_frame(raw, subject=subject)
     units = [_unit(raw, output) for output in outputs]
     scaled = [_in_file(o, unit, metres, turn) for o, unit in zip(outputs, units, strict=True)]
-    said: dict[str, FileValue] = {
-        "LABELS": [o.label for o in outputs],
-        "UNITS": units,
-        "COMPONENTS": [o.about for o in outputs],
-        **(parameters or {}),
-    }
+    labels, kinds, about = ([getattr(o, name) for o in outputs] for name in ("label", "kind", "about"))
+    said: dict[str, FileValue] = {"LABELS": labels, "UNITS": units, "COMPONENTS": about, **(parameters or {})}
     first = (raw.first_frame - 1) / raw.rate
+    undeclared = [kind for kind in _UNITS if kind in kinds and not texts(raw.parameters, "POINT", _unit_name(kind))]
     question = {
-        "labels": said["LABELS"],
-        "kinds": [o.kind for o in outputs],
-        "units": dict(
-            v
-            for kind, v in _UNITS.items()
-            if kind in {o.kind for o in outputs} and not texts(raw.parameters, "POINT", v[0])
-        ),
+        "labels": labels,
+        "kinds": kinds,
+        "units": {_unit_name(kind): _UNITS[kind] for kind in undeclared},
         "events": [[event.time + first, event.context, event.label] for event in events],
         "parameters": {name: np.asarray(value).tolist() for name, value in said.items()},
     }
@@ -172,9 +161,15 @@ def _unit(raw: RawC3d, output: Output) -> str:
     """Return the unit that the file declares for such results, if it is one we know, else our own."""
     if output.kind == "MODELED_MARKERS":
         return next(iter(texts(raw.parameters, "POINT", "UNITS")), "mm")
-    name, own = _UNITS[output.kind]
-    declared = next(iter(texts(raw.parameters, "POINT", name)), own).replace(".", "").replace(" ", "")
+    own = _UNITS[output.kind]
+    declared = next(iter(texts(raw.parameters, "POINT", _unit_name(output.kind))), own)
+    declared = declared.replace(".", "").replace(" ", "")
     return declared if declared in PER_SI else own
+
+
+def _unit_name(kind: str) -> str:
+    """Return the parameter of POINT that says in which unit a kind of results is, ``ANGLE_UNITS``."""
+    return f"{kind.removesuffix('S')}_UNITS"
 
 
 def _in_file(output: Output, unit: str, metres: float, turn: Array) -> Array:
@@ -243,9 +238,7 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
 
 
 def _gathered(group: dict[str, Any], name: str) -> list[str]:
-    """Return a list of texts with its continuations NAME2, NAME3 ..., which are taken out of the group: ezc3d writes
-    them anew.
-    """
+    """Return a list of texts with its continuations NAME2 ..., taken out of the group: ezc3d writes them anew."""
     rest = [text for tail in range(2, 100) for text in group.pop(f"{name}{tail}", {"value": []})["value"]]
     return [*group[name]["value"], *rest]
 

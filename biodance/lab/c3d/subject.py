@@ -163,9 +163,7 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
 def _without_repeats(
     raw: RawC3d, columns: list[int], history: list[str], warnings: list[str]
 ) -> tuple[list[int], list[str]]:
-    """Return columns and names without repeated names: an unseen or equal repetition goes, a different one keeps
-    both apart by number.
-    """
+    """Return columns and names: an unseen or equal repetition goes, a different one is numbered like the first."""
     places: dict[str, list[int]] = {}
     for column in columns:
         places.setdefault(split_label(raw.labels[column])[1], []).append(column)
@@ -195,19 +193,12 @@ def _without_repeats(
     return sorted(kept), [kept[column] for column in sorted(kept)]
 
 
-LENGTHS = (
-    *("Height", "MarkerDiameter", "InterAsisDistance", "PelvisLength"),
-    *(
-        side + name
-        for side in "LR"
-        for name in ("LegLength", "KneeWidth", "AnkleWidth", "ShoulderOffset", "ElbowWidth", "WristWidth")
-    ),
-    *(
-        side + name
-        for side in "LR"
-        for name in ("HandThickness", "AsisTrocanterDistance", "FemurLength", "TibiaLength", "FootLength", "SoleDelta")
-    ),
+_WHOLE = "Height MarkerDiameter InterAsisDistance PelvisLength"
+_OF_A_SIDE = (
+    "LegLength KneeWidth AnkleWidth ShoulderOffset ElbowWidth WristWidth HandThickness AsisTrocanterDistance "
+    "FemurLength TibiaLength FootLength SoleDelta"
 )
+LENGTHS = (*_WHOLE.split(), *(side + name for side in "LR" for name in _OF_A_SIDE.split()))
 OTHER_NAMES = {"WEIGHT": "BODYMASS", "MASS": "BODYMASS", "STATURE": "HEIGHT", "SEX": "GENDER"}
 PLAIN = ("Bodymass", "age", "gender")
 _LEGAL = {"Bodymass": (2.0, 400.0), "age": (0.0, 120.0), "gender": (0.0, 1.0)}
@@ -223,11 +214,8 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     person is taken for all of them. Zeros mean "not measured" and are left out, as is everything that a person cannot
     have.
     """
-    written = {
-        _NAMES[name]: value
-        for name, value in _written(raw).items()
-        if name in _NAMES and math.isfinite(value) and value != 0
-    }
+    known = {_NAMES[name]: value for name, value in _written(raw).items() if name in _NAMES}
+    written = {name: value for name, value in known.items() if math.isfinite(value) and value != 0}
     scale = _scale(written)
     warnings: list[str] = []
     measures: dict[str, float] = {}
@@ -242,12 +230,8 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
             warnings.append(f"The file says {name} = {written[name]:g}, which a person cannot have; it was left out.")
     lengths = [name for name in measures if name not in PLAIN]
     unit = {1e-3: "mm", 1e-2: "cm", 1.0: "m"}[scale]
-    history = (
-        (f"{len(measures)} measures of the subject read from the file" + (f", lengths in {unit}." if lengths else "."),)
-        if measures
-        else ()
-    )
-    return measures, history, tuple(warnings)
+    said = f"{len(measures)} measures of the subject read from the file{f', lengths in {unit}' if lengths else ''}."
+    return measures, (said,) if measures else (), tuple(warnings)
 
 
 def as_written(measures: Mapping[str, float]) -> dict[str, float]:
@@ -271,9 +255,7 @@ def _written(raw: RawC3d) -> dict[str, float]:
 
 
 def _scale(written: dict[str, float]) -> float:
-    """Return metres per unit of the lengths: the unit that makes stature, else leg length, a person's; mm if neither
-    is there.
-    """
+    """Return metres per unit by which stature, else a leg, is a person's; mm if neither is there."""
     for name, (low, high) in (("Height", STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG)):
         if name in written:
             fitting = [scale for scale in _SCALES if low <= written[name] * scale <= high]

@@ -93,11 +93,7 @@ def write_c3d(
     path = Path(path)
     samples = _samples(path, markers, plates, analog_rate)
     points = _points(markers, len(plates[0].channels) if markers is None and plates else 0)
-    analog = (
-        np.concatenate([_on_disk(plate) for plate in plates], axis=1)
-        if plates
-        else np.empty((len(points) * samples, 0))
-    )
+    analog = np.concatenate([np.empty((len(points) * samples, 0)), *map(_on_disk, plates)], axis=1)
     if not np.isfinite(analog).all():
         row, column = np.argwhere(~np.isfinite(analog))[0]
         raise BiodanceError(
@@ -118,11 +114,8 @@ def write_c3d(
     groups["POINT"]["DATA_START"] = 2 + len(_parameter_section(groups)) // C3D_BLOCK
     section = _parameter_section(groups)
     header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
-    data = (
-        np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1)
-        .astype("<f4")
-        .tobytes()
-    )
+    rows = np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1)
+    data = rows.astype("<f4").tobytes()
     write_new(path, header + section + data + bytes(-len(data) % C3D_BLOCK))
 
 
@@ -168,12 +161,13 @@ def _words(number: int) -> Array:
 
 def _point_group(markers: Markers | None, prefix: str, rate: float, frames: int) -> dict[str, FileValue]:
     labels = [prefix + name for name in markers.names] if markers is not None else []
+    clipped = int(np.uint16(min(frames, 65535)).astype(np.int16))
     return {
         "USED": len(labels),
         "SCALE": -0.1,
         "RATE": float(rate),
         "DATA_START": 0,
-        "FRAMES": int(np.uint16(min(frames, 65535)).astype(np.int16)),
+        "FRAMES": clipped,
         "LABELS": labels,
         "DESCRIPTIONS": [""] * len(labels),
         "UNITS": ["mm"],

@@ -136,9 +136,7 @@ class _Filling:
         return any(f"{side}_{part}" in self.places for side in SIDES for part in parts)
 
     def _free(self, place: str, *, mute: bool = False) -> list[str]:
-        """Return the labels without a landmark that say nothing (``mute``), or nothing else than this place; none that
-        says the other side.
-        """
+        """Return the labels without a landmark that say nothing (``mute``), or nothing but this place."""
         side, taken = place.partition("_")[0], set(self.places.values())
         own = [label for label in plain_labels(self.stand.at) if label not in taken]
         own = [label for label in own if side not in SIDES or self.sides.get(label, side) == side]

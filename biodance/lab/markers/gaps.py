@@ -111,9 +111,7 @@ def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:
 
 
 def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Array | None, str]:
-    """Return the positions (n, 3) of a marker over its gap from its segment, or None; and the sentence that says
-    which and why.
-    """
+    """Return the positions (n, 3) of a marker over its gap from its segment, or None; and how, or why not."""
     if gap.start == 0 or gap.stop == markers.time.size:
         return None, "left unseen: it reaches the end of the recording, and nothing is extrapolated"
     carriers = _carriers(markers, gap, segments)
@@ -133,9 +131,7 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
 
 
 def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[str]:
-    """Return the labels on the same segment, seen from before to after the gap, whose distance to the marker varies
-    least.
-    """
+    """Return the labels of the segment, seen throughout, whose distance to the marker varies least."""
     own = markers[gap.label]
     spread = {}
     for label in markers.names:

@@ -201,9 +201,7 @@ def _across(label: str, side: str, places: Mapping[str, str], stand: Standing) -
 
 
 def _medial_alone(places: dict[str, str]) -> list[str]:
-    """Take the only marker of a knee or ankle for its lateral one where its label says medial on both sides: nobody
-    puts the medial marker alone; return it in sentences.
-    """
+    """Take the only marker of a joint for the lateral one where both sides call it medial: nobody puts that alone."""
     said = []
     for joint in ("knee", "ankle"):
         ends = _ends(joint).values()

@@ -131,9 +131,7 @@ def _guessed(name: str) -> MarkerSet:
 
 
 def _made(name: str, contents: Contents, *, usual: bool) -> MarkerSet:
-    """Return the marker set of a file's contents; where it is a map, markers on landmarks get the usual places and
-    weights of these.
-    """
+    """Return the set of a file's contents; ``usual``: landmarks without a place get the usual one."""
     markers = dict(contents.markers)
     for place, labels in contents.landmarks.items() if usual else ():
         label, known = labels[0][0], usual_places().get(place)

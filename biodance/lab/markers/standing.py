@@ -136,9 +136,7 @@ def standing_person(at: Mapping[str, Array], named: Mapping[str, str]) -> Standi
 
 
 def _size(at: Mapping[str, Array], named: Mapping[str, str]) -> tuple[float, float]:
-    """Return the height of the floor and the stature, m: the median of what every landmark above the ankles says; 0
-    without one.
-    """
+    """Return the height of the floor and the stature, m, the median of what all landmarks say; 0 without one."""
     heights = {place: float(at[label][2]) for place, label in named.items()}
     feet = [z for place, z in heights.items() if place.endswith(_FEET)]
     floor = min(feet or (float(at[label][2]) for label in plain_labels(at))) - 0.02

@@ -104,9 +104,7 @@ def _blocks(vertical: Array, rate: float) -> Array:
 
 
 def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
-    """Return the longest run of blocks that stay within the sway of their median; None if it is too short or carries
-    nobody.
-    """
+    """Return the longest run of blocks within the sway of their median; None if too short, or of nobody."""
     middle = float(np.nanmedian(blocks)) if np.isfinite(blocks).any() else 0.0
     if not middle >= rules.force:
         return None

@@ -63,9 +63,7 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
 
 
 def _segments(labels: tuple[str, ...]) -> dict[str, str]:
-    """Return label -> segment, read as the whole set is written or, where that says nothing, alone: high and low have
-    no sides that could be mistaken.
-    """
+    """Return label -> segment, read in the whole set or, where that says nothing, alone: sides do not matter."""
     together = meanings_of(labels)
     found = {label: together.get(label) or meanings(label) for label in labels}
     places = {label: said[0].place for label, said in found.items() if said}

@@ -142,9 +142,7 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
 
 
 def _groups(columns: tuple[str, ...]) -> dict[str, dict[str, str]]:
-    """Return per plate its columns by part (``vx`` ... ``pz``, and ``mx`` ... where there is a torque), in the
-    file's order.
-    """
+    """Return per plate its columns by part, ``vx`` to ``pz`` and ``mx`` ... where there is a torque, in order."""
     found: dict[str, dict[str, str]] = {}
     for column in columns:
         match = re.fullmatch(r"(.*?)_?([vpmt]?)_?([xyz])", column.strip(), flags=re.IGNORECASE)

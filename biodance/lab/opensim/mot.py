@@ -114,9 +114,7 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
 
 
 def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
-    """Return the header (keys in lower case, the name of the table under ""), the column labels, and the numbered
-    rows below them.
-    """
+    """Return the header (lower-case keys, the table's name under ""), the column labels and the numbered rows."""
     rows = read_text(path).splitlines()
     start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
     if start is None:

@@ -190,9 +190,7 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
 
 
 def _spread(values: Array) -> float:
-    """Return the median over the frames of the largest extent of the marker cloud (T, K, 3), in its own unit; 0 if
-    nothing is seen.
-    """
+    """Return the median over frames of the largest extent of the markers (T, K, 3), file units; 0 if none is seen."""
     seen = values[np.logical_not(np.isnan(values).all(axis=(1, 2)))]
     return float(np.median(np.max(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=1))) if len(seen) else 0.0
 
@@ -200,9 +198,7 @@ def _spread(values: Array) -> float:
 def _equal_steps(
     number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path
 ) -> tuple[Array, Array, list[str]]:
-    """Return time (T,) with equal steps and the coordinates on it, NaN where the file leaves a frame out, and the
-    warnings.
-    """
+    """Return time (T,) with equal steps, the coordinates on it (NaN in frames left out), and warnings."""
     if np.isnan(raw).any() or np.any(np.diff(raw) <= 0):
         frame = int(np.argmax(np.isnan(raw))) if np.isnan(raw).any() else int(np.argmax(np.diff(raw) <= 0)) + 1
         raise FileRefused(

@@ -39,9 +39,7 @@ def distance_to_feet(cop: Array, xyz: Array, corners: Array) -> float | None:
 
 
 def _distances_between(points: Array, feet: Array) -> Array:
-    """Return the distance (F,) m of points (F, 2) to the nearest segment between any two of ``feet`` (F, n, 2) that are
-    there, infinity where they are not.
-    """
+    """Return (F,) m from points (F, 2) to the nearest segment between two of ``feet`` (F, n, 2); inf without any."""
     i, j = np.triu_indices(feet.shape[1], 1)
     away = feet - points[:, None]
     with np.errstate(invalid="ignore"):  # feet that are not there give NaN
@@ -99,9 +97,7 @@ def oriented(
 def _origin_under_feet(
     reading: PlateReading, time: Array, axes: Array, markers: Markers | None
 ) -> tuple[PlateReading, Said]:
-    """Return the reading with ORIGIN x, y turned round where only that puts the load under the feet, and what was
-    decided.
-    """
+    """Return the reading, ORIGIN x, y turned where only that puts the load under the feet, and what was decided."""
     x, y = 1000 * reading.vector[:2]
     if markers is None or reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < 1000 * LEAST_BESIDE:
         return reading, ()
@@ -143,9 +139,7 @@ def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Marker
 def _under_feet(
     reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers
 ) -> tuple[Array, Said, Said]:
-    """Return the axes after asking the foot markers: as they are, or by quarter turns where only that puts the load
-    under them.
-    """
+    """Return the axes, by quarter turns where only that puts the load under the feet; decisions and warnings."""
     distance = _distance(reading, time, axes, markers)
     if distance is None:
         return axes, (), ()
@@ -168,9 +162,7 @@ def _under_feet(
 
 
 def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:
-    """Return the median distance in m of the load to the feet if the plate's axes were ``axes``, by frames spread over
-    the trial.
-    """
+    """Return the median distance (m) of load and feet in frames spread over the trial, with lab_R_plate ``axes``."""
     if not markers.time.size:
         return None
     frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
@@ -189,9 +181,7 @@ def _sway_said(reading: PlateReading, agrees: bool) -> tuple[str, Said]:
 
 
 def _upwards_said(reading: PlateReading) -> tuple[str, Said]:
-    """Return the sentence about a plate whose z points up, and a warning where the maker's own axes have z down
-    (eight channels).
-    """
+    """Say that a plate's z points up, and warn where the maker's own axes have z down (eight channels)."""
     said = "CORNERS make the plate's z point up; the file's axes were used as they are"
     if reading.plate.type not in (3, 7):
         return f"{said}.", ()

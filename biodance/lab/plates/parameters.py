@@ -63,9 +63,7 @@ def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
 
 
 def _misnamed(raw: RawC3d) -> tuple[str, ...]:
-    """Say which group holds the parameters of force plates under another name: damage, which must not pass in
-    silence.
-    """
+    """Say which group holds force plates under another name: damage, which must not pass in silence."""
     other = [name for name, group in raw.parameters.items() if {"CORNERS", "ORIGIN", "CHANNEL"} <= group.keys()]
     if not other or "FORCE_PLATFORM" in other:
         return ()
@@ -127,9 +125,7 @@ def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
 
 
 def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | None:
-    """Return the plate's CAL_MATRIX (stored column by column unless MATRIX_STORE says BYROW), None for types without
-    one.
-    """
+    """Return CAL_MATRIX (stored by columns unless MATRIX_STORE says BYROW); None for types without one."""
     if kind not in MATRIX_OF_TYPE:
         return None
     rows, columns = MATRIX_OF_TYPE[kind]
@@ -153,9 +149,7 @@ def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | No
 
 
 def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
-    """Return Kistler's FPCOPPOLY (2, 6) of the plate, stored as 2 x 6 or 6 x 2; None if the file has none or only
-    zeros.
-    """
+    """Return Kistler's FPCOPPOLY (2, 6), stored as 2 x 6 or 6 x 2; None if there is none or only zeros."""
     stored = _numbers(group, "FPCOPPOLY")
     if stored.size < 12 * number:
         return None
@@ -167,9 +161,7 @@ def _polynomial(group: Mapping[str, Any], number: int) -> Array | None:
 
 
 def _numbers(group: Mapping[str, Any], name: str, *, keep: bool = False) -> Array:
-    """Return a parameter as floats, flat in the file's order (``keep``: with its dimensions); empty if missing or
-    text.
-    """
+    """Return a parameter's floats in the file's order (``keep``: in its dimensions); empty if missing or text."""
     value = group.get(name)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufb":
         return np.empty(0)

@@ -122,9 +122,7 @@ def _two_signs(readings: list[PlateReading], votes: list[float]) -> tuple[str, .
 
 
 def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None) -> ReadPlates:
-    """Return the plates in the lab frame; an unloaded plate takes the sign of the majority, +1 (reaction) if nobody
-    stood on any.
-    """
+    """Return the plates in the lab frame; an unloaded one takes the majority's sign, +1 if all are unloaded."""
     axes = [plate_axes(r.corners) for r in readings]
     signs = [gravity_sign(r.sensor, a, r.rate) for r, a in zip(readings, axes, strict=True)]  # any point: forces alone
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign

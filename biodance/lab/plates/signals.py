@@ -107,10 +107,7 @@ def _at_surface(plate: PlateParameters, sensor: Array, vector: Array, axes: Arra
 
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
-    """Return ORIGIN in m; taken as m or mm instead of the file's unit where only that makes sense.
-
-    Raises TrialRefused where none does.
-    """
+    """Return ORIGIN in m, as m or mm where only that makes sense; TrialRefused where nothing does."""
     fits = [unit for unit in dict.fromkeys((metres, 0.001, 1.0)) if _makes_sense(plate, plate.origin * unit, half)]
     if fits and fits[0] == metres:
         return plate.origin * metres, ()
@@ -207,9 +204,7 @@ def _vertical(plate: PlateParameters, forces: Array) -> Array:
 
 
 def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> Array:
-    """Return the mean of each channel over the window; 0 for an empty window and for the two point channels of TYPE
-    1.
-    """
+    """Return the mean of each channel over the window; 0 without one and for the point channels of TYPE 1."""
     if stop <= start:
         return np.zeros(channels.shape[1])
     mean = channels[start:stop].mean(axis=0)
@@ -219,9 +214,7 @@ def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> 
 def _moments_in_sense(
     plate: PlateParameters, sensor: Array, vector: Array, corners: Array, *, rate: float, unsure: bool
 ) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the wrench with moments in N·m, decisions and warnings: the declared unit, or the only one that puts
-    the load on the plate.
-    """
+    """Return the wrench in the unit of moments, declared or else only one, that puts the load on the plate."""
     axes, half = plate_axes(corners), half_sides(corners)
     loaded = loaded_samples(sensor, rate)
     if not loaded.any():

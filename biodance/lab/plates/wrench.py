@@ -183,9 +183,7 @@ def sway_sign(wrench: Array, rate: float) -> int:
 
 
 def _standing(vertical: Array, rate: float) -> slice | None:
-    """Return the longest run of whole half-seconds in which the vertical force stays near the trial's median; None
-    below 2.5 s.
-    """
+    """Return the longest run of half-seconds with a vertical force near the trial's median; None below 2.5 s."""
     size = round(0.5 * rate)
     middle = float(np.median(vertical))
     if size < 4 or abs(middle) < 5 * TOUCH_FORCE:

@@ -59,9 +59,7 @@ def _places_of_forces(markers: Path) -> list[Path]:
 
 
 def _with_forces(trial: Trial, path: Path) -> Trial:
-    """Return the trial of a .trc file with the plates of the table beside it; a damaged table is a warning, the
-    markers stay.
-    """
+    """Return the trial with the plates of the table beside it; a damaged table is a warning, the markers stay."""
     try:
         table = read_mot(path)
         plates, said = plates_of(table, where=str(path))

@@ -182,9 +182,7 @@ def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
 
 
 def _marker_set(path: Path, said: MarkersEntry) -> str:
-    """Return the marker set of one file: the name of a known set, the path of a file, the file itself for a map; ""
-    where it says none.
-    """
+    """Return a known set's name, a set file's path, or the file's own path for a map; "" where it says none."""
     if said.file is not None and said.map is not None:
         raise SessionRefused(f"{path}: [markers] has both file and map. Keep one of the two.")
     if said.map is not None:
@@ -215,9 +213,7 @@ def _beside(path: Path, found: _Contents) -> _Contents:
 
 
 def _whole_numbers_are_numbers(raw: Any) -> Any:
-    """Return the tables with ``70`` read as ``70.0`` (strict pydantic keeps text and truth values apart from
-    numbers).
-    """
+    """Return the tables with 70 as 70.0: strict pydantic keeps text and truth apart from numbers."""
     if isinstance(raw, dict):
         return {key: _whole_numbers_are_numbers(value) for key, value in raw.items()}
     return float(raw) if isinstance(raw, int) and not isinstance(raw, bool) else raw
@@ -237,7 +233,10 @@ def _sentence(path: Path, fault: Any) -> str:
 
 
 _TABLES: dict[str, type[BaseModel]] = {
-    **{"session": VisitEntry, "subject": SubjectEntry, "trials": TrialEntry, "markers": MarkersEntry},
+    "session": VisitEntry,
+    "subject": SubjectEntry,
+    "trials": TrialEntry,
+    "markers": MarkersEntry,
 }
 _HELP = {
     "mass_kg": "Give the body mass in kg.",

@@ -200,9 +200,7 @@ def _with_strikes(trial: Trial, operator: EclipseNotes | None) -> Trial:
 def _settle_static(
     trials: list[Trial], settings: SessionFile, reasons: dict[str, str], notes: list[str]
 ) -> list[Trial]:
-    """Return the trials with one of them as static where nobody told which; note a static that moves, or that there
-    is none.
-    """
+    """Return the trials, one of them static where nobody told which; note a static that moves, or none."""
     for trial in trials:
         if trial.role == "static" and trial.markers is not None and not is_still(trial):
             notes.append(
@@ -225,9 +223,7 @@ def _settle_static(
 
 
 def _nothing_left(folder: Path, files: Sequence[Path], refused: Mapping[str, str], readers: Chosen[Reader]) -> str:
-    """Return the sentence for a folder of which no recording is left: nothing there, nothing that can be read, or that
-    is not to be skipped.
-    """
+    """Say why no recording of a folder is left: none there, none that can be read, or all to be skipped."""
     if refused:
         name, reason = next(iter(refused.items()))
         if len(refused) == 1:

@@ -100,9 +100,7 @@ def _typed(value: float | None) -> list[Declared]:
 def _declared(
     sources: Mapping[str, Mapping[str, float]], names: Iterable[str], legal: tuple[float, float]
 ) -> list[Declared]:
-    """Return what the sources declare under one of the names, in order; values outside the legal range count as not
-    declared.
-    """
+    """Return what the sources declare under one of the names, in order, within the legal range."""
     found = []
     for source, values in sources.items():
         lower = {key.lower(): value for key, value in values.items()}
@@ -127,9 +125,7 @@ def _choose(quantity: str, unit: str, declared: list[Declared], notes: list[str]
 
 
 def _check_mass(mass: float, on_plates: list[Declared], notes: list[str]) -> float:
-    """Return the declared mass, else the one on the plates; note the guess, and what contradicts the mass that is
-    used.
-    """
+    """Return the declared mass, else the one on the plates; note the guess and what contradicts it."""
     if not on_plates:
         return mass
     first = on_plates[0]
@@ -170,9 +166,7 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
 
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) from the height of markers in the static trial, over its feet where these are not on the
-    floor; NaN if nobody stands there.
-    """
+    """Return the stature (m) from heights of markers over the floor or the feet; NaN if nobody stands there."""
     for trial in (t for t in trials if t.role == "static"):
         feet = _height(trial, "right_heel", "left_heel", "right_toe", "left_toe")
         step = 0.0 if FLOOR[0] <= feet <= FLOOR[1] else feet - _OVER_SOLE
