@@ -65,7 +65,7 @@ Tell = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class DesignContext:
-    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``ledger``
+    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``checkpoint``
     keeps what is finished, ``workers`` search side by side, ``tell`` is told the progress.
     """
 
@@ -73,7 +73,7 @@ class DesignContext:
     blocks: Blocks
     plan: Plan
     seed: int
-    ledger: Checkpoint
+    checkpoint: Checkpoint
     workers: Executor
     tell: Tell
 
