@@ -29,7 +29,7 @@ def danced(plan: PlannedDance, start: float, end: float, seed: list[int]) -> Mot
     coarse, when = draw_clock(np.random.default_rng([*seed, 7]), end - start, USUAL_IMPRECISION)
     time = np.arange(round(coarse[-1] * RATE) + 1) / RATE
     there = start + np.interp(time, coarse, when)
-    copy = plan.performed(np.random.default_rng([*seed, 8]), time, there, USUAL_IMPRECISION)
+    copy = plan.performed_by(((np.random.default_rng([*seed, 8]), time, there, slice(None)),), USUAL_IMPRECISION)
     return smooth(plan.dance.body, time, copy.q)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.cues import _MOST, _WORDS, calls, cue_sheet, instructions
+from biodance.dance.cues import _MOST, _words, calls, cue_sheet, instructions
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
@@ -23,7 +23,7 @@ def posture(**degrees: float) -> Array:
 
 def test_every_joint_of_the_human_has_words() -> None:
     movements = {joint.name.removeprefix("right_").removeprefix("left_") for joint in BODY.joints}
-    assert movements == set(_WORDS)
+    assert movements == set(_words("joints"))
 
 
 def test_direction_size_and_order() -> None:

@@ -13,7 +13,7 @@ from biodance.dance.postures.exchange import image_feet, mirror_posture, mirror_
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import initial_guess, solve
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.nlp import anyhow
+from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import PersonLimits, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import holding
@@ -29,9 +29,9 @@ FEET = tuple(s for s in support_sequence(BODY, Plan("all", "", tuple((name, 1) f
 def test_an_image_keeps_every_limit_as_well_as_its_posture(place):
     here, there = FEET[place], FEET[image_feet(FEET[place], FEET)]
     posture = solve(
-        CHAIN, here, initial_guess(CHAIN, here, np.random.default_rng(place)), anyhow, family(), iterations=8
+        CHAIN, here, initial_guess(CHAIN, here, np.random.default_rng(place)), no_objective, family(), iterations=8
     )
-    image = solve(CHAIN, there, mirror_posture(CHAIN, posture.x, here, there), anyhow, family(), iterations=0)
+    image = solve(CHAIN, there, mirror_posture(CHAIN, posture.x, here, there), no_objective, family(), iterations=0)
     assert image.violation == pytest.approx(posture.violation, abs=1e-9)
     np.testing.assert_allclose(image.up, mirror_vectors(BODY, posture.up), atol=1e-12)
     assert np.abs(image.x[ROOT:] - posture.x[ROOT:]).max() > 0.1

@@ -13,7 +13,7 @@ from biodance.body.human.limits import joint_limits
 from biodance.dance.limits import family
 from biodance.dance.postures.posture import KEPT, initial_guess, refuse, solve
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.nlp import anyhow
+from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, PersonLimits, limit_body
 from biodance.dance.problem.stance import Stance, stance
 from biodance.errors import BiodanceError
@@ -32,7 +32,7 @@ def words(person: PersonLimits, feet: Stance) -> str:
     """Return why there is no posture; nothing if there is one."""
     chain, rng = Chain(limits_of(person)), np.random.default_rng(1)
     begin = [initial_guess(chain, feet, rng) for _ in range(4)]
-    if any(solve(chain, feet, x, anyhow, family(), iterations=40).violation <= KEPT for x in begin):
+    if any(solve(chain, feet, x, no_objective, family(), iterations=40).violation <= KEPT for x in begin):
         return ""
     with pytest.raises(BiodanceError) as said:
         refuse(chain, feet, begin, family())

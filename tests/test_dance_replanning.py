@@ -14,7 +14,7 @@ from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import KEPT, initial_guess, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
-from biodance.dance.problem.nlp import anyhow
+from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.plan import Plan
 from biodance.dance.transitions import context
 from biodance.dance.transitions import schedule as schedule_module
@@ -34,7 +34,9 @@ PLAN = Plan("small", "", (("parallel", 4),), hold=1.0)
 def course():
     rng, stances = np.random.default_rng(3), support_sequence(BODY, PLAN)
     return Course(
-        np.array([solve(CHAIN, s, initial_guess(CHAIN, s, rng), anyhow, family(), iterations=30).x for s in stances]),
+        np.array(
+            [solve(CHAIN, s, initial_guess(CHAIN, s, rng), no_objective, family(), iterations=30).x for s in stances]
+        ),
         stances,
     )
 
@@ -84,7 +86,7 @@ def test_the_posture_that_cannot_be_reached_or_left_is_exchanged_for_another_one
     assert asked[1] == (1, [0])
     assert len(found.x) == 4
     assert not alike(np.array([course.x[trap], found.x[trap]]))[0, 1]
-    again = solve(CHAIN, found.stances[trap], found.x[trap], anyhow, family(), iterations=0)
+    again = solve(CHAIN, found.stances[trap], found.x[trap], no_objective, family(), iterations=0)
     assert again.violation <= KEPT
     assert f"Posture {trap + 1} (with both feet side by side) was exchanged for another one" in notes[-1]
     assert "joint range" in notes[-1]

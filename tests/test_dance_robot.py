@@ -20,7 +20,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import dynamic_grams, excitation_blocks
-from biodance.dance.problem.nlp import anyhow
+from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, fit_to_person
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of
@@ -110,7 +110,7 @@ def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:
     assert len(replace(slow, duration=2.8).grid(10.0)) == 27
     move, _ = evaluate_move(slow, slow.straight())
     time = np.linspace(0.0, 9.5, 2001)[1:-1]
-    fine = slow.problem(slow.straight(), [], time, reserve=0.0, objective=anyhow).state(np.empty(0))
+    fine = slow.problem(slow.straight(), [], time, reserve=0.0, objective=no_objective).state(np.empty(0))
     np.testing.assert_allclose(
         move.gram, dynamic_grams(fine, list(range(12))) * 9.5 / 2000, rtol=0, atol=1e-4 * np.abs(move.gram).max()
     )

@@ -27,7 +27,6 @@ _MOST = 4
 """Things that a person can begin at once."""
 _ALIKE = 12.0
 """degrees within which right and left are called as a pair."""
-
 _FORWARD = np.array([1.0, 1.0, -1.0])
 """Signs of turn, drop and tilt as they are called."""
 _BENT = 30.0

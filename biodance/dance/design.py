@@ -61,8 +61,8 @@ def design(
             return design(body, plan, limits=limits, seed=seed, tell=tell, resume=resume, workers=pool)
     plan = plan.with_limits(limits)
     alone = DesignContext.alone(body, plan, seed)
-    ledger = Checkpoint(resume, body, plan, seed)
-    work = replace(alone, ledger=ledger, workers=workers, tell=tell or alone.tell)
+    checkpoint = Checkpoint(resume, body, plan, seed)
+    work = replace(alone, checkpoint=checkpoint, workers=workers, tell=tell or alone.tell)
     danced: tuple[Margin, ...] = ()
     if np.isfinite(plan.instructions):
         dance, danced = _followable(work)
@@ -106,12 +106,12 @@ def _postures(work: DesignContext) -> Course:
     """Return all postures in the order of the dance, those in between included."""
     plan, chain = work.plan, work.chain
     counted = [s for s in support_sequence(chain.body, plan) if s.over is None]
-    kept = work.ledger.get("postures")
+    kept = work.checkpoint.get("postures")
     if kept is None:
         work.tell("postures", 0, len(counted))
         found = find_postures(chain, work.blocks, tuple(counted), plan.limits, seed=work.seed, workers=work.workers)
         kept = {"x": found.x}
-        work.ledger.put("postures", **kept)
+        work.checkpoint.put("postures", **kept)
     work.tell("postures", len(counted), len(counted))
     x, names = kept["x"], [s.name for s in counted]
     chosen = range(len(x)) if np.isinf(plan.budget) else choose(chain, x, tuple(names), plan).order

@@ -147,15 +147,12 @@ class PlannedDance:
         tops = self.chain.root_heights(x, ankle, _STRAIGHT) + up.T
         return np.asarray(-np.log(np.exp(-_SOFT * tops).sum(axis=0)) / _SOFT)
 
-    def performed(self, rng: np.random.Generator, time: Array, when: Array, how: Imprecision) -> Copied:
-        """Return a performance at ``time`` s, (T,), that is where the plan is at ``when`` s."""
-        return self.performed_by(((rng, time, when, slice(None)),), how)
-
     def performed_by(
         self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
     ) -> Copied:
-        """Return the performances of several people, each as `performed`, one behind the other: of each the first and
-        the last two frames have differences to somebody else's.
+        """Return the performances of several people, one behind the other: of each the random numbers, instants s (T,)
+        and those s (T,) of the plan that belong to them, and which of them count. The first and the last two frames of
+        each have differences to somebody else's.
         """
         parts = list[tuple[Array, Array, Array, Array]]()
         for rng, time, when, part in people:

@@ -77,11 +77,8 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     every = list(range(len(dance.body.segments)))
     grams = static_grams(ups)
     static, _ = total(weight, grams, parts.first)
-    poor = [
-        i
-        for i in every
-        if parts.first[i] and weight[i] > 0 and condition(grams[i][np.ix_(parts.first[i], parts.first[i])])[0] > POOR
-    ]
+    blocks = {i: grams[i][np.ix_(parts.first[i], parts.first[i])] for i in every if parts.first[i] and weight[i] > 0}
+    poor = [i for i, block in blocks.items() if condition(block)[0] > POOR]
     gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
     straight = replace(dance, via=straight_way(dance.postures[:-1], dance.postures[1:]))
     dynamic, paths = [], []
@@ -91,12 +88,10 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
         gram = gram + dynamic_grams(state, every) / _RATE
         dynamic.append(total(weight, gram, parts.second)[0])
         paths.append(ZmpPath(phase.posture - 1, phase.stance, straight.state(phase, time).zmp, state.zmp))
-    bounds = [
-        float(sum(w for w, pick in zip(weight, picks, strict=True) if pick)) for picks in (parts.first, parts.second)
-    ]
-    return DanceMetrics(
-        static, bounds[0], np.array(dynamic), bounds[1], tuple(dance.body.segments[i] for i in poor), tuple(paths)
-    )
+    pairs = (zip(weight, picks, strict=True) for picks in (parts.first, parts.second))
+    first, second = (float(sum(w for w, pick in pair if pick)) for pair in pairs)
+    hardly = tuple(dance.body.segments[i] for i in poor)
+    return DanceMetrics(static, first, np.array(dynamic), second, hardly, tuple(paths))
 
 
 def criterion_of(body: Body, motion: Motion) -> tuple[float, float]:

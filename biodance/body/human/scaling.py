@@ -73,16 +73,7 @@ def measure_static(subject: Subject, static: Trial) -> Scaling:
     centres that ``static.settings`` choose.
 
     The table gives masses, CoM, inertias and where the trunk joint lies between mid hip and mid shoulder. ``notes`` of
-    the body say what was measured, assumed, contradicted and warned about.
-
-    Raises
-    ------
-    TrialRefused
-        The static trial has no markers, no known marker set, or misses a landmark; all missing ones are named.
-    UnknownName
-        There is no such table.
-    SessionRefused
-        The mass or the stature of the subject is not known.
+    the body say what was measured, assumed, contradicted and warned about. Raises as `scale` does.
     """
     subject.require("mass", "stature")
     hip, table = static.settings.hip, static.settings.table

@@ -221,12 +221,6 @@ def _near(body: Body, part: str, joint: str, angle: float) -> float:
 
 def singular(text: str) -> str:
     """Return a word's text with the one limb that it is said of."""
-    for many, one in (
-        ("arms", "arm"),
-        ("forearms", "forearm"),
-        ("elbows", "elbow"),
-        ("legs", "leg"),
-        ("thighs", "thigh"),
-    ):
-        text = text.replace(f"{many} ", f"{one} ", 1)
+    for limb in ("arm", "forearm", "elbow", "leg", "thigh"):
+        text = text.replace(f"{limb}s ", f"{limb} ", 1)
     return text

@@ -16,30 +16,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from biodance.dance.limits._checked import NOTHING, CheckedMotion, Copied, ForImprecise, Remaining
-from biodance.dance.problem.nlp import FAR, Margins
+from biodance.dance.limits._checked import NOTHING as NOTHING
+from biodance.dance.limits._checked import CheckedMotion as CheckedMotion
+from biodance.dance.limits._checked import Copied as Copied
+from biodance.dance.limits._checked import ForImprecise as ForImprecise
+from biodance.dance.limits._checked import Remaining as Remaining
+from biodance.dance.problem.nlp import FAR as FAR
+from biodance.dance.problem.nlp import Margins as Margins
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, assign
-
-__all__ = [
-    "FAR",
-    "NOTHING",
-    "CheckedMotion",
-    "Copied",
-    "ForImprecise",
-    "Limit",
-    "Margins",
-    "Remaining",
-    "bounded",
-    "family",
-    "join_limits",
-    "limits_with",
-    "repeated",
-    "unconcerned",
-]
 
 
 def bounded(default: float, low: float, high: float, unit: str = "") -> Any:

@@ -126,15 +126,9 @@ def symmetric(body: Body) -> bool:
     places, axes, turns = (
         np.array([getattr(joint, name) for joint in body.joints]) for name in ("translation", "axis", "rotation")
     )
+    bounds = np.array([[limits.lower, limits.upper], [limits.torque_lower, limits.torque_upper]])
     pairs: list[tuple[Array, Array]] = [
-        (
-            np.sort([sense * limits.lower[across], sense * limits.upper[across]], axis=0),
-            np.array([limits.lower, limits.upper]),
-        ),
-        (
-            np.sort([sense * limits.torque_lower[across], sense * limits.torque_upper[across]], axis=0),
-            np.array([limits.torque_lower, limits.torque_upper]),
-        ),
+        (np.sort(sense * bounds[:, :, across], axis=1), bounds),
         (FLIP * places[across], places),
         (-FLIP * axes[across], sense[:, None] * axes),  # of a robot's rolls and yaws, both sides may turn the same way
         (FLIP[:, None] * turns[across] * FLIP, turns),

@@ -16,7 +16,7 @@ from biodance.dance.postures.exchange import criterion, exchange, image_feet, mi
 from biodance.dance.postures.posture import ATTEMPTS, KEPT, Exciting, Posture, initial_guess, posture_at, refuse, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, static_grams
-from biodance.dance.problem.nlp import anyhow
+from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
@@ -105,7 +105,7 @@ class _Search:
     def possible(self, place: int) -> Posture:
         """Return a posture that keeps all limits at this place, or raise the BiodanceError that names a limit."""
         begin, stance = [self.anywhere(place, run) for run in range(ATTEMPTS)], self.stances[place]
-        found = (solve(self.chain, stance, x, anyhow, self.limits, iterations=30) for x in begin)
+        found = (solve(self.chain, stance, x, no_objective, self.limits, iterations=30) for x in begin)
         posture = next((p for p in found if p.violation <= KEPT), None)
         return posture or refuse(self.chain, stance, begin, self.limits)
 

@@ -23,7 +23,7 @@ Objective = Callable[[State], tuple[float, Array]]
 """Returns f and its slopes (3, T, n) by x, v, a, which are always computed together."""
 
 
-def anyhow(state: State) -> tuple[float, Array]:
+def no_objective(state: State) -> tuple[float, Array]:
     """Objective of a problem that has none: any point that keeps the limits will do."""
     return 0.0, np.zeros((3, *state.x.shape))
 

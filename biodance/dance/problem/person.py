@@ -1,9 +1,10 @@
 """What one person can and may do: reduced range, strength and speed, one side, no standing on one leg, only seated.
 
-    reason = "stroke in March, left side"      for the record max_speed_deg_s = 120                      no joint turns
-    faster stand_alone_on = ["right"]                 legs on which the person may stand alone; [] = never; without it:
-    both seated = false                             true: only protocols on a stool hold_frame = ["right"]
-    hands that stay on the grips of a walking frame on the plate; without it: none
+    reason = "stroke in March, left side"      for the record
+    max_speed_deg_s = 120                      no joint turns faster
+    stand_alone_on = ["right"]                 legs on which the person may stand alone; [] = never; without it: both
+    seated = false                             true: only protocols on a stool
+    hold_frame = ["right"]                     hands that stay on the grips of a walking frame; without it: none
 
     [range_deg]                                what a joint reaches, degrees
     left_shoulder_flexion = [0, 70]

@@ -65,15 +65,15 @@ Tell = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class DesignContext:
-    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; ``ledger``
-    keeps what is finished, ``workers`` search side by side, ``tell`` is told the progress.
+    """One design: ``chain`` of the body, ``blocks`` that count, ``plan``, ``seed`` of all random numbers; what is
+    finished goes to ``checkpoint``, ``workers`` search side by side, ``tell`` is told the progress.
     """
 
     chain: Chain
     blocks: Blocks
     plan: Plan
     seed: int
-    ledger: Checkpoint
+    checkpoint: Checkpoint
     workers: Executor
     tell: Tell
 

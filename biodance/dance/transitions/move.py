@@ -13,7 +13,14 @@ import numpy as np
 from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
-from biodance.dance.problem.nlp import Evaluation, NonlinearProgramme, Objective, anyhow, free_coordinates, minimise
+from biodance.dance.problem.nlp import (
+    Evaluation,
+    NonlinearProgramme,
+    Objective,
+    free_coordinates,
+    minimise,
+    no_objective,
+)
 from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
@@ -202,7 +209,7 @@ def improved_way(
 def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     """Return the move through ``via`` as all limits judge it on the fine grid, and the worst instants s."""
     time = task.grid(CHECK)
-    problem = task.problem(via, [], time, reserve=BETWEEN, objective=anyhow)
+    problem = task.problem(via, [], time, reserve=BETWEEN, objective=no_objective)
     found = Evaluation(problem, problem.state(np.empty(0)).judged)
     worst, limit = found.worst
     left = np.pad(found.least, 1, constant_values=np.inf)

@@ -147,7 +147,7 @@ class _Search:
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 k, way = running.pop(future), future.result()
                 arrays = {one: np.array(getattr(way, one)) for one in ("via", "duration", "stops", "gram", "limit")}
-                self.work.ledger.put(self._name(k), **arrays)
+                self.work.checkpoint.put(self._name(k), **arrays)
                 self._accept(k, way)
                 self._advance(self.tasks[k].stance.planted, running)
         return [self.found[k] for k in range(len(self.tasks))]
@@ -157,7 +157,7 @@ class _Search:
         work, queue = self.work, self.queue[planted]
         while queue:
             k = queue[0]
-            kept = work.ledger.get(self._name(k))
+            kept = work.checkpoint.get(self._name(k))
             if kept is None:
                 seed = [work.seed, 3, k, *([self.attempt] if self.attempt else [])]
                 running[work.workers.submit(find_way, self.tasks[k], self.history[planted], seed)] = k

@@ -6,6 +6,7 @@ the weight has left it and takes weight only after it has landed.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,11 +14,9 @@ from biodance.records import SIDES, Array
 from biodance.virtual_lab.movement.protocol import FIELDS, STAND, ProtocolPosture, ProtocolStep, TrialPlan
 from biodance.virtual_lab.tolerances import smooth_noise
 
-COLUMNS = {
-    name: slice(sum(map(len, list(FIELDS.values())[:i])), sum(map(len, list(FIELDS.values())[: i + 1])))
-    for i, name in enumerate(FIELDS)
-}
-SHIFT, RAISED = COLUMNS["shift"].start, sum(map(len, FIELDS.values()))
+_ENDS = np.cumsum([0, *map(len, FIELDS.values())]).tolist()
+COLUMNS = {name: slice(*pair) for name, pair in zip(FIELDS, pairwise(_ENDS), strict=True)}
+SHIFT, RAISED = COLUMNS["shift"].start, _ENDS[-1]
 WIDTH = RAISED + len(SIDES)
 EXACT = ("lean", "shift")
 """Fields that are the balance of the trial, not a matter of how well a posture was copied."""
@@ -79,16 +78,10 @@ def _windows(
     late = np.minimum(np.abs(2.0 * sloppiness * rng.normal(size=WIDTH)), 0.3) * move
     start, duration = late, move - late
     for foot in (RAISED, RAISED + 1):
-        if target[foot] > previous[foot]:
-            start[[SHIFT, foot]], duration[[SHIFT, foot]] = (
-                (0.0, WEIGHT_FIRST * move),
-                (WEIGHT_FIRST * move, (1 - WEIGHT_FIRST) * move),
-            )
-        elif target[foot] < previous[foot]:
-            start[[SHIFT, foot]], duration[[SHIFT, foot]] = (
-                ((1 - WEIGHT_FIRST) * move, 0.0),
-                (WEIGHT_FIRST * move, (1 - WEIGHT_FIRST) * move),
-            )
+        rises = target[foot] > previous[foot]
+        if rises or target[foot] < previous[foot]:
+            start[[SHIFT, foot]] = (0.0, WEIGHT_FIRST * move) if rises else ((1 - WEIGHT_FIRST) * move, 0.0)
+            duration[[SHIFT, foot]] = WEIGHT_FIRST * move, (1 - WEIGHT_FIRST) * move
     return start, duration
 
 

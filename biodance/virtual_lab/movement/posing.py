@@ -89,14 +89,7 @@ def upper_body(
         add(f"thorax_{motion}", t.thorax_share * trunk[:, k])
         add(f"neck_{motion}", head[:, k])
     for name, curve in unasked.items():
-        rms = (
-            t.head_motion
-            if name.startswith("neck")
-            else t.thorax_motion
-            if name.startswith("thorax")
-            else t.wrist_motion
-        )
-        add(name, rms * curve)
+        add(name, {"neck": t.head_motion, "thorax": t.thorax_motion}.get(name.split("_")[0], t.wrist_motion) * curve)
     add("thorax_flexion", -t.breathing * np.sin(2 * np.pi * 0.25 * time + rng.uniform(0, 2 * np.pi)))
     for side in SIDES:
         arm = np.radians(curves[f"{side}_arm"])
@@ -118,10 +111,7 @@ def upper_body(
 
 
 _UNASKED = (
-    "neck_flexion",
-    "neck_rotation",
-    "thorax_flexion",
-    "thorax_bending",
+    *("neck_flexion", "neck_rotation", "thorax_flexion", "thorax_bending"),
     *(f"{side}_{name}" for side in SIDES for name in ("wrist_flexion", "wrist_deviation", "forearm_pronation")),
 )
 

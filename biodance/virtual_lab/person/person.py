@@ -163,14 +163,8 @@ def _box(phi: Array) -> Array:
 def _sole(size: Proportions, side: str) -> Foot:
     """Return the outline of a foot on the ground: heel 27 % of its length behind the ankle (Millard et al. 2017)."""
     back, front, half = -0.27 * size["sole"], 0.73 * size["sole"], size["sole_breadth"] / 2
-    corners = [
-        (back, 0.6 * half),
-        (0.55 * front, half),
-        (front, 0.5 * half),
-        (front, -0.5 * half),
-        (0.55 * front, -half),
-        (back, -0.6 * half),
-    ]
+    right = [(back, 0.6 * half), (0.55 * front, half), (front, 0.5 * half)]
+    corners = [*right, *((x, -z) for x, z in reversed(right))]
     outline = [on_side(np.array([x, -size["ankle_height"], z]), side) for x, z in corners]
     return Foot(TRUE_SEGMENTS.index(f"{side}_foot"), np.array(outline if side == "right" else outline[::-1]))
 

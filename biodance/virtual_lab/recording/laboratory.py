@@ -91,6 +91,9 @@ class Laboratory:
             )
 
 
+C3dGroups = dict[str, dict[str, list[float] | list[str] | float | str]]
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One trial as the instruments deliver it, before it is written; ``parameters`` of the C3D file. Faults are
@@ -102,7 +105,7 @@ class Recording:
     markers: Markers
     plates: tuple[PlateRecording, ...]
     analog_rate: float
-    parameters: dict[str, dict[str, list[float] | list[str] | float | str]]
+    parameters: C3dGroups
 
 
 Fault = Callable[[Recording], Recording]
@@ -206,32 +209,16 @@ def record(performance: Performance, instruments: Instruments) -> Recording:
     time = np.arange(frames) / lab.camera_rate
     analog_rate = lab.camera_rate * lab.samples
     fine = np.arange(frames * lab.samples) / analog_rate
-    markers = film(
-        performance,
-        instruments.tissue,
-        time,
-        instruments.tilt,
-        tolerances,
-        stream(seed, "cameras", str(session), plan.name),
-    )
-    noise = stream(seed, "plates", str(session), plan.name)
-    plates = tuple(
-        digitise(
-            sense_plate(performance, plate, fine, instruments.tilt, tolerances, noise),
-            plate,
-            kind=lab.plate_type,
-            bits=lab.bits,
-        )
-        for plate in instruments.plates
-    )
-    return Recording(
-        plan.name, plan.role, markers, plates, analog_rate, measurements(performance.person, session, tolerances)
-    )
+    sight, noise = (stream(seed, what, str(session), plan.name) for what in ("cameras", "plates"))
+    markers = film(performance, instruments.tissue, time, instruments.tilt, tolerances, sight)
+    sensed = [sense_plate(performance, one, fine, instruments.tilt, tolerances, noise) for one in instruments.plates]
+    pairs = zip(sensed, instruments.plates, strict=True)
+    plates = tuple(digitise(channels, one, kind=lab.plate_type, bits=lab.bits) for channels, one in pairs)
+    typed = measurements(performance.person, session, tolerances)
+    return Recording(plan.name, plan.role, markers, plates, analog_rate, typed)
 
 
-def measurements(
-    person: Person, session: int, tolerances: LabTolerances
-) -> dict[str, dict[str, list[float] | list[str] | float | str]]:
+def measurements(person: Person, session: int, tolerances: LabTolerances) -> C3dGroups:
     """Return the C3D groups with the subject's typed measurements as Vicon stores them (mm, kg), errors included."""
     rng = stream(person.seed, "measurements", str(session))
     size = person.size
@@ -264,12 +251,6 @@ def scale_reading(person: Person, session: int, tolerances: LabTolerances) -> fl
 
 def write(recording: Recording, folder: Path) -> Path:
     """Write one recording as ``folder/NAME.c3d`` and return the path; an existing file is never overwritten."""
-    path = folder / f"{recording.name}.c3d"
-    write_c3d(
-        path,
-        markers=recording.markers,
-        plates=recording.plates,
-        analog_rate=recording.analog_rate,
-        parameters=dict(recording.parameters),
-    )
+    path, groups, rate = folder / f"{recording.name}.c3d", dict(recording.parameters), recording.analog_rate
+    write_c3d(path, markers=recording.markers, plates=recording.plates, analog_rate=rate, parameters=groups)
     return path
