@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from bench_marker_sets import landmark_path
+from bench_marker_sets import landmark, landmark_path
 
 from biodance.errors import BiodanceError
 from biodance.lab.markers.guess import guess_set
@@ -47,6 +47,16 @@ _MIDDLES = {
     "elbow": ("elbow_lateral", "elbow_medial"),
     "wrist": ("wrist_radial", "wrist_ulnar"),
 }
+_CORNERS = {
+    "pelvis": ("R.asis", "L.asis", "mid_psis"),
+    "trunk_head": ("R.acromion", "L.acromion", "xiphoid"),
+    "thigh": ("hip_centre", "knee_lateral", "knee_medial"),
+    "shank": ("knee_centre", "ankle_lateral", "ankle_medial"),
+    "foot": ("heel", "toe", "ankle_lateral"),
+    "upper_arm": ("acromion", "elbow_lateral", "elbow_medial"),
+    "forearm_hand": ("elbow_centre", "wrist_radial", "wrist_ulnar"),
+}
+"""Segment -> three places that ride on it."""
 
 
 class Person:
@@ -117,6 +127,31 @@ class Person:
             return self.surface(code, rng)
         return self.landmark(SIDES[code[0]], code[2:]) if code[1:2] == "." else self.landmark("", code)
 
+    def wears(self, place: str) -> bool:
+        """Return whether this person was recorded with a marker at a landmark."""
+        return place in LANDMARKS and landmark(self.markers, self.worn, place) is not None
+
+    def frame(self, segment: str) -> tuple[Array, Array]:
+        """Return a point (T, 3) m of a segment and axes (T, 3, 3) that turn with it, from three places on it."""
+        side, _, limb = segment.rpartition("_") if segment in ("pelvis", "trunk_head") else segment.partition("_")
+        kind = segment if segment in _CORNERS else limb
+        start = "" if segment in _CORNERS else f"{side[0].upper()}."
+        a, b, c = (self.path(f"{start}{place}", np.random.default_rng(0)) for place in _CORNERS[kind])
+        along = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
+        across = np.cross(along, c - a)
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        return a, np.stack([along, across, np.cross(along, across)], axis=2)
+
+
+def carried(still: Person, moving: Person, place: str, path: Array) -> Array:
+    """Return the path (T, 3) m of a point that a standing person was given (``path``), riding on its segment where the
+    person moves.
+    """
+    segment = segment_of(place) if place in LANDMARKS else place
+    (at, turn), (then, turned) = still.frame(segment), moving.frame(segment)
+    local = np.einsum("tji,tj->ti", turn, path - at).mean(axis=0)
+    return np.asarray(then + turned @ local)
+
 
 def people_of(data: Path) -> dict[str, Person]:
     """Return the nine persons of BIODANCE_DATA who stand, by the name of the trial."""
@@ -128,8 +163,11 @@ def people_of(data: Path) -> dict[str, Person]:
     return {file.stem: Person(read_trial(file)) for file in files}
 
 
-def labelled(person: Person, name: str) -> tuple[Markers, dict[str, str]]:
-    """Return the recording under the labels of a set, and label -> what it may be."""
+def labelled(person: Person, name: str, still: Person | None = None) -> tuple[Markers, dict[str, str]]:
+    """Return the recording under the labels of a set, and label -> what it may be; what was not recorded rides on its
+    segment as the ``still`` person got it.
+    """
+    before = labelled(still, name)[0].xyz if still else None
     truth = dict(line.split(" = ") for line in SETS[name]["labels"])
     prefix = PREFIXES[zlib.crc32(name.encode()) % len(PREFIXES)]
     rng = np.random.default_rng(zlib.crc32(name.encode()))
@@ -138,7 +176,11 @@ def labelled(person: Person, name: str) -> tuple[Markers, dict[str, str]]:
     for code in truth.values():
         place = code.split("|")[0]
         aside = rng.normal(0, SPREAD, 2) if place in taken else np.zeros(2)
-        columns.append(person.path(place, rng) + aside[0] * person.ahead + [0.0, 0.0, aside[1]])
+        path = person.path(place, rng) + aside[0] * person.ahead + [0.0, 0.0, aside[1]]
+        if still and before is not None and "virtual" not in place and place != "object":
+            made_up = place in taken or not person.wears(_place(place))
+            path = carried(still, person, _place(place), before[:, len(columns)]) if made_up else path
+        columns.append(path)
         taken.add(place)
     junk = np.full((len(person.markers.time), 2, 3), np.nan)
     junk[: max(len(junk) // 10, 1)] = [[0.3, 0.8, 1.9], [-0.7, 0.1, 0.4]]
@@ -176,7 +218,7 @@ def tracked(name: str, still: Person, moving: Person) -> str:
 
     with tempfile.TemporaryDirectory() as folder:
         for stem, person in (("static", still), ("walk", moving)):
-            markers, _ = labelled(person, name)
+            markers, _ = labelled(person, name, None if person is still else still)
             if len(markers.time) == 1:  # a recording of one frame stands for half a second
                 markers = Markers(markers.names, np.arange(50) / 100, np.repeat(markers.xyz, 50, axis=0))
             write_trc(Path(folder) / f"{stem}.trc", markers)

@@ -14,7 +14,7 @@ from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, told_together
 from biodance.report.figures.vector import round_ticks
 from biodance.report.pages.movement import _beside
-from biodance.report.wording import causes_by_effect, moment, share_of, signed, size_seen, sized
+from biodance.report.wording import causes_by_effect, changed, moment, share_of, signed, size_seen, sized
 
 
 @pytest.mark.parametrize(
@@ -44,6 +44,11 @@ def test_small_shares_are_not_nothing_and_nothing_has_no_sign():
     assert [signed(value) for value in (0.04, -0.04, 1.26, -1.26)] == ["0.0", "0.0", "+1.3", "−1.3"]
     assert moment("2026-11-25T18:51:33Z") == "2026-11-25 18:51 UTC"
     assert [_beside(late) for late in (-0.0062, 0.002)] == ["6 ms earlier", "2 ms later"]
+
+
+def test_a_change_has_its_sign_its_unit_and_no_more_digits_than_it_deserves():
+    told = [changed(*one) for one in ((0.016, "m"), (-0.00911, "m"), (1.637, "kg"), (0.00123, "kg·m²"))]
+    assert told == ["+16 mm", "−9 mm", "+1.64 kg", "+0.0012 kg·m²"]
 
 
 def test_causes_are_told_by_effect_and_counted_beyond_the_sixth():

@@ -41,12 +41,17 @@ def moment(created: str) -> str:
 
 def sized(value: float, unit: str) -> str:
     """Return a number with its unit as a person says it, with three significant digits at most: 0.02 m is 20 mm."""
-    factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 2))
+    factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 4 if unit == "kg·m²" else 2))
     if value == float("inf"):
         return "no size"
     shown = factor * value
     large = math.floor(math.log10(abs(shown))) if shown and math.isfinite(shown) else 0
     return f"{format_number(shown, max(0, min(digits, 2 - large)))} {name}".strip()
+
+
+def changed(value: float, unit: str) -> str:
+    """Return a difference as a person says it, with its sign: 0.016 m is +16 mm."""
+    return f"{'+' if value > 0 else ''}{sized(value, unit)}"
 
 
 def share_of(part: float) -> str:

@@ -31,7 +31,7 @@ from biodance.report.figures.vector import (
     shade,
 )
 from biodance.report.pages.template import render
-from biodance.report.wording import format_number
+from biodance.report.wording import changed, format_number, signed
 
 if TYPE_CHECKING:
     from biodance.dance.scoring import PerformanceScore
@@ -207,7 +207,7 @@ def identification_section(found: SessionIdentification) -> str:
     rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
     return render(
         "identification.html.j2",
-        filters={"spaced": spaced, "small": small},
+        filters={"spaced": spaced, "small": small, "changed": changed, "signed": signed},
         one=one,
         notes=[note for note in found.notes if not note.startswith(LISTED)],
         failures=found.failures,
