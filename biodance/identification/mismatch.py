@@ -21,7 +21,7 @@ from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
 from biodance.motion.kinematics import segment_motion
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Index, Sip
+from biodance.records import Array, Index, Motion, Sip
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.caution import shift_slope
 from biodance.uncertainty.noise import Noise
@@ -62,20 +62,26 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float |
 
     Skin and flesh slide ``softer`` times as much as the table says, by default as the markers show (`softness`).
     """
-    whole, shares = parts_as_segments(body), share_errors(body)
-    found, sources, plates = nothing(body), of_markers(whole), plate_sources()
+    whole, found = parts_as_segments(body), nothing(body)
+    sources = of_markers(whole)
     scores, plate_scores = np.array(found.kinematics), np.array(found.plates)
     for fit, pick in _runs(fits, noise.bands):
         motion = fit.motion.at(pick)
-        links, trial = regressor_of(segment_motion(body, motion), gravity=body.gravity), Response.of(whole, motion)
-        W = links if body.sharing is None else links @ body.sharing
-        weight = noise.at(fit.motion.rate).weighted(W)
-        scores += transpose(sources, trial, weight).T
-        wrong = plate_errors(W @ body.sip.phi, motion.rate, noise, plates)
-        plate_scores += np.tensordot(weight, np.concatenate([wrong, links @ shares], axis=2), axes=((0, 1), (0, 1)))
+        weight, wrong = _weighed(body, motion, noise.at(fit.motion.rate))
+        plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
+        scores += transpose(sources, Response.of(whole, motion), weight).T
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = softness(body, fits, noise.bands) if softer is None else softer
     return Mismatch(scores * np.where(soft, more, 1.0) * deviations(whole, sources), plate_scores)
+
+
+def _weighed(body: Body, motion: Motion, noise: Noise) -> tuple[Array, Array]:
+    """Return S^-1 W (F, 6, p) of a run, and the errors (F, 6, m) of plates and of the shares of parts in its wrench."""
+    links = regressor_of(segment_motion(body, motion), gravity=body.gravity)
+    W = links if body.sharing is None else links @ body.sharing
+    plates = plate_errors(W @ body.sip.phi, motion.rate, noise, plate_sources())
+    wrong = np.concatenate([plates, links @ share_errors(body)], axis=2)
+    return noise.weighted(W), wrong
 
 
 def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:

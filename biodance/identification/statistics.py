@@ -153,9 +153,10 @@ def _add(body: Body, fit: Fit, total: Statistics) -> None:
     for pick in layout.bands.runs(fit.use, fit.motion.rate):
         part = fit.motion.at(pick)
         moved = segment_motion(body, part)
-        W = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
-        rows = np.concatenate([W, fit.wrench.value[pick][:, :, None]], axis=2)
-        X = layout.bands.coefficients(layout.shift @ rows)
+        rows = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
+        rows = np.concatenate([rows, fit.wrench.value[pick][:, :, None]], axis=2)
+        rows = layout.shift @ rows
+        X = layout.bands.coefficients(rows)
         band = layout.bands.at(fit.motion.rate).of(len(X))
         last = POSTURE_BANDS if _is_standing(moved.position) and not layout.bands.white else len(gram)
         for b in np.unique(band[(band >= 0) & (band < last)]):

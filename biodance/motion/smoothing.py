@@ -85,9 +85,10 @@ def _moving(chart: Chart, near: Array, at: Smooth, first: Smooth, second: Smooth
 
 def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[Smooth, Smooth, Smooth]:
     """Return low-passed postures ``rough`` (nq, T) in the coordinates of ``chart``, and their two first derivatives."""
-    longer, span = _continued_at_the_ends(chart.smooth(rough).stacked(), rate, settings)
-    filtered = chart.split(low_pass(longer.T, rate, settings).T)
+    even, span = _continued_at_the_ends(chart.smooth(rough).stacked(), rate, settings)
+    filtered = chart.split(low_pass(even.T, rate, settings).T)
     even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle).stacked()
+    del filtered  # what is derived needs the memory
     first, second = _derivatives(np.arange(even.shape[1]) / rate, even)
     return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
 

@@ -61,11 +61,11 @@ class Noise:
         """Return S^-1 rows (T, 6, n) for consecutive samples ``rows`` (T, 6, n) about the lab origin: ``whiten`` and
         its transpose.
         """
-        white = self.whiten(rows)
+        inverse, band = np.linalg.inv(self.covariance), self.bands.of(len(rows))
         if self.bands.white:
-            return np.asarray(self.shift.T @ np.linalg.solve(np.linalg.cholesky(self.covariance[0]).T, white))
-        band = self.bands.of(len(rows))
-        keep = band >= 0
-        spectrum = np.zeros_like(rows)
-        spectrum[keep] = np.swapaxes(np.linalg.inv(np.linalg.cholesky(self.covariance)), 1, 2)[band[keep]] @ white
+            return np.asarray(self.shift.T @ (inverse[0] @ (self.shift @ rows)))
+        spectrum = self.bands.coefficients(self.shift @ rows)
+        spectrum[band < 0] = 0.0
+        for one in np.unique(band[band >= 0]):
+            spectrum[band == one] = inverse[one] @ spectrum[band == one]
         return np.asarray(self.shift.T @ self.bands.samples(spectrum))

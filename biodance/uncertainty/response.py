@@ -161,12 +161,14 @@ class Banded:
     @classmethod
     def of(cls, matrix: csr_array) -> "Banded":
         """Return a sparse matrix (n, n) as such."""
-        found, count = [], matrix.shape[0]
-        for start in range(0, count, _ROWS):
+        found: list[tuple[slice, slice, Array]] = []
+        for start in range(0, count := matrix.shape[0], _ROWS):
             rows = slice(start, min(start + _ROWS, count))
             at = matrix.indices[matrix.indptr[rows.start] : matrix.indptr[rows.stop]]
             columns = slice(int(at.min(initial=rows.start)), int(at.max(initial=rows.start)) + 1)
-            found.append((rows, columns, matrix[rows, columns].toarray()))
+            block = matrix[rows, columns].toarray()
+            same = bool(found) and np.array_equal(block, found[-1][2])  # the middle rows are one, moved along
+            found.append((rows, columns, found[-1][2] if same else block))
         return cls(tuple(found))
 
     def add(self, size: float, values: Array, out: Array) -> None:

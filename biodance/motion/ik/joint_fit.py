@@ -141,17 +141,21 @@ def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Marker
     """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
     marker.
     """
-    parts = [
-        np.stack([one[n] if n in one else np.full((one.time.size, 3), np.nan) for n in names], axis=1) for one in trials
-    ]
-    xyz = np.concatenate(parts) if parts else np.empty((0, len(names), 3))
-    xyz = xyz[np.isfinite(xyz).any(axis=(1, 2))]
-    if not len(xyz):
+    shown = [one.seen[:, [name in names for name in one.names]].any(axis=1) for one in trials]
+    frames = np.flatnonzero(np.concatenate(shown)) if shown else np.empty(0, dtype=int)
+    if not frames.size:
         raise TrialRefused(
             "No moving trial shows a marker of the body, so its joints stay where the static trial puts them."
         )
-    chosen = np.linspace(0, len(xyz), min(_POSTURES, len(xyz)), endpoint=False).astype(int)
-    return Markers(names, np.arange(len(chosen)) / 100.0, xyz[chosen])
+    frames = frames[np.linspace(0, frames.size, min(_POSTURES, frames.size), endpoint=False).astype(int)]
+    xyz, first = np.full((frames.size, len(names), 3), np.nan), 0
+    for one in trials:
+        own = (frames >= first) & (frames < first + one.time.size)
+        for place, name in enumerate(names):
+            if name in one:
+                xyz[own, place] = one[name][frames[own] - first]
+        first += one.time.size
+    return Markers(names, np.arange(frames.size) / 100.0, xyz)
 
 
 def evaluate_joints(

@@ -11,9 +11,6 @@ from typing import Any
 
 import numba
 
-FAST = {"contract", "reassoc", "nsz", "arcp"}
-"""What the compiler may do to sums: reorder and fuse them. NaN and infinity keep their meaning."""
-
 STAMP = tuple(
     (path.name, path.stat().st_mtime, path.stat().st_size) for path in sorted(Path(__file__).parent.glob("*.py"))
 )
@@ -25,8 +22,9 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
     numba looks for changes in the function's own file only and would keep what it inlined from the others, so the kept
     code carries the state of the whole folder (a private attribute of numba's; tests/test_motion_compiled.py sees that
-    it works).
+    it works). Sums keep their order (no fastmath): else the process that compiles a function, which runs it inlined
+    otherwise than what it keeps for later ones, gives other last digits than these.
     """
-    dispatcher = numba.njit(cache=True, fastmath=FAST, error_model="numpy", no_cfunc_wrapper=True)(function)
+    dispatcher = numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function)
     dispatcher._cache._cache_file._source_stamp = STAMP
     return dispatcher
