@@ -79,7 +79,7 @@ def test_a_touch_pushes_to_one_side_and_a_swell_does_not() -> None:
     assert one_sided(touch)
     assert one_sided(-touch)
     assert not one_sided(swell)
-    creeping = np.exp(-np.arange(40) / 8)[:, None] * [0.0, 0.3, 1.0]
+    creeping = np.exp(-np.arange(40) / 15)[:, None] * [0.0, 0.3, 1.0]
     held = (np.arange(40) % 20 < 8)[:, None] * [0.0, 0.3, 1.0]
     assert comes_and_goes(held + 0.1 * np.random.default_rng(0).normal(size=(40, 3)))
     assert not comes_and_goes(swell)
