@@ -208,13 +208,13 @@ def test_a_foot_that_touches_is_named_though_the_mean_of_a_trial_is_hidden() -> 
 
     def touched(wrench, session, moving):
         point = poses(one, moving.q).points([index], ball[None])[:, 0]
-        strength = np.where(np.abs(moving.time % 4.0 - 2.0) < 0.5, 9.0, 0.0)
+        strength = np.where(np.abs(moving.time % 4.0 - 2.0) < 0.8, 6.0, 0.0)
         force = strength[:, None] * np.array([0.0, 0.3, 1.0])
         return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
 
     diagnosis = found(touched, chosen=(*FAST, "external_contact")).diagnosis
     assert [(f.effect, f.target) for f in diagnosis.findings] == [("external_contact", "left_foot")]
-    assert diagnosis.findings[0].parameters[2].value == pytest.approx(9.0, abs=3.0)
+    assert diagnosis.findings[0].parameters[2].value == pytest.approx(6.0, abs=1.5)
 
 
 def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkeypatch) -> None:
