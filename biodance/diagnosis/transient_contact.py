@@ -31,7 +31,8 @@ OTHER_SIDE = 0.2
 QUICK, _END = 0.2, 2
 """Share of its squares that the steps between values 0.4 s apart hold at least in a touch, and values at the ends of a
 trial that are not asked. A touch of d seconds has 0.8 s / d where it takes hold at once, half of that where it takes
-0.8 s; what creeps back with a time constant T has (0.4 s / T)². Seen: touches of 1.6 s 0.57 to 0.69, creep 0.04 to 0.08.
+0.8 s; what creeps back with a time constant T has (0.4 s / T)². Seen: touches of 1.6 s 0.57 to 0.69, creep 0.04 to
+0.08.
 """
 _BESIDE = 0.1
 """m, standard deviation before the data of the place of a touch from the far end of its segment: a hand's length."""
