@@ -7,7 +7,7 @@ import pytest
 from human_cases import human_case
 from scipy.signal import butter, filtfilt
 
-from biodance.diagnosis.transient_contact import one_sided
+from biodance.diagnosis.transient_contact import one_sided, quick
 from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import REFERENCE, STRENGTH
 from biodance.effects.sloshing_load import _FREQUENCY
@@ -79,3 +79,8 @@ def test_a_touch_pushes_to_one_side_and_a_swell_does_not() -> None:
     assert one_sided(touch)
     assert one_sided(-touch)
     assert not one_sided(swell)
+    creeping = np.exp(-np.arange(25) / 4)[:, None] * [0.0, 0.3, 1.0]  # 1.6 s, at values 0.4 s apart
+    held = (np.arange(25) % 10 < 4)[:, None] * [0.0, 0.3, 1.0]
+    assert quick([held, held])
+    assert not quick([swell, swell])
+    assert not quick([creeping - np.median(creeping, axis=0), creeping])

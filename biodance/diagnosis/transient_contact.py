@@ -28,6 +28,12 @@ SIZES = (2.0, 8.0, 30.0)
 """Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
 OTHER_SIDE = 0.2
 """Share of its squares that a touch may lie on the other side."""
+QUICK, _END = 0.2, 2
+"""Share of its squares that the steps between values 0.4 s apart hold at least in a touch, and values at the ends of a
+trial that are not asked. A touch of d seconds has 0.8 s / d where it takes hold at once, half of that where it takes
+0.8 s; what creeps back with a time constant T has (0.4 s / T)². Seen: touches of 1.6 s 0.57 to 0.69, creep 0.04 to
+0.08.
+"""
 _BESIDE = 0.1
 """m, standard deviation before the data of the place of a touch from the far end of its segment: a hand's length."""
 _STEPS = 2
@@ -91,12 +97,13 @@ def _with(
         return None
     if suspects[0].score < max(base.tolerances.threshold, than, required_evidence(base, best.visible)):
         return None
-    if not one_sided(best.size * beside_rest(base, best.effect, best.found.mean)):
+    values = _touching(base, best)
+    if values is None:
         return None
     effect, white = _placed(base, best)
     wide = white.scaled(SIZES[-1])  # widest: the most probable one would shrink short peaks
     course = SIZES[-1] * _posterior_mean(base, wide, np.zeros(wide.width))
-    touch = _named(base, effect, course, best)
+    touch = _named(base, effect, course, best, values)
     if not (is_significant(base, touch) and matters(touch.effect, touch.theta)):
         return None
     posterior = linear_posterior(
@@ -123,19 +130,29 @@ def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_TransientContact |
     return best, tuple(replace(one, score=one.score - price) for one in found)
 
 
-def beside_rest(base: Model, effect: Effect, course: Array) -> Array:
-    """Return (n, p) the values over time of a contact's ``course`` (k,) beside what they are most of the time in their
-    trial: a touch comes and goes, and its mean over a trial is nearly that of the plate's zero and the body's weight,
-    which take it.
+def _touching(base: Model, one: _TransientContact) -> Array | None:
+    """Return the values (n, p) over time of a contact's course, if it is that of something touched: on one side of zero
+    or, as the plate's zero and the body's weight take the mean of a trial from a foot, of where it lies most of the
+    time in its trial, if it is quick. None for one that is neither.
     """
-    count, parts, start = len(effect.parameters), [], 0
+    values, beside, start = one.size * one.found.mean.reshape(-1, len(one.effect.parameters)), [], 0
+    if one_sided(values):
+        return values
     for case in base.problem.cases:
-        columns = effect.local(case)
-        stop = start + (0 if columns is None else columns.shape[2])
-        values = course[start:stop].reshape(-1, count)
-        parts.append(values - np.median(values, axis=0) if len(values) else values)
+        columns = one.effect.local(case)
+        stop = start + (0 if columns is None else columns.shape[2] // values.shape[1])
+        beside.append(values[start:stop] - (np.median(values[start:stop], axis=0) if stop > start else 0.0))
         start = stop
-    return np.concatenate(parts)
+    inner = [part[_END:-_END] for part in beside]  # nobody judges the ends of a trial: there the course is open
+    return np.concatenate(beside) if one_sided(np.concatenate(inner)) and quick(inner) else None
+
+
+def quick(courses: Sequence[Array]) -> bool:
+    """Return whether forces (n, 3) over time, one of each trial, take hold and let go as a hand or foot does: what
+    swells or creeps back does not.
+    """
+    steps = sum(float(np.sum(np.diff(course, axis=0) ** 2)) for course in courses)
+    return steps >= QUICK * sum(float(np.sum(course**2)) for course in courses)
 
 
 def one_sided(course: Array) -> bool:
@@ -214,9 +231,10 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 
-def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact) -> NamedCause:
+def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact, steps: Array) -> NamedCause:
     """Return the cause with its ``course`` (k,) cut by trials; as its size, the force while it acts: half of the
-    squares, as ``sized`` sees them, belong to larger ones (the largest of hundreds of values would be mostly noise).
+    squares of its ``steps`` (n, p), as ``sized`` sees them, belong to larger ones (the largest of hundreds of values
+    would be mostly noise).
     """
     count, parts, start = len(effect.parameters), {}, 0
     for case in base.problem.cases:
@@ -224,7 +242,6 @@ def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact)
         width = 0 if columns is None else columns.shape[2]
         parts[case.trial.name] = course[start : start + width]
         start += width
-    steps = sized.size * beside_rest(base, sized.effect, sized.found.mean)
     spread = sized.size**2 * np.diag(sized.found.covariance).reshape(-1, count)
     square = np.sum(steps**2, axis=1)
     order = np.argsort(square)
