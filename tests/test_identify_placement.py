@@ -23,8 +23,8 @@ TRUNK = 7
 
 @cache
 def low_joint() -> Body:
-    """Return a person whose trunk turns 6 cm below the table's cut, without a second opinion on the masses."""
-    return replace(displaced(hidden()).body()[0], studies=())
+    """Return a person whose trunk turns 6 cm below the table's cut."""
+    return displaced(hidden()).body()[0]
 
 
 def moments(body: Body, true: Sip, seed: int = 0) -> Information:

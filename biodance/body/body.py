@@ -64,9 +64,6 @@ class Body(JointTree, Sendable):
     girths : mapping
         By segment, what of the person's shape its mass in ``sip`` takes in beside the table: girths by name, "foot
         outline", "scan".
-    studies : tuple of float
-        (N) shares of the body mass in the mean of the published studies, a second opinion beside the table; () where
-        there is none.
     parts : tuple
         Pieces of segments that move on joints of their own (``Part``): the head, hands, collar bones.
 
@@ -91,7 +88,6 @@ class Body(JointTree, Sendable):
     gravity: Array = field(default_factory=GRAVITY.copy)
     at_joint: Sip | None = None
     girths: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    studies: tuple[float, ...] = ()
     parts: tuple[Part, ...] = ()
 
     def __post_init__(self) -> None:

@@ -77,6 +77,5 @@ def _body(raw: dict[str, Any]) -> Body:
         **({"gravity": raw["gravity"]} if "gravity" in raw else {}),
         at_joint=Sip(**raw["at_joint"]) if raw.get("at_joint") else None,
         girths={segment: tuple(names) for segment, names in raw.get("girths", {}).items()},
-        studies=tuple(raw.get("studies", ())),
         parts=tuple(Part(**part) for part in raw.get("parts", ())),
     )

@@ -111,7 +111,6 @@ def branch_off(body: Body, cut: Cut) -> Body:
         com_boxes=_com_boxes(body, cut),
         notes=(*body.notes, f"{cut.name} moves on {cut.segment}."),
         at_joint=None,
-        studies=(),
     )
 
 
@@ -166,7 +165,6 @@ def parts_as_segments(body: Body) -> Body:
         parts=(),
         sip=Sip(body.links, phi, table @ body.sip.covariance @ table.T),
         at_joint=along and Sip(body.links, table @ along.phi, table @ along.covariance @ table.T),
-        studies=(),
         boxes=np.array(boxes),
         com_boxes=np.array(rooms),
     )

@@ -1,8 +1,7 @@
 """What the table leaves open about a person, answered by the session: where the trunk's matter lies when movement puts
 its joint elsewhere than the table cuts the trunk from the pelvis (where the table has it in the person, or along with
-the joint), and whether the masses of the two sides are alike or each on its own: the most probable answer is kept.
-Whether the masses are the table's or those of the published studies together no session tells for sure: both count, as
-probable as it makes them.
+the joint), and whether the masses of the two sides are alike or each on its own. All answers are measured, the most
+probable one is kept.
 """
 
 from dataclasses import replace
@@ -14,7 +13,7 @@ from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.posterior import posterior
-from biodance.records import Array, Sip
+from biodance.records import Sip
 from biodance.uncertainty.caution import shift_slope, widened
 
 _ALONG = 1
@@ -83,58 +82,10 @@ def with_sides(table: Sip, *, apart: bool) -> Sip:
     return replace(table, covariance=covariance)
 
 
-def studies_share(table: Sip, body: Body) -> float:
-    """Return how far the masses of ``table`` lie on the way from those of the body's table (0) to the mean of the
-    published studies (1); 0 where the body has no such second opinion.
-    """
-    if not body.studies:
-        return 0.0
-    first, way = _way_to_studies(body)
-    return float(np.clip(way @ (table.mass / table.mass.sum() - first) / (way @ way), 0.0, 1.0))
-
-
-def with_studies(table: Sip, body: Body, share: float) -> Sip:
-    """Return ``table`` with its masses at ``share`` of the way to the mean of the published studies, each segment's
-    matter in proportion, and with what being unsure between the two opinions adds to the covariance.
-    """
-    then = studies_share(table, body)
-    if share == then:
-        return table
-    mass, per_kg = table.mass, table.phi.reshape(-1, 10) / table.mass[:, None]
-    way = float(mass.sum()) * _way_to_studies(body)[1]
-    both = (per_kg * way[:, None]).ravel()
-    unsure = share * (1 - share) - then * (1 - then)
-    phi = (per_kg * (mass + (share - then) * way)[:, None]).ravel()
-    return replace(table, phi=phi, covariance=table.covariance + unsure * np.outer(both, both))
-
-
-def _way_to_studies(body: Body) -> tuple[Array, Array]:
-    """Return the shares (N,) of the body mass in the table, and what the studies' have more."""
-    first = body.sip.mass / body.sip.mass.sum()
-    return first, np.array(body.studies) - first
-
-
-def _weigh_studies(data: Information, table: Sip, body: Body) -> tuple[Sip, tuple[str, ...]]:
-    """Return the ``table`` moved towards the studies by their probability after the ``data`` (half beforehand), and
-    this in words.
-    """
-    if not body.studies:
-        return table, ()
-    masses = np.array([table.mass, table.mass + table.mass.sum() * _way_to_studies(body)[1]])
-    other = replace(table, phi=table.phi * np.repeat(masses[1] / masses[0], 10))
-    gain = posterior(data, other).log_evidence - posterior(data, table).log_evidence
-    share = float(1 / (1 + np.exp(-gain)))
-    words = (
-        f"The masses are expected {100 * share:.0f} % of the way from the table to the mean of the published studies "
-        f"(logarithm of the Bayes factor {gain:.1f})."
-    )
-    return with_studies(table, body, share), (words,)
-
-
 def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
     """Return the ``table`` with the trunk's matter and the sides as the ``data`` of the session make more probable
-    (evidence under the table's own standard deviations and those of the trunk's place), its masses between the table's
-    and those of the published studies, whether the sides are apart in it, and all of this in words.
+    (evidence under the table's own standard deviations and those of the trunk's place), whether the sides are apart in
+    it, and both in words.
     """
     places = (False, True) if body.at_joint is not None else (False,)
     placed = [_at(body, float(table.mass.sum()), along=x) if len(places) > 1 else table for x in places]
@@ -156,5 +107,4 @@ def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip,
             f"The masses of the right and left side are taken each on its own, not as alike as the table expects "
             f"(logarithm of the Bayes factor {evidence[best] - evidence[along, False]:.1f})."
         )
-    table, told = _weigh_studies(data, choices[best], body)
-    return table, apart, (*words, *told)
+    return choices[best], apart, tuple(words)

@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 
 from biodance.identification.identification import Identification
 from biodance.identification.information import Information
-from biodance.identification.placement import ODDS, goes_along, placed_as, studies_share, with_sides, with_studies
+from biodance.identification.placement import ODDS, goes_along, placed_as, with_sides
 from biodance.identification.posterior import prior_factor
 from biodance.records import Array, Sip
 from biodance.uncertainty.caution import in_other_frames
@@ -43,7 +43,8 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     NotSolved
         The reference contradicts every possible body, so its belief is none of a body.
     """
-    same = _open_as(session, reference)
+    along = goes_along(reference.belief.prior, reference.body)
+    same = placed_as(session.belief.prior, session.body, along=along)
     table = scaled_to_mass(same, float(reference.belief.prior.mass.sum()))
     shift = table.phi - reference.belief.prior.phi
     moved = Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
@@ -65,15 +66,9 @@ def _with_sides_as(session: Identification, *, apart: bool) -> Sip:
 
 def table_like(one: Identification, other: Identification) -> Sip:
     """Return the table of session ``one`` with the trunk's matter and the sides as in session ``other``."""
-    table = _open_as(one, other)
-    apart = one.apart and goes_along(one.belief.prior, one.body) == goes_along(table, one.body)
+    table = placed_as(one.belief.prior, one.body, along=goes_along(other.belief.prior, other.body))
+    apart = one.apart and table is one.belief.prior
     return table if apart == other.apart else with_sides(table, apart=other.apart)
-
-
-def _open_as(one: Identification, other: Identification) -> Sip:
-    """Return the table of session ``one`` with the trunk's matter placed and the studies weighed as in ``other``."""
-    placed = placed_as(one.belief.prior, one.body, along=goes_along(other.belief.prior, other.body))
-    return with_studies(placed, one.body, studies_share(other.belief.prior, other.body)) if one.body.studies else placed
 
 
 def scaled_to_mass(prior: Sip, mass: float) -> Sip:

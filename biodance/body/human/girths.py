@@ -62,13 +62,6 @@ def mean_fraction(kind: str, sex: Sex) -> tuple[float, float]:
     return float(np.mean(some)), float(np.std(some, ddof=1) / np.mean(some) / np.sqrt(len(some)))
 
 
-@functools.cache
-def studied_shares(sex: Sex) -> tuple[float, ...]:
-    """Return the share of every segment (12) of the body mass in the mean of the published fractions of one sex."""
-    mean = np.array([mean_fraction(kind_of(segment), sex)[0] for segment in SEGMENTS])
-    return tuple((mean / mean.sum()).tolist())
-
-
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
 
 

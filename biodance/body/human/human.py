@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.girths import studied_shares
 from biodance.body.human.limits import joint_limits
 from biodance.body.human.opinions import body_opinions, sole_corners, told_by, usual_outline
 from biodance.body.human.prior import child_widening, com_sd, is_child, prior
@@ -158,7 +157,6 @@ def assemble(
         gravity=np.array([0.0, 0.0, -gravity]),
         at_joint=along,
         girths=told,
-        studies=() if told or is_child(subject) or table not in measured_whole() else studied_shares(subject.sex),
     )
 
 
