@@ -44,6 +44,16 @@ def test_every_copy_gives_the_right_set(pairs: tuple, wrong: tuple) -> None:
     assert found == dict.fromkeys(wrong, right)
 
 
+def test_markers_flung_about_say_nothing_of_names() -> None:
+    static, walk = visit(speed=1.5)
+    walk = renamed(walk, HEAD)
+    flung = walk.markers.xyz.copy()
+    flung[::5] *= 30.0
+    for xyz, told in ((walk.markers.xyz, {"fit"}), (flung, set())):
+        trial = replace(walk, markers=Markers(walk.markers.names, walk.markers.time, xyz))
+        assert set(exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), (static, trial), Path())))) == told
+
+
 def bent(trial: Trial, degrees: float) -> Trial:
     """Return the trial with the left finger's marker turned about the wrist, to the back of the hand or (below zero)
     to the palm.

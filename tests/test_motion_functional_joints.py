@@ -43,6 +43,24 @@ def test_every_choice_of_the_joints_stands_exactly_under_the_static_markers() ->
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+def scattered(markers: Markers) -> Markers:
+    """Return the markers flung about by metres, as where a recording went wrong."""
+    flung = np.random.default_rng(3).normal(0.0, 2.0, markers.xyz.shape)
+    return replace(markers, xyz=markers.xyz + flung)
+
+
+def test_frames_that_show_no_person_place_no_joint() -> None:
+    true = displaced(hidden())
+    good = moving(true)
+    found = functional_joints(scaling(), [good, scattered(good)])
+    for joint in ("right_elbow", "trunk", "right_hip", "left_shoulder"):
+        error = np.linalg.norm(found.scaling.centres.place[joint] - true.centres.place[joint])
+        assert error < 0.01, (joint, error)
+    assert any("75 of 150 frames did not count" in note for note in found.scaling.notes)
+    with pytest.raises(TrialRefused, match="stay where the static trial puts them"):
+        functional_joints(scaling(), [scattered(good)])
+
+
 def test_hidden_joints_are_found_from_movement() -> None:
     theta = hidden()
     found = functional_joints(scaling(), [moving(displaced(theta))])

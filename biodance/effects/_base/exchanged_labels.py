@@ -19,6 +19,10 @@ _ASIDE = 0.02
 """m by which a left marker must lie to the right of its right partner, in the median over the trial."""
 _ENDS = (("FHD", "BHD"), ("ASI", "PSI"), ("TOE", "HEE"))
 """Stems of labels in front and behind of the same bone."""
+_SPAN = 3.5
+"""m between the outermost markers: more than a person's, arms and legs stretched."""
+_SPANNED = 0.05
+"""Share of frames with markers farther apart than `_SPAN` from which on a trial says nothing of names."""
 _MISFIT = 0.003
 """m: distances within a rigid group that differ so much (RMS) between static and trial are not those of one group."""
 _ARM = ("ELB", "FIN")
@@ -37,7 +41,7 @@ def exchanged_pairs(
     in which both arms hang.
     """
     markers = trial.markers
-    if markers is None:
+    if markers is None or not _on_a_person(markers):
         return frozenset()
     alone = {*crossed_sides(markers), *crossed_ends(markers)}
     if arms_hang(trial):
@@ -58,6 +62,13 @@ def exchanged_pairs(
         relative = frozenset(swaps)
         alone = (alone - here) | (relative ^ {pair for pair in known if set(pair) <= set(group)})
     return frozenset(alone)
+
+
+def _on_a_person(markers: Markers) -> bool:
+    """Return whether the markers lie no farther apart than those on a person, but for a few frames."""
+    xyz = markers.xyz[np.isfinite(markers.xyz).any(axis=(1, 2))]
+    span = np.nanmax(xyz, axis=1, initial=-np.inf) - np.nanmin(xyz, axis=1, initial=np.inf)
+    return bool(np.mean(span.max(axis=1, initial=0.0) > _SPAN) <= _SPANNED) if len(xyz) else False
 
 
 def arms_hang(trial: Trial) -> bool:

@@ -16,6 +16,7 @@ from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
+from biodance.errors import TrialRefused
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
     elsewhere,
@@ -38,7 +39,7 @@ from biodance.motion.ik.joint_unknowns import (
     own_unknowns,
 )
 from biodance.motion.ik.knee_markers import knees_elsewhere
-from biodance.motion.kinematics import chains
+from biodance.motion.kinematics import chains, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
 
@@ -53,6 +54,10 @@ deviations, which are then those of 12 virtual dances.
 """
 _FAULTS = 3
 """Joints that lie elsewhere and markers that have moved, at most, in one session."""
+_NO_POSTURE = 0.1
+"""m, RMS marker distance from which on a frame shows no posture of this body; in ten real sessions a frame stays below
+0.06, with exchanged head markers below 0.05.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +92,13 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
+    shows = _marker_distance(scaling, postures, fresh) < _NO_POSTURE
+    if not shows.any():
+        raise TrialRefused(_NOBODY)
+    if not shows.all():
+        postures = replace(postures, time=postures.time[shows], xyz=postures.xyz[shows])
+        scaling = replace(scaling, notes=(*scaling.notes, _not_shown(shows)))
+        fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q[shows], noise=skin)
     alike = max(1.0, postures.time.size * _ALIKE / seconds)
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
@@ -108,6 +120,28 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
         again = evaluate_joints(scaling, postures, found.theta, found.q, noise=noise)
         found = fit_joints(scaling, postures, again, shown, noise=noise)
     return _told(scaling, start, found, shown, spared)
+
+
+def _marker_distance(scaling: Scaling, postures: Markers, found: CalibrationState) -> Array:
+    """Return the RMS distance (T,) m of the markers of every posture from the body that follows them best."""
+    body = scaling.body()[0]
+    place = poses(body, found.q).points(list(body.markers.segment), body.markers.position)
+    return np.asarray(np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)))
+
+
+_NOBODY = (
+    f"In every frame of the moving trials the markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS), so "
+    "the joints stay where the static trial puts them. Are the labels right, and is it the same person?"
+)
+
+
+def _not_shown(shows: NDArray[np.bool_]) -> str:
+    """Return what is said of the frames that show no posture of the body."""
+    return (
+        f"Warning: {np.count_nonzero(~shows)} of {shows.size} frames did not count in placing the joints: there the "
+        f"markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS). Look at the trials with the largest "
+        "marker distance: labels, gaps, jumps."
+    )
 
 
 def _without(postures: Markers, name: str) -> Markers:
