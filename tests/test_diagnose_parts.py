@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
 from biodance.diagnosis.diagnosis import Alias, Finding
-from biodance.diagnosis.engine import _with_weaker
+from biodance.diagnosis.engine import _with_less_evidence
 from biodance.diagnosis.evidence import evidence, linear_posterior, smallest_detectable
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
@@ -120,8 +120,8 @@ def test_a_cause_of_less_evidence_than_a_doubted_one_is_doubted_too(gain: float,
         (None, Finding(name, "", (), (Alias(name, "", bayes),), 0.5))
         for name, bayes in (("shoulder_girdle", 117.1), ("plate_gain", gain))
     ]
-    assert [finding.effect for _, finding in _with_weaker(pairs[:1], pairs)] == doubted
-    assert _with_weaker([], pairs) == []
+    assert [finding.effect for _, finding in _with_less_evidence(pairs[:1], pairs)] == doubted
+    assert _with_less_evidence([], pairs) == []
 
 
 def test_no_limit_lies_below_what_changes_the_wrench(put) -> None:

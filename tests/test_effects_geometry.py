@@ -143,7 +143,7 @@ def test_joint_at_its_limit_does_not_answer() -> None:
     """
     names = [j.name for j in CASE.body.joints]
     knee = names.index("right_knee_flexion")
-    answer = CASE.body_geometry().answer
+    answer = CASE.body_geometry().sensitivity
     straight = np.array(answer.angles)
     straight[:, knee] = CASE.body.limits.lower[knee]
     coordinate = CASE.body.n_root + knee
