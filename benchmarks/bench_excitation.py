@@ -25,7 +25,7 @@ from kept_files import kept
 from virtual_visits import subjects
 
 from biodance.dance.dance import Dance
-from biodance.dance.design import _SHORT, design
+from biodance.dance.design import design
 from biodance.dance.metrics import criterion_of
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import KEPT, distance_from, initial_guess, intermediate_posture, solve
@@ -117,7 +117,7 @@ def random_dance(like: Dance, plan: Plan, subject: Subject = SHOWN_TO) -> Dance:
     for k in np.flatnonzero(np.isnan(x[:, 0])):
         near = x[[max(k - 1, 0)]] if k and not np.isnan(x[k - 1, 0]) else x[:1]
         x[k] = intermediate_posture(chain, stances[k], near, plan.limits, seed=[3, int(k)]).x
-    hold = np.array([plan.hold if s.over is None else min(_SHORT, plan.hold) for s in stances])
+    hold = np.array([plan.hold_on(s) for s in stances])
     move = np.full(len(x) - 1, (like.duration - hold.sum()) / (len(x) - 1))
     feet = tuple(under(a, b) for a, b in pairwise(stances))
     return Dance("random", body, x, stances, hold, x[:-1, None] + THIRDS * np.diff(x, axis=0)[:, None], move, feet, 7)
