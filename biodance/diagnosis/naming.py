@@ -162,11 +162,11 @@ def is_significant(found: Model, one: NamedCause) -> bool:
 
 def is_possible(found: Model, one: NamedCause) -> bool:
     """Return whether a cause can be what its name says in this session: in the person and laboratory, and by the
-    parameter that tells it from a simpler cause (`Effect.told_by`), which is `SURE` standard deviations and matters.
+    parameter that tells it from a simpler cause (`Effect.distinguished_by`), which is `SURE` standard deviations and matters.
     """
-    told = [p.name == one.effect.told_by for p in one.effect.parameters]
+    told = [p.name == one.effect.distinguished_by for p in one.effect.parameters]
     sd, own = np.sqrt(np.diag(one.covariance)[told]), np.abs(one.theta[told])
-    itself = np.all(own >= np.maximum(SURE * sd, least(one.effect).get(one.effect.told_by, 0.0)))
+    itself = np.all(own >= np.maximum(SURE * sd, least(one.effect).get(one.effect.distinguished_by, 0.0)))
     return bool(itself and one.effect.possible_in(found.problem.cases[0], one.theta))
 
 
