@@ -13,7 +13,7 @@ from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residual
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.evidence import evidence
 from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import build_model, is_possible
+from biodance.diagnosis.naming import build_model, can_be_named
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.screening import screen
 from biodance.diagnosis.transient_contact import with_transient_contact
@@ -148,7 +148,7 @@ def test_a_load_in_which_nothing_sloshes_is_no_sloshing_load(sloshing: float, sd
     some, _ = build_model(problem(body(), looks(1, trials=1)), known(), ("sloshing_load",))
     carried = replace(effect("sloshing_load"), target="trunk_head")
     one = NamedCause(carried, np.array([5.0, sloshing, -0.2, -0.05]), np.diag([0.1, sd, 0.01, 0.01]) ** 2)
-    assert is_possible(some, one) is itself
+    assert can_be_named(some, one) is itself
 
 
 def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:

@@ -157,16 +157,17 @@ def is_significant(found: Model, one: NamedCause) -> bool:
     alike = found.tolerances.size(key_of(*cause_key(one))) * one.effect.typical / one.effect.typical[0]
     sd = np.maximum(np.sqrt(np.diag(one.covariance)), alike)
     sure = bool(np.sum((one.theta / sd) ** 2) >= chdtri(sd.size, 2 * ndtr(-SURE)))
-    return sure and is_possible(found, one)
+    return sure and can_be_named(found, one)
 
 
-def is_possible(found: Model, one: NamedCause) -> bool:
+def can_be_named(found: Model, one: NamedCause) -> bool:
     """Return whether a cause can be what its name says in this session: in the person and laboratory, and by the
-    parameter that tells it from a simpler cause (`Effect.told_by`), which is `SURE` standard deviations and matters.
+    parameter that tells it from a simpler cause (`Effect.distinguished_by`), which is `SURE` standard deviations and
+    matters.
     """
-    told = [p.name == one.effect.told_by for p in one.effect.parameters]
+    told = [p.name == one.effect.distinguished_by for p in one.effect.parameters]
     sd, own = np.sqrt(np.diag(one.covariance)[told]), np.abs(one.theta[told])
-    itself = np.all(own >= np.maximum(SURE * sd, least(one.effect).get(one.effect.told_by, 0.0)))
+    itself = np.all(own >= np.maximum(SURE * sd, least(one.effect).get(one.effect.distinguished_by, 0.0)))
     return bool(itself and one.effect.possible_in(found.problem.cases[0], one.theta))
 
 
@@ -244,7 +245,7 @@ def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model
     with it named.
     """
     settled = settle(found, (*found.named, NamedCause(one.effect, one.start, np.empty((0, 0)))))
-    possible = is_possible(found, settled.named[-1])
+    possible = can_be_named(found, settled.named[-1])
     bayes = log_bayes_factor_between(settled, found) if possible else -np.inf
     return replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled
 

@@ -28,7 +28,7 @@ SIZES = (2.0, 8.0, 30.0)
 """Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
 OTHER_SIDE = 0.2
 """Share of its squares that a touch may lie on the other side."""
-QUICK, _END = 0.2, 2
+_QUICK, _END = 0.2, 2
 """Share of its squares that the steps between values 0.4 s apart hold at least in a touch, and values at the ends of a
 trial that are not asked. A touch of d seconds has 0.8 s / d where it takes hold at once, half of that where it takes
 0.8 s; what creeps back with a time constant T has (0.4 s / T)². Seen: touches of 1.6 s 0.57 to 0.69, creep 0.04 to
@@ -152,7 +152,7 @@ def quick(courses: Sequence[Array]) -> bool:
     swells or creeps back does not.
     """
     steps = sum(float(np.sum(np.diff(course, axis=0) ** 2)) for course in courses)
-    return steps >= QUICK * sum(float(np.sum(course**2)) for course in courses)
+    return steps >= _QUICK * sum(float(np.sum(course**2)) for course in courses)
 
 
 def one_sided(course: Array) -> bool:

@@ -44,7 +44,7 @@ class SloshingLoad(Effect):
         ),
         Parameter("high", "m", 0.1, "a bag hangs between loins and shoulders"),
     )
-    told_by = "sloshing"
+    distinguished_by = "sloshing"
     separated_by = "A sudden stop and five seconds of standing still: the load goes on swinging, the person does not."
     advice = "Take the load off, or empty it, and repeat one trial."
 

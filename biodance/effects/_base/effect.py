@@ -59,7 +59,7 @@ class Effect:
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
     """
-    told_by: ClassVar[str] = ""
+    distinguished_by: ClassVar[str] = ""
     """The parameter without which it is another, simpler cause (a load in which nothing sloshes); "" for none."""
     advice: ClassVar[str] = ""
     """What to do in the laboratory to settle it, and how it is mended."""
