@@ -21,7 +21,7 @@ from biodance.records.arrays import rate_of
 VERSION = "1.10.0"
 COMPONENTS = ("x", "y", "z")
 _LABEL = re.compile(r"[^0-9A-Za-z]")
-LAB_FRAME = {
+_LAB_FRAME = {
     "lab": {"Description": "x and y horizontal, z up, right-handed", "RotationRule": "right-hand"},
     "joint": {"Description": "axes of the ISB, anatomical signs", "RotationRule": "right-hand"},
 }
@@ -82,7 +82,7 @@ def write_motion(folder: Path, stem: str, channels: BidsChannels, *, task: str, 
     titles = ("name", "component", "type", "tracked_point", "units", "reference_frame")
     table = "\n".join("\t".join(row) for row in (titles, *channels.rows))
     write_new(folder / f"{stem}_channels.tsv", (table + "\n").encode())
-    _json(folder / f"{stem}_channels.json", {"reference_frame": {"Levels": LAB_FRAME}})
+    _json(folder / f"{stem}_channels.json", {"reference_frame": {"Levels": _LAB_FRAME}})
     types = [row[2] for row in channels.rows]
     counts = {f"{kind}ChannelCount": types.count(kind) for kind in dict.fromkeys(types)}
     rate, frames = rate_of(channels.time), channels.time.size

@@ -26,7 +26,7 @@ _KEYS = (
     "file status reason format frames rate_hz analog_rate_hz markers marker_set marker_map gaps_percent subjects "
     "plates mean_vertical_n mass_on_plates_kg declared_mass_kg declared_height_m history warnings"
 )
-SHORTEST_STEP = 0.05
+_SHORTEST_STEP = 0.05
 """Seconds under load from which on a plate has a centre of pressure; less is noise."""
 
 
@@ -165,7 +165,7 @@ def _plate(plate: Plate) -> dict[str, Any]:
     force = np.nanmean(plate.wrench.force, axis=0) if plate.wrench.time.size else np.full(3, math.nan)
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     loaded = cop[np.isfinite(cop).all(axis=1)]
-    stepped_on = loaded.size > 0 and len(loaded) >= SHORTEST_STEP * plate.wrench.rate
+    stepped_on = loaded.size > 0 and len(loaded) >= _SHORTEST_STEP * plate.wrench.rate
     return {
         "name": plate.name,
         "type": plate.type,

@@ -12,7 +12,7 @@ from biodance.library import refuse_special
 
 _LARGEST = 2**31
 """Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
-TEXT_LOOKS_BINARY = b"\x00"
+_TEXT_LOOKS_BINARY = b"\x00"
 
 
 def read_bytes(path: Path) -> bytes:
@@ -83,7 +83,7 @@ def decode(content: bytes, path: Path) -> str:
     """
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         text = content.decode("utf-16", errors="replace")
-    elif TEXT_LOOKS_BINARY in content[:4096]:
+    elif _TEXT_LOOKS_BINARY in content[:4096]:
         raise FileRefused(
             f"{path}: holds binary data where text is expected. Check what the file is; its extension does not fit."
         )

@@ -17,7 +17,7 @@ from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.records import Array, Markers, Plate, Trial, Wrench
 from biodance.settings import GapSettings
 
-PREPARED = "Prepared for the model."
+_PREPARED = "Prepared for the model."
 
 
 def prepare(trial: Trial) -> Trial:
@@ -33,10 +33,10 @@ def prepare(trial: Trial) -> Trial:
     TrialRefused
         The cut-off is not below half the marker or analog rate, or markers and plates share no time.
     """
-    if PREPARED in trial.history:
+    if _PREPARED in trial.history:
         return trial
     low_pass = force_filter(trial.settings)
-    history, warnings = [PREPARED], []
+    history, warnings = [_PREPARED], []
     markers = trial.markers
     try:
         if markers is not None:

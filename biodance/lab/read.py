@@ -74,7 +74,7 @@ def without_frozen(trial: Trial) -> Trial:
     return replace(trial, markers=replace(markers, xyz=xyz), warnings=(*trial.warnings, warning))
 
 
-SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
+_SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
 _HEAD = 8192
 """Bytes of a file that are looked at to find its reader."""
 
@@ -96,9 +96,9 @@ def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
         return found
     extension, legal = path.suffix.lower(), extensions(chosen)
     data = _subject_data(head)
-    if data or extension in SUBJECT_DATA:
+    if data or extension in _SUBJECT_DATA:
         raise FileRefused(
-            f"{path}: holds {SUBJECT_DATA[data or extension]}, not a recording. Give the folder, then it is read with "
+            f"{path}: holds {_SUBJECT_DATA[data or extension]}, not a recording. Give the folder, then it is read with "
             f"the trials."
         )
     if extension in legal:

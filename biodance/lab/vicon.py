@@ -15,10 +15,10 @@ from xml.etree import ElementTree
 from biodance.errors import FileRefused
 from biodance.lab.plain_text import decode, parse_number, read_bytes, read_text
 
-MILLIMETRE = 1e-3
+_MILLIMETRE = 1e-3
 _MASSES = ("bodymass",)
 ANGLES = re.compile(r"torsion|rotation|plantflex|rotoff|abadd|headoffset|^theta$|^beta$|angle", flags=re.IGNORECASE)
-NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
+_NOT_MEASURES = re.compile(r"usefloorff|hindfootflat|^(?:subject)?(?:name|id)$", flags=re.IGNORECASE)
 _SIDE = re.compile(r"^(Left|Right)(?=[A-Z])")
 
 
@@ -131,7 +131,7 @@ def _in_si(values: dict[str, float]) -> dict[str, float]:
     measures: dict[str, float] = {}
     for name, value in values.items():
         short = _SIDE.sub(lambda side: side[1][0], name)
-        if value == 0 or ANGLES.search(short) or NOT_MEASURES.search(short):
+        if value == 0 or ANGLES.search(short) or _NOT_MEASURES.search(short):
             continue
-        measures[short] = value if short.lower() in _MASSES else value * MILLIMETRE
+        measures[short] = value if short.lower() in _MASSES else value * _MILLIMETRE
     return measures

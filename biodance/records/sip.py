@@ -12,7 +12,7 @@ from biodance.records.arrays import Array, assign, freeze
 if TYPE_CHECKING:
     import pandas as pd
 
-INERTIAL = (
+_INERTIAL = (
     "mass (kg)",
     "com x (m)",
     "com y (m)",
@@ -121,6 +121,6 @@ class Sip:
         import pandas as pd
 
         values = np.concatenate([self.mass[:, None], self.com, self.phi.reshape(-1, 10)[:, 4:]], axis=1)
-        out = pd.DataFrame(values, index=pd.Index(self.segments, name="segment"), columns=list(INERTIAL))
+        out = pd.DataFrame(values, index=pd.Index(self.segments, name="segment"), columns=list(_INERTIAL))
         out.insert(1, "mass sd (kg)", np.sqrt(np.maximum(np.diag(self.covariance)[::10], 0.0)))
         return out

@@ -56,6 +56,10 @@ class FramePose:
         turned = np.concatenate([value[..., :3] @ self.turn.T, value[..., 3:] @ self.turn.T], axis=-1)
         return wrench_about_origin(turned, self.shift)
 
+    def in_room(self, plate: Plate, time: Array, value: Array) -> Plate:
+        """Return a plate of the file in the room, with what it recorded, ``value`` (T, 6) about the file's origin."""
+        return replace(plate, corners=self.points(plate.corners), wrench=Wrench(time, self.wrench(value)))
+
     def changed(self, change: Array, about: Array) -> "FramePose":
         """Return the pose after a ``change`` (4,): x, y m, yaw rad about the vertical through ``about`` (3,) m, delay
         s.
@@ -135,11 +139,8 @@ def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose
     if known.size < 2:
         raise TrialRefused(f"Trial {trial.name}: under this delay ({pose.delay:.2f} s) the two files share no time.")
     kept = slice(known[0], known[-1] + 1)
-    values = pose.wrench(forces.during(own[kept]))
-    plates = tuple(
-        replace(plate, corners=pose.points(plate.corners), wrench=Wrench(motion.time[kept], value))
-        for plate, value in zip(forces.plates, values, strict=True)
-    )
+    recorded = zip(forces.plates, forces.during(own[kept]), strict=True)
+    plates = tuple(pose.in_room(plate, motion.time[kept], value) for plate, value in recorded)
     by_frame = ("time", "q", "v", "a", "residual", "determined")
     cut = replace(motion, **{name: getattr(motion, name)[kept] for name in by_frame})
     markers = trial.markers
@@ -149,11 +150,4 @@ def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose
 
 def registered_plates(plates: tuple[Plate, ...], pose: FramePose) -> tuple[Plate, ...]:
     """Return plates as recorded (not filtered) in the room, on the markers' clock."""
-    return tuple(
-        replace(
-            plate,
-            corners=pose.points(plate.corners),
-            wrench=Wrench(plate.wrench.time - pose.delay, pose.wrench(plate.wrench.value)),
-        )
-        for plate in plates
-    )
+    return tuple(pose.in_room(plate, plate.wrench.time - pose.delay, plate.wrench.value) for plate in plates)

@@ -35,9 +35,9 @@ INSTRUMENT = _layout(
     "sensitivity f4 32, numbers i4 32, turn f4 16, distance f4 3, gain f4 32, excitation f4 32, counts_per_volt f4 32, "
     "timing f4 5, zero i4 32, rate i4, trigger f4, end f4"
 )
-SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
+_SAMPLE = {100: np.dtype("<i2"), 105: np.dtype("<f8")}
 IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)
-MICROVOLT = 1e6
+_MICROVOLT = 1e6
 MOST_PLATES, MOST_CHANNELS, FASTEST = 16, 32, 100_000
 
 
@@ -82,7 +82,7 @@ def parse_bsf(content: bytes, path: Path) -> BsfContent:
     headers, end = _instruments(content, main, path)
     channels = [int(h["channels"]) for h in headers]
     samples = round(float(main["seconds"]) * rate)
-    data = _data(content, samples, sum(channels), SAMPLE[version], end, len(headers), path)
+    data = _data(content, samples, sum(channels), _SAMPLE[version], end, len(headers), path)
     first = np.concatenate([[0], np.cumsum(channels)])
     plates = []
     for i, header in enumerate(headers[: int(main["plates"])]):
@@ -105,7 +105,7 @@ def _main_header(content: bytes, path: Path) -> Any:
             f"off: copy it again."
         )
     main = np.frombuffer(content, MAIN, 1)[0]
-    if int(main["version"]) not in SAMPLE:
+    if int(main["version"]) not in _SAMPLE:
         raise FileRefused(
             f"{path}: is no .bsf file of version 100 or 105 (it says {int(main['version'])}). Check what the file is."
         )
@@ -176,7 +176,7 @@ def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
             f"{path}: plate {number} holds ADC counts but a calibration value is 0. Enter the calibration in NetForce "
             f"and save again."
         )
-    return MICROVOLT / product
+    return _MICROVOLT / product
 
 
 def _plate(header: Any, load: Array) -> BsfPlate:

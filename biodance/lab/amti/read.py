@@ -17,9 +17,9 @@ from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import wrench_about_point
 
-PLATE_UPRIGHT = np.diag([1.0, -1.0, -1.0])
+_PLATE_UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """lab_R_plate (3, 3): AMTI's plate axes have z down; x stays, y and z are turned, so that the lab's z points up."""
-OWN_ZERO = 5.0  # N: an unloaded reading up to here is what the maker's own zero leaves and is kept
+_OWN_ZERO = 5.0  # N: an unloaded reading up to here is what the maker's own zero leaves and is kept
 
 
 def amti_plate(
@@ -39,11 +39,11 @@ def amti_plate(
     plate axes; ``rate`` Hz.
     """
     channels, zeroed = _zeroed(channels, rate)
-    below, placed = sensor_below(vector, PLATE_UPRIGHT)
+    below, placed = sensor_below(vector, _PLATE_UPRIGHT)
     wrench = wrench_about_point(channels, below)
-    sign = 1 if gravity_sign(wrench, PLATE_UPRIGHT, rate) > 0 else -1
+    sign = 1 if gravity_sign(wrench, _PLATE_UPRIGHT, rate) > 0 else -1
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array(size) / 2
-    corners = np.column_stack([half, np.zeros(4)]) @ PLATE_UPRIGHT.T + centre
+    corners = np.column_stack([half, np.zeros(4)]) @ _PLATE_UPRIGHT.T + centre
     directions = (
         "Lab frame = plate frame turned about x: x stays, y and z (down) are reversed, so that z points up; origin at "
         "the first surface.",
@@ -51,7 +51,7 @@ def amti_plate(
         if sign < 0
         else "Sign: the weight shows that the file holds the reaction, not the load on the plate; it was kept.",
     )
-    recorded = Wrench(np.arange(len(channels)) / rate, wrench_in_lab(wrench, PLATE_UPRIGHT, sign, centre))
+    recorded = Wrench(np.arange(len(channels)) / rate, wrench_in_lab(wrench, _PLATE_UPRIGHT, sign, centre))
     plate = Plate(f"plate{number}", 0, corners, recorded, (*said, zeroed, placed, *directions))
     return plate, (f"Plate {number}: {directions[1]}",) if sign > 0 else ()
 
@@ -63,7 +63,7 @@ def _zeroed(channels: Array, rate: float) -> tuple[Array, str]:
         return channels, "Zero: the maker's own was kept; the plate is never seen unloaded."
     empty = channels[zero.start : zero.stop].mean(axis=0)
     where = f"unloaded (samples {zero.start + 1}-{zero.stop}) the plate reads {empty[2]:.2g} N vertical"
-    if abs(empty[2]) <= OWN_ZERO:
+    if abs(empty[2]) <= _OWN_ZERO:
         return channels, f"Zero: the maker's own was kept; {where}."
     return channels - empty, f"Zero: {where}; that mean was subtracted from every channel."
 
@@ -90,7 +90,7 @@ def read_bsf(path: str | Path, *, role: Role = "fit") -> Trial:
     for number, plate in enumerate(bsf.plates, start=1):
         _refuse_nonsense(plate, number, path)
         if number > 1:
-            centre = centre + PLATE_UPRIGHT @ plate.distance
+            centre = centre + _PLATE_UPRIGHT @ plate.distance
             warnings.append(_placed(plate, number))
         place, said = (plate.size, centre, plate.offset), (_unit_said(bsf, plate),)
         done, odd = amti_plate(number, plate.load, *place, rate=bsf.rate, said=said)
@@ -145,7 +145,7 @@ def _placed(plate: BsfPlate, number: int) -> str:
             f"Plate {number}: the file says no distance to the plate before it, so both lie at one place. Enter "
             f"it in NetForce."
         )
-    away: Array = PLATE_UPRIGHT @ plate.distance
+    away: Array = _PLATE_UPRIGHT @ plate.distance
     return (
         f"Plate {number} was put ({', '.join(f'{d:.3g}' for d in away)}) m from the plate before it, as the file "
         f"says. Check that."

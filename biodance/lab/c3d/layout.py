@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from biodance.errors import FileRefused
 from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
 
-CLIPPED = 65535
+_CLIPPED = 65535
 """What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group
 or LONG_FRAMES.
 """
@@ -125,12 +125,12 @@ def _unsigned(value: float) -> float:
 
 def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
     """Return all frame counts that the file declares: header, TRIAL fields, POINT:FRAMES, POINT:LONG_FRAMES."""
-    declared = [float(header.last_frame - header.first_frame + 1) if header.last_frame < CLIPPED else math.nan]
+    declared = [float(header.last_frame - header.first_frame + 1) if header.last_frame < _CLIPPED else math.nan]
     first, last = (_field(parameters, name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
     declared.append(last - first + 1)
     declared += [_unsigned(scalar(parameters, "POINT", name)) for name in ("FRAMES", "LONG_FRAMES")]
     counts = [count for count in _distinct(declared) if count > 0]
-    return [count for count in counts if count != CLIPPED] or counts
+    return [count for count in counts if count != _CLIPPED] or counts
 
 
 def _field(parameters: Parameters, name: str) -> float:
@@ -263,7 +263,7 @@ def _listed(channels: list[str]) -> str:
 def _first_frame(header: Header, parameters: Parameters, frames: int, notes: list[str]) -> int:
     """Return the number of the first frame."""
     first = _field(parameters, "ACTUAL_START_FIELD")
-    spans = header.last_frame - header.first_frame + 1 == frames or header.last_frame == CLIPPED
+    spans = header.last_frame - header.first_frame + 1 == frames or header.last_frame == _CLIPPED
     if int(first) == header.first_frame if math.isfinite(first) else spans:
         return header.first_frame
     if not math.isfinite(first):

@@ -18,11 +18,11 @@ from biodance.errors import FileRefused
 
 C3D_BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
-PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
+_PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
 _SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
-RESAVE_IT = "export the trial again from the recording software."
+_RESAVE_IT = "export the trial again from the recording software."
 RESAVE = "Export the trial again from the recording software, or copy the file again from its source."
 
 ParameterValue = NDArray[Any] | list[str]
@@ -91,7 +91,7 @@ def read_header(content: bytes, where: str) -> Header:
             f"{where}: the header puts the parameter section into block {content[0]}, outside the file. {RESAVE}"
         )
     processor = content[start + 3]
-    if processor not in PROCESSORS:
+    if processor not in _PROCESSORS:
         raise FileRefused(
             f"{where}: processor type {processor} is unknown (84 Intel, 85 DEC and 86 SGI/MIPS are legal). {RESAVE}"
         )
@@ -105,7 +105,7 @@ def read_header(content: bytes, where: str) -> Header:
         )
     if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
         raise FileRefused(
-            f"{where}: read as {PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of "
+            f"{where}: read as {_PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of "
             f"{rate:g} Hz, which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
         )
     return Header(processor, words[1], words[2], words[3], words[4], scale, words[9], rate, start, data_start)
@@ -139,7 +139,7 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
         if name in known and not _same(known[name], value):
             raise FileRefused(
                 f"{where}: parameter {names.get(group, group)}:{name} is there twice, as {_short(known[name])} and as "
-                f"{_short(value)}. Delete the wrong one, for example in Mokka or with ezc3d, or {RESAVE_IT}"
+                f"{_short(value)}. Delete the wrong one, for example in Mokka or with ezc3d, or {_RESAVE_IT}"
             )
         known[name] = value
     return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})

@@ -32,7 +32,7 @@ _SPELLINGS = {
     **{unit: unit for unit in _METRES},
     **dict.fromkeys(("inch", "inches"), "in"),
 }
-GUESSES = ("mm", "cm", "m")
+_GUESSES = ("mm", "cm", "m")
 PERSON = 1.5
 """m, the largest extent of the markers on a person: about 0.9 m for legs alone, up to 2.3 m with arms spread or
 raised.
@@ -42,7 +42,7 @@ PLATE = 0.6
 """m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets."""
 
 _CORNERS = ("FORCE_PLATFORM", "CORNERS")
-BELIEVABLE = (0.05, 4.75)
+_BELIEVABLE = (0.05, 4.75)
 """Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is
 overruled.
 """
@@ -64,7 +64,7 @@ def metres_per_unit(
     written = next(iter(texts(parameters, "POINT", "UNITS")), "")
     unit = _SPELLINGS.get(written.strip(" .").casefold(), "")
     size, expected, what = _size(parameters, points)
-    if unit and (math.isnan(size) or BELIEVABLE[0] <= size * _METRES[unit] <= BELIEVABLE[1]):
+    if unit and (math.isnan(size) or _BELIEVABLE[0] <= size * _METRES[unit] <= _BELIEVABLE[1]):
         return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
     if math.isnan(size) and not np.isfinite(points).any() and not parameter_numbers(parameters, *_CORNERS).size:
         return _METRES["mm"], ("The file holds no lengths, so its unit of length does not matter.",), ()
@@ -73,7 +73,7 @@ def metres_per_unit(
             f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
             "m). Write the unit into the file and read it again."
         )
-    guess = min(GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
+    guess = min(_GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
     said = f"POINT:UNITS is {written!r}; {what} of {size:.4g} can only be in {guess}, so lengths are in {guess}."
     return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
 
@@ -108,9 +108,9 @@ def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
 GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
 """Parameters of POINT in which the results are listed; POINT:TYPE_GROUPS may name more."""
 
-RESULT = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF|Cent(re|er)OfMass(Floor)?)$")
-BONE = re.compile(r"(?P<bone>.{3,})[OALP]$")
-UNLABELLED = re.compile(r"^(\*\d*|[Uu]\d+|[Uu]nlabell?ed.*|[Uu]ncertain.*)?$")
+_RESULT = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF|Cent(re|er)OfMass(Floor)?)$")
+_BONE = re.compile(r"(?P<bone>.{3,})[OALP]$")
+_UNLABELLED = re.compile(r"^(\*\d*|[Uu]\d+|[Uu]nlabell?ed.*|[Uu]ncertain.*)?$")
 
 
 def split_label(label: str) -> tuple[str, str]:
@@ -129,21 +129,21 @@ def model_outputs(labels: Sequence[str], parameters: Parameters) -> tuple[int, .
     declared = {group.upper() for group in texts(parameters, "POINT", "TYPE_GROUPS")[::2]} - {"MARKERS", "LABELS"}
     listed = {label for group in declared | set(GROUPS) for label in texts(parameters, "POINT", group)}
     listed |= {split_label(label)[1] for label in listed}
-    bones = Counter(match["bone"] for label in set(labels) if (match := BONE.match(label)))
+    bones = Counter(match["bone"] for label in set(labels) if (match := _BONE.match(label)))
     found = []
     for column, label in enumerate(labels):
-        name, bone = split_label(label)[1], BONE.match(label)
-        if {label, name} & listed or RESULT.search(name) or (bone and bones[bone["bone"]] == 4):
+        name, bone = split_label(label)[1], _BONE.match(label)
+        if {label, name} & listed or _RESULT.search(name) or (bone and bones[bone["bone"]] == 4):
             found.append(column)
     return tuple(found)
 
 
 def unlabelled(labels: Sequence[str]) -> tuple[int, ...]:
     """Return the columns without a name, or with the name that software gives to unlabelled trajectories (``*115``)."""
-    return tuple(column for column, label in enumerate(labels) if UNLABELLED.match(split_label(label)[1]))
+    return tuple(column for column, label in enumerate(labels) if _UNLABELLED.match(split_label(label)[1]))
 
 
-LEAP = 1.0
+_LEAP = 1.0
 """m along one axis; no marker on a person moves further between two frames, at any rate in use."""
 
 
@@ -246,7 +246,7 @@ def _smells(
     if not leaps and not layout.notes:
         return (), "biodance"
     opinion = second_opinion(path, numbers, layout)
-    jump = f"Markers jump by more than {LEAP:g} m between two frames in {leaps} places"
+    jump = f"Markers jump by more than {_LEAP:g} m between two frames in {leaps} places"
     smell = jump if leaps else "Header and parameters disagree"
     if opinion == "refuted":
         raise FileRefused(
@@ -268,7 +268,7 @@ def _leaps(points: Array, markers: list[int], parameters: Parameters) -> int:
     found = 0
     for start in range(0, len(points), _FRAMES):
         step = np.abs(np.diff(points[start : start + _FRAMES + 1, markers], axis=0))
-        found += int(np.count_nonzero(any_coordinate(step > LEAP * metre)))
+        found += int(np.count_nonzero(any_coordinate(step > _LEAP * metre)))
     return found
 
 

@@ -56,7 +56,7 @@ _NEAR = 0.1
 Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
 _UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"}
 """Unit of a kind of results where the parameter of POINT (`_unit_name`) declares none."""
-PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0, "W": 1.0}
+_PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0, "W": 1.0}
 """How many of a file's unit one SI unit is."""
 
 
@@ -164,7 +164,7 @@ def _unit(raw: RawC3d, output: Output) -> str:
     own = _UNITS[output.kind]
     declared = next(iter(texts(raw.parameters, "POINT", _unit_name(output.kind))), own)
     declared = declared.replace(".", "").replace(" ", "")
-    return declared if declared in PER_SI else own
+    return declared if declared in _PER_SI else own
 
 
 def _unit_name(kind: str) -> str:
@@ -175,7 +175,7 @@ def _unit_name(kind: str) -> str:
 def _in_file(output: Output, unit: str, metres: float, turn: Array) -> Array:
     """Return the values (T, 3) in the file's axes and unit."""
     value = output.value @ turn if output.turns else output.value
-    return np.asarray(value / metres if output.kind == "MODELED_MARKERS" else value * PER_SI[unit])
+    return np.asarray(value / metres if output.kind == "MODELED_MARKERS" else value * _PER_SI[unit])
 
 
 def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:

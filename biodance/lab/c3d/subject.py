@@ -199,12 +199,12 @@ _OF_A_SIDE = (
     "FemurLength TibiaLength FootLength SoleDelta"
 )
 LENGTHS = (*_WHOLE.split(), *(side + name for side in "LR" for name in _OF_A_SIDE.split()))
-OTHER_NAMES = {"WEIGHT": "BODYMASS", "MASS": "BODYMASS", "STATURE": "HEIGHT", "SEX": "GENDER"}
-PLAIN = ("Bodymass", "age", "gender")
+_OTHER_NAMES = {"WEIGHT": "BODYMASS", "MASS": "BODYMASS", "STATURE": "HEIGHT", "SEX": "GENDER"}
+_PLAIN = ("Bodymass", "age", "gender")
 _LEGAL = {"Bodymass": (2.0, 400.0), "age": (0.0, 120.0), "gender": (0.0, 1.0)}
 STATURE, _LEG = (0.4, 2.6), (0.2, 1.4)
 _SCALES = (1e-3, 1.0, 1e-2)
-_NAMES = {"".join(name.upper()): name for name in (*LENGTHS, *PLAIN)}
+_NAMES = {"".join(name.upper()): name for name in (*LENGTHS, *_PLAIN)}
 
 
 def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
@@ -221,14 +221,14 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     measures: dict[str, float] = {}
     for name, value in written.items():
         low, high = _LEGAL.get(name, (-0.1, STATURE[1]))
-        value = value if name in PLAIN else value * scale
+        value = value if name in _PLAIN else value * scale
         if name == "Height":
             low, high = STATURE
         if low <= value <= high:
             measures[name] = value
         else:
             warnings.append(f"The file says {name} = {written[name]:g}, which a person cannot have; it was left out.")
-    lengths = [name for name in measures if name not in PLAIN]
+    lengths = [name for name in measures if name not in _PLAIN]
     unit = {1e-3: "mm", 1e-2: "cm", 1.0: "m"}[scale]
     said = f"{len(measures)} measures of the subject read from the file{f', lengths in {unit}' if lengths else ''}."
     return measures, (said,) if measures else (), tuple(warnings)
@@ -236,7 +236,7 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
 
 def as_written(measures: Mapping[str, float]) -> dict[str, float]:
     """Return measures (lengths m, as `measurements_of`) as PROCESSING holds them: lengths in mm, the rest unchanged."""
-    return {name: value if name in PLAIN else 1000 * value for name, value in measures.items()}
+    return {name: value if name in _PLAIN else 1000 * value for name, value in measures.items()}
 
 
 def _written(raw: RawC3d) -> dict[str, float]:
@@ -250,7 +250,7 @@ def _written(raw: RawC3d) -> dict[str, float]:
         pairs = [*listed, *((name, values[0]) for name, values in direct if values.size == 1)]
         for name, value in pairs:
             key = name.upper().replace("_", "").replace(" ", "").lstrip("$")
-            found.setdefault(OTHER_NAMES.get(key, key), float(value))
+            found.setdefault(_OTHER_NAMES.get(key, key), float(value))
     return found
 
 

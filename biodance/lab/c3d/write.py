@@ -19,7 +19,7 @@ FileParameters = Mapping[str, Mapping[str, FileValue]]
 _MOST = 255
 """The longest dimension of a parameter: one byte tells it."""
 _MM = 1000.0
-CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
+_CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
 """What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""
 _NAMES = {
     1: ("Fx", "Fy", "Fz", "Px", "Py", "Mz"),
@@ -27,7 +27,7 @@ _NAMES = {
     3: ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4"),
     4: ("V1", "V2", "V3", "V4", "V5", "V6"),
 }
-DISK = {"F": (1.0, "N"), "L": (_MM, "mm"), "M": (_MM, "Nmm"), "V": (1.0, "V")}
+_DISK = {"F": (1.0, "N"), "L": (_MM, "mm"), "M": (_MM, "Nmm"), "V": (1.0, "V")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class PlateRecording:
     calibration: Array | None = None
 
     def __post_init__(self) -> None:
-        if self.type not in CHANNEL_KINDS:
+        if self.type not in _CHANNEL_KINDS:
             raise BiodanceError(f"A plate of TYPE {self.type} cannot be written; legal are 1, 2, 3 and 4.")
-        count = len(CHANNEL_KINDS[self.type])
+        count = len(_CHANNEL_KINDS[self.type])
         channels = frozen_array(self.channels, (None, count), f"PlateRecording.channels of TYPE {self.type}")
         assign(self, channels=channels, labels=tuple(self.labels))
         freeze(self, "PlateRecording", corners=(4, 3), origin=(3,))
@@ -151,7 +151,7 @@ def _points(markers: Markers | None, frames: int) -> Array:
 
 
 def _on_disk(plate: PlateRecording) -> Array:
-    return plate.channels * [DISK[kind][0] for kind in CHANNEL_KINDS[plate.type]]
+    return plate.channels * [_DISK[kind][0] for kind in _CHANNEL_KINDS[plate.type]]
 
 
 def _words(number: int) -> Array:
@@ -190,17 +190,17 @@ def _analog_group(plates: Sequence[PlateRecording], rate: float) -> dict[str, Fi
         "GEN_SCALE": 1.0,
         "SCALE": np.ones(count),
         "OFFSET": np.zeros(count, dtype=int),
-        "UNITS": [DISK[kind][1] for plate in plates for kind in CHANNEL_KINDS[plate.type]],
+        "UNITS": [_DISK[kind][1] for plate in plates for kind in _CHANNEL_KINDS[plate.type]],
         "RATE": float(rate),
     }
 
 
 def _plate_group(plates: Sequence[PlateRecording]) -> dict[str, FileValue]:
     count = len(plates)
-    width = max((len(CHANNEL_KINDS[plate.type]) for plate in plates), default=6)
+    width = max((len(_CHANNEL_KINDS[plate.type]) for plate in plates), default=6)
     channel, matrix, first = np.zeros((width, count), dtype=int), np.zeros((6, 6, count)), 1
     for index, plate in enumerate(plates):
-        size = len(CHANNEL_KINDS[plate.type])
+        size = len(_CHANNEL_KINDS[plate.type])
         channel[:size, index] = np.arange(first, first + size)
         first += size
         if plate.calibration is not None:

@@ -17,15 +17,15 @@ import numpy as np
 from biodance.records import Array, Markers, longest_run, runs
 from biodance.spatial import rigid_fit
 
-FLANK = 6
+_FLANK = 6
 """Seen frames that each side of a short gap must have."""
 _CARRIERS = 5
 """At most so many neighbours carry a marker across a gap; at least three are needed."""
-RIGID = 0.01
+_RIGID = 0.01
 """m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
 _OFF_LINE = 0.01
 """m: so far from one line the neighbours must lie to fix a rotation."""
-CLOSURE = 0.02
+_CLOSURE = 0.02
 """m: the neighbours must predict the marker across the gap to this, or it is left unseen."""
 
 
@@ -97,13 +97,13 @@ def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:
     """Return the spline over one gap of one marker (T, 3); None where a side has fewer than FLANK seen frames."""
     from scipy.interpolate import CubicHermiteSpline
 
-    before, after = slice(start - FLANK, start), slice(stop, stop + FLANK)
-    if start < FLANK or stop + FLANK > len(time) or np.isnan(xyz[before]).any() or np.isnan(xyz[after]).any():
+    before, after = slice(start - _FLANK, start), slice(stop, stop + _FLANK)
+    if start < _FLANK or stop + _FLANK > len(time) or np.isnan(xyz[before]).any() or np.isnan(xyz[after]).any():
         return None
     ends = []
     for side, edge in ((before, start - 1), (after, stop)):
         offset = time[side] - time[edge]
-        powers = np.stack([np.ones(FLANK), offset, offset**2], axis=1)
+        powers = np.stack([np.ones(_FLANK), offset, offset**2], axis=1)
         place, slope, _ = np.linalg.lstsq(powers, xyz[side], rcond=None)[0]
         ends.append((time[edge], place, slope))
     knots, places, slopes = zip(*ends, strict=True)
@@ -122,7 +122,7 @@ def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Arr
     ways = ((rigid_fit(others[edge], others), own[edge]) for edge in (0, -1))
     forward, backward = (turn @ point + place for (turn, place), point in ways)
     closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
-    if closure > CLOSURE:
+    if closure > _CLOSURE:
         error = f"with an error of {1000 * closure:.0f} mm across the gap"
         return None, f"left unseen: {', '.join(carriers)} predict it {error}"
     part = np.linspace(0.0, 1.0, len(own))[:, None]
@@ -139,7 +139,7 @@ def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[s
         if same and not np.isnan(markers[label][gap.start - 1 : gap.stop + 1]).any():
             distance = np.linalg.norm(markers[label] - own, axis=1)
             spread[label] = float(np.nanstd(distance))
-    rigid = sorted((label for label, value in spread.items() if value < RIGID), key=spread.__getitem__)[:_CARRIERS]
+    rigid = sorted((label for label, value in spread.items() if value < _RIGID), key=spread.__getitem__)[:_CARRIERS]
     if len(rigid) < 3:
         return []
     points = np.stack([markers[label][gap.start - 1] for label in rigid])

@@ -23,7 +23,7 @@ from biodance.records import SIDES, Array, Markers, Trial
 
 FOLDER = "anthropometry/marker_sets"
 FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
-MAPS = ("session.toml", "subject.toml")
+_MAPS = ("session.toml", "subject.toml")
 """Files whose ``[markers] map`` is a marker set of its own."""
 GUESSED = "guessed "
 """How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
@@ -118,7 +118,7 @@ _PLACED = ("plug_in_gait", "isb_landmarks")
 @cache
 def _read(name: str, path: Path, _stamp: int) -> MarkerSet:
     """Return the marker set in a file; read anew when the file has changed."""
-    if path.name in MAPS:
+    if path.name in _MAPS:
         return _made(name, read_map(path), usual=True)
     return _made(name, parse_marker_set(path), usual=path.stem not in _PLACED)
 

@@ -14,8 +14,8 @@ from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.still import median_places, quietest
 from biodance.records import Array, Markers, spread_frames
 
-UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
-LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
+_UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
+_LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
 _HIGH, _DEEP = ("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank")
 """Segments of the upper and of the lowest part of the body, for sets that nobody described."""
 _CLOUD = 16
@@ -33,7 +33,7 @@ def axis_to_head(markers: Markers) -> Array | None:
     known = recognise(markers.names)
     few = replace(markers, time=spread_frames(markers.time), xyz=spread_frames(markers.xyz))
     ends = [
-        [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (UPPER, LOWER)
+        [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (_UPPER, _LOWER)
     ]
     if not all(ends):
         on = _segments(markers.names)

@@ -87,7 +87,7 @@ _NOT_PLACED = (
     "The file does not say where the plate lies: its corners enclose the centres of pressure under load with 0.15 m to "
     "spare."
 )
-FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
+_FOOT_MARGIN = 0.15  # m, how far a foot reaches beyond its centres of pressure
 _FARTHEST = 50.0  # m
 _AXES = "xyz"
 
@@ -211,5 +211,5 @@ def _height(table: TimeTable, columns: dict[str, str], turn: Array) -> float:
 def _rectangle(cop: Array) -> Array:
     """Return the corners (4, 3) m around the centres of pressure (T, 3), counter-clockwise seen from above."""
     (x0, y0, z), (x1, y1, _) = np.nanmin(cop, axis=0), np.nanmax(cop, axis=0)
-    x0, y0, x1, y1 = x0 - FOOT_MARGIN, y0 - FOOT_MARGIN, x1 + FOOT_MARGIN, y1 + FOOT_MARGIN
+    x0, y0, x1, y1 = x0 - _FOOT_MARGIN, y0 - _FOOT_MARGIN, x1 + _FOOT_MARGIN, y1 + _FOOT_MARGIN
     return np.array([[x1, y1, z], [x0, y1, z], [x0, y0, z], [x1, y0, z]])

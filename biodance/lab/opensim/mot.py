@@ -16,8 +16,8 @@ from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownNam
 from biodance.lab.plain_text import cells, parse_number, read_text, write_new
 from biodance.records import Array, assign, frozen_array
 
-LONGEST_HEADER = 200
-JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writers round the time column
+_LONGEST_HEADER = 200
+_JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writers round the time column
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class TimeTable:
     def has_equal_steps(self) -> bool:
         """True if every time lies within a fifth of a step of equal steps (writers round the time column)."""
         even = np.linspace(self.time[0], self.time[-1], self.time.size) if self.time.size else self.time
-        return bool(self.time.size < 3 or np.abs(self.time - even).max() <= JITTER * (even[1] - even[0]))
+        return bool(self.time.size < 3 or np.abs(self.time - even).max() <= _JITTER * (even[1] - even[0]))
 
 
 def read_mot(path: str | Path) -> TimeTable:
@@ -116,7 +116,7 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
 def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
     """Return the header (lower-case keys, the table's name under ""), the column labels and the numbered rows."""
     rows = read_text(path).splitlines()
-    start = next((i for i, row in enumerate(rows[:LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
+    start = next((i for i, row in enumerate(rows[:_LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
     if start is None:
         raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
     pairs = (re.split(r"\s*=\s*|\s+", row.strip(), maxsplit=1) for row in rows[:start])

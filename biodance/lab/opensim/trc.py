@@ -21,11 +21,11 @@ from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _CLEARLY_TALLER = 1.3
-HEADER_ROWS = 4
-WIDEST = 50.0  # m, between the markers of one frame
-NARROWEST = 0.05  # m, the same of a hand
+_HEADER_ROWS = 4
+_WIDEST = 50.0  # m, between the markers of one frame
+_NARROWEST = 0.05  # m, the same of a hand
 _FEW = 4  # markers, fewer of which may lie anywhere
-TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
+_TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 
 
 def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
@@ -49,7 +49,7 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
     spread = _spread(values) * _METRES[unit]
-    if spread > WIDEST or (0 < spread < NARROWEST and len(names) >= _FEW):
+    if spread > _WIDEST or (0 < spread < _NARROWEST and len(names) >= _FEW):
         raise FileRefused(
             f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "
             f"the unit."
@@ -115,7 +115,7 @@ def _header(rows: list[str], path: Path) -> dict[str, str]:
         raise FileRefused(
             f"{path}: does not begin with 'PathFileType', so it is not a .trc file. Export the markers again."
         )
-    if len(rows) <= HEADER_ROWS:
+    if len(rows) <= _HEADER_ROWS:
         raise FileRefused(
             f"{path}: ends after {len(rows)} rows; a .trc file has five header rows and the frames. Export it again."
         )
@@ -165,10 +165,10 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
     """Return frame numbers (T,), times (T,) s and coordinates (T, K, 3) in file units."""
     width = 2 + 3 * count
     table: list[list[float]] = []
-    for line_number, line in enumerate(rows[HEADER_ROWS:], start=HEADER_ROWS + 1):
+    for line_number, line in enumerate(rows[_HEADER_ROWS:], start=_HEADER_ROWS + 1):
         found = cells(line)
         if not any(found) or not re.fullmatch(r"\d+(\.0*)?", found[0]):
-            if any(found) and (table or line_number > HEADER_ROWS + 2):
+            if any(found) and (table or line_number > _HEADER_ROWS + 2):
                 raise FileRefused(
                     f"{path}: row {line_number} does not begin with a frame number ({found[0]!r}). Export the file "
                     f"again."
@@ -209,7 +209,7 @@ def _equal_steps(
     duration = raw[-1] - raw[0]
     for place in (number_of - number_of[0], np.rint((raw - raw[0]) * declared).astype(int)):
         step = duration / place[-1] if place[-1] > 0 else np.inf
-        near = np.abs(raw - raw[0] - step * place) < 0.25 * step + TIME_COLUMN_ROUNDING
+        near = np.abs(raw - raw[0] - step * place) < 0.25 * step + _TIME_COLUMN_ROUNDING
         if np.all(np.diff(place) > 0) and near.all():
             break
     else:
@@ -219,7 +219,7 @@ def _equal_steps(
         )
     warnings = []
     rate = declared
-    if abs(1 / (step * declared) - 1) > TIME_COLUMN_ROUNDING / duration + 1e-6:
+    if abs(1 / (step * declared) - 1) > _TIME_COLUMN_ROUNDING / duration + 1e-6:
         rate = 1 / step
         warnings.append(f"DataRate says {declared:g} Hz, the time column {rate:.6g} Hz; the time column was used.")
     full = np.full((int(place[-1]) + 1, *xyz.shape[1:]), np.nan)

@@ -9,7 +9,7 @@ SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
 NOT_CLOSED, CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
 _UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its closure
 _STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
-SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
+_SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
 _UNITS = {"m": 1.0, "mm": 0.001}
 
 
@@ -109,7 +109,7 @@ def _refuse_disorder(lab: Array) -> None:
     sides = lab - np.roll(lab, -1, axis=0)
     if sides[0] @ sides[2] < 0 and sides[1] @ sides[3] < 0:
         return
-    for order, which in SWAPS.items():
+    for order, which in _SWAPS.items():
         if _gap(lab[list(order)]) < NOT_CLOSED:
             raise TrialRefused(
                 f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "

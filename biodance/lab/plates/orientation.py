@@ -12,7 +12,7 @@ from biodance.lab.plates.signals import LEAST_BESIDE, PlateReading
 from biodance.lab.plates.wrench import FOUR_SENSORS, centre_of_pressure, gravity_sign, sway_sign, wrench_in_lab
 from biodance.records import Array, Markers, Plate, Wrench
 
-LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
+_LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
 BESIDE = 0.15  # m beyond the edge
 _FRAMES = 200
 _QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0), (0, -1))]
@@ -28,7 +28,7 @@ def distance_to_feet(cop: Array, xyz: Array, corners: Array) -> float | None:
     straight line between two of them, so it is near 0 between two feet.
     """
     centre, reach = corners.mean(axis=0), float(np.linalg.norm(half_sides(corners))) + BESIDE
-    low = np.abs(xyz[:, :, 2] - centre[2]) <= LOW
+    low = np.abs(xyz[:, :, 2] - centre[2]) <= _LOW
     near = low & (np.linalg.norm(xyz[:, :, :2] - centre[:2], axis=2) <= reach)
     told = np.isfinite(cop).all(axis=1) & (near.sum(axis=1) >= 2)
     if told.sum() < max(1, min(5, len(cop))):

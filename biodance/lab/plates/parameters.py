@@ -14,9 +14,9 @@ from biodance.lab.c3d.raw import RawC3d
 from biodance.records import Array
 from biodance.settings import STANDARD_GRAVITY
 
-CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
-MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
-NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
+_CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
+_MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
+_NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +91,9 @@ def plate_parameters(raw: RawC3d, number: int) -> PlateParameters:
     """
     group = raw.parameters.get("FORCE_PLATFORM", {})
     kind = int(_of_plate(group, "TYPE", (), number))
-    if kind not in CHANNELS_OF_TYPE:
-        known = ", ".join(map(str, CHANNELS_OF_TYPE))
-        what = f" ({NAMES_OF_TYPE[kind]})" if kind in NAMES_OF_TYPE else ""
+    if kind not in _CHANNELS_OF_TYPE:
+        known = ", ".join(map(str, _CHANNELS_OF_TYPE))
+        what = f" ({_NAMES_OF_TYPE[kind]})" if kind in _NAMES_OF_TYPE else ""
         raise TrialRefused(f"TYPE {kind}{what} cannot be computed; legal are {known}. Export the plate as TYPE 2.")
     rows = _numbers(group, "CHANNEL", keep=True).shape[:1]
     listed = _of_plate(group, "CHANNEL", rows or (0,), number)
@@ -105,7 +105,7 @@ def plate_parameters(raw: RawC3d, number: int) -> PlateParameters:
 
 def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
     """Return the columns (from 0) of the plate's channels after checking their number and range."""
-    need = CHANNELS_OF_TYPE[kind]
+    need = _CHANNELS_OF_TYPE[kind]
     if listed.size < need:
         raise TrialRefused(
             f"CHANNEL lists {listed.size} channels, TYPE {kind} needs {need}. Correct the file or export it again."
@@ -126,9 +126,9 @@ def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
 
 def _calibration(group: Mapping[str, Any], kind: int, number: int) -> Array | None:
     """Return CAL_MATRIX (stored by columns unless MATRIX_STORE says BYROW); None for types without one."""
-    if kind not in MATRIX_OF_TYPE:
+    if kind not in _MATRIX_OF_TYPE:
         return None
-    rows, columns = MATRIX_OF_TYPE[kind]
+    rows, columns = _MATRIX_OF_TYPE[kind]
     stored = _numbers(group, "CAL_MATRIX", keep=True)
     by_row = "BYROW" in "".join(str(text) for text in group.get("MATRIX_STORE", [])).replace(" ", "").upper()
     shape = stored.shape[:2] if stored.ndim >= 2 else (rows, columns)
@@ -220,7 +220,7 @@ def unit_factors(
     """
     content = CONTENT[plate.type]
     assumed = {"F": 1.0, "M": metres, "L": metres}
-    if plate.type in MATRIX_OF_TYPE:
+    if plate.type in _MATRIX_OF_TYPE:
         return tuple(assumed[c] for c in content), (
             f"Units: channels in {_listed(units)} times CAL_MATRIX give N and N x {metres:g} m.",
         )

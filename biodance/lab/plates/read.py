@@ -18,7 +18,7 @@ from biodance.records import Array, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
-AS_POUNDS = 0.03
+_AS_POUNDS = 0.03
 _STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
 
 _SAME_PLACE = 0.001
@@ -180,6 +180,6 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"
     for factor, meaning in ((POUND, "newton declared as pounds"), (1 / POUND, "pounds declared as newton")):
-        if abs(mass / body_mass / factor - 1) <= AS_POUNDS:
+        if abs(mass / body_mass / factor - 1) <= _AS_POUNDS:
             return (f"{said}: the ratio is that of {meaning}. Check ANALOG:UNITS.",)
     return (f"{said}: check the mass, the units, and whether a foot stood beside the plates.",)

@@ -28,10 +28,10 @@ from biodance.spatial import wrench_about_point
 
 _EDGE = 0.02  # m by which a centre of pressure may lie beyond the edge
 INSIDE = 0.8  # share of the loaded samples that must lie on the plate
-STILLEST = 0.0015  # m: nobody's centre of pressure stays this close to the plate's centre
+_STILLEST = 0.0015  # m: nobody's centre of pressure stays this close to the plate's centre
 FARTHEST_ORIGIN, CLOSEST_SENSORS = 2.0, 0.05  # m
 LEAST_BESIDE = 0.02  # m: sensors so near to the middle of the surface cannot be told to lie on its other side
-STRONGEST = np.array([30e3, 30e3, 30e3, 30e3, 30e3, 30e3])  # N, N·m: beyond the range of every maker's plate
+_STRONGEST = np.array([30e3, 30e3, 30e3, 30e3, 30e3, 30e3])  # N, N·m: beyond the range of every maker's plate
 MOMENT_UNITS = (1.0, 1000.0, 0.001)
 
 
@@ -154,11 +154,11 @@ def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, NDArr
 def _refuse_impossible(plate: PlateParameters, sensor: Array) -> None:
     """Refuse a plate that reads what no plate measures: TrialRefused names channel and value."""
     largest = np.abs(sensor).max(axis=0, initial=0.0)
-    worst = int(np.argmax(largest / STRONGEST))
-    if largest[worst] > STRONGEST[worst]:
+    worst = int(np.argmax(largest / _STRONGEST))
+    if largest[worst] > _STRONGEST[worst]:
         raise TrialRefused(
             f"{CHANNELS[worst]} reads up to {largest[worst]:.3g} {'N' if worst < 3 else 'N·m'}; no plate measures more "
-            f"than {STRONGEST[worst]:g}. Check the channels {', '.join(str(c + 1) for c in plate.channels)}, their "
+            f"than {_STRONGEST[worst]:g}. Check the channels {', '.join(str(c + 1) for c in plate.channels)}, their "
             f"ANALOG:SCALE and units."
         )
 
@@ -224,7 +224,7 @@ def _moments_in_sense(
     for factor in factors:
         tried = pressed * np.array([1, 1, 1, factor, factor, factor])
         on_it = _share_on(centre_of_pressure(_at_surface(plate, tried, vector, axes)[0]), half)
-        lives = float(np.percentile(np.abs(centre_of_pressure(tried)).max(axis=1), 90)) > STILLEST
+        lives = float(np.percentile(np.abs(centre_of_pressure(tried)).max(axis=1), 90)) > _STILLEST
         share[factor] = (on_it, on_it >= INSIDE and lives)
         if share[1.0][1]:
             break  # as declared it makes sense: no other unit is asked

@@ -105,12 +105,12 @@ def _eight_sums(plate: PlateParameters, signals: Array) -> tuple[Array, ...]:
 
 
 DEEPEST = 0.3  # m, no sensor lies farther below the surface
-CONTACT = 0.1  # s
-SWAY_BAND = (0.5, 5.0)  # Hz
-SWAY_TIME = 2.5  # s of standing that the sway test needs
-SWAY_STEADY = 0.05  # share of the weight by which the vertical force may vary
-SWAY_CORRELATION = 0.4
-SWAY_SLOPE = (0.25, 3.0)
+_CONTACT = 0.1  # s
+_SWAY_BAND = (0.5, 5.0)  # Hz
+_SWAY_TIME = 2.5  # s of standing that the sway test needs
+_SWAY_STEADY = 0.05  # share of the weight by which the vertical force may vary
+_SWAY_CORRELATION = 0.4
+_SWAY_SLOPE = (0.25, 3.0)
 """1/m, shear over weight per metre of centre of pressure; about 1 / height of the centre of mass."""
 
 
@@ -140,7 +140,7 @@ def loaded_samples(wrench: Array, rate: float) -> NDArray[np.bool_]:
 
     So a plate that only trembles under a neighbour's step does not count as loaded.
     """
-    means, size = block_means(wrench[:, 2], rate, length=CONTACT)
+    means, size = block_means(wrench[:, 2], rate, length=_CONTACT)
     threshold = max(TOUCH_FORCE, 0.05 * float(np.abs(means).max()))
     lasting = np.repeat(np.abs(means) >= threshold, size)
     lasting = np.append(lasting, np.full(len(wrench) - lasting.size, lasting[-1]))
@@ -176,7 +176,7 @@ def sway_sign(wrench: Array, rate: float) -> int:
             return 0
         correlation = float(shear @ cop / np.sqrt(power * float(shear @ shear)))
         slope = abs(float(shear @ cop)) / power / abs(float(wrench[part, 2].mean()))
-        if abs(correlation) < SWAY_CORRELATION or not SWAY_SLOPE[0] <= slope <= SWAY_SLOPE[1]:
+        if abs(correlation) < _SWAY_CORRELATION or not _SWAY_SLOPE[0] <= slope <= _SWAY_SLOPE[1]:
             return 0
         signs.append(-np.sign(correlation))
     return int(signs[0]) if signs[0] == signs[1] else 0
@@ -189,10 +189,10 @@ def _standing(vertical: Array, rate: float) -> slice | None:
     if size < 4 or abs(middle) < 5 * TOUCH_FORCE:
         return None
     blocks = vertical[: vertical.size // size * size].reshape(-1, size)
-    most = SWAY_STEADY * abs(middle)
+    most = _SWAY_STEADY * abs(middle)
     steady = (np.abs(blocks.mean(axis=1) - middle) <= most) & (blocks.std(axis=1) <= most)
     start, stop = longest_run(steady)
-    return slice(start * size, stop * size) if (stop - start) * size >= SWAY_TIME * rate else None
+    return slice(start * size, stop * size) if (stop - start) * size >= _SWAY_TIME * rate else None
 
 
 def _band(values: Array, rate: float) -> Array:
@@ -201,5 +201,5 @@ def _band(values: Array, rate: float) -> Array:
     values = values - values.mean() - along * (along @ values) / (along @ along)
     spectrum = np.fft.rfft(values * np.hanning(values.size))
     frequency = np.fft.rfftfreq(values.size, 1 / rate)
-    spectrum[(frequency < SWAY_BAND[0]) | (frequency > SWAY_BAND[1])] = 0
+    spectrum[(frequency < _SWAY_BAND[0]) | (frequency > _SWAY_BAND[1])] = 0
     return np.fft.irfft(spectrum, values.size)

@@ -10,9 +10,9 @@ NAME = "AMTI text"
 EXTENSIONS = (".asc", ".txt", ".csv")
 PREFERENCE = 90
 """Asked last: any table of numbers looks like this format."""
-NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
-_CELL = rf"(?:{NUMBER}|nan)"
-ROW = re.compile(rf"\s*{_CELL}(?:[\s,;]+{_CELL}){{5,}}[\s,;]*", flags=re.IGNORECASE)
+_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
+_CELL = rf"(?:{_NUMBER}|nan)"
+_ROW = re.compile(rf"\s*{_CELL}(?:[\s,;]+{_CELL}){{5,}}[\s,;]*", flags=re.IGNORECASE)
 
 
 def sniff(head: bytes) -> bool:
@@ -20,7 +20,7 @@ def sniff(head: bytes) -> bool:
     one may be damaged, which is for `read` to say.
     """
     rows = [line for line in head_text(head).splitlines()[:4] if line.strip()]
-    fit = [bool(ROW.fullmatch(line)) for line in rows[1:] or rows]
+    fit = [bool(_ROW.fullmatch(line)) for line in rows[1:] or rows]
     return any(fit) and sum(fit) >= len(fit) - (len(fit) > 2)
 
 

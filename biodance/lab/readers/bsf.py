@@ -8,12 +8,12 @@ from biodance.records import Role, Trial
 NAME = "AMTI NetForce"
 EXTENSIONS = (".bsf",)
 PREFERENCE = 30
-VERSIONS = (100, 105)
+_VERSIONS = (100, 105)
 
 
 def sniff(head: bytes) -> bool:
     """Return whether the head begins with a version of NetForce."""
-    return len(head) >= 8 and struct.unpack("<i", head[:4])[0] in VERSIONS
+    return len(head) >= 8 and struct.unpack("<i", head[:4])[0] in _VERSIONS
 
 
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:

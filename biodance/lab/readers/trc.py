@@ -17,10 +17,10 @@ from biodance.records import Role, Trial
 NAME = "markers of OpenSim"
 EXTENSIONS = (".trc",)
 PREFERENCE = 10
-FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
+_FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
 
-MARKER_FOLDER = re.compile(r"marker|mocap|trc", flags=re.IGNORECASE)
-FORCE_FOLDER = re.compile(r"force|grf|^id$|kinetic|^mot$|inverse.?dynamics", flags=re.IGNORECASE)
+_MARKER_FOLDER = re.compile(r"marker|mocap|trc", flags=re.IGNORECASE)
+_FORCE_FOLDER = re.compile(r"force|grf|^id$|kinetic|^mot$|inverse.?dynamics", flags=re.IGNORECASE)
 
 
 def sniff(head: bytes) -> bool:
@@ -40,7 +40,7 @@ def beside(path: Path) -> Path | None:
     folder or in the one for forces beside it (MarkerData/ and ForceData/ or ID/); None if there is none.
     """
     for place in (path.parent, *_places_of_forces(path.parent)):
-        for ending, suffix in product(FORCES_BESIDE, (".mot", ".sto")):
+        for ending, suffix in product(_FORCES_BESIDE, (".mot", ".sto")):
             candidate = place / f"{path.stem}{ending}{suffix}"
             if candidate.is_file():
                 try:
@@ -53,9 +53,9 @@ def beside(path: Path) -> Path | None:
 
 def _places_of_forces(markers: Path) -> list[Path]:
     """Return the folders for forces beside a folder for markers; none where the folder is no such one."""
-    if not MARKER_FOLDER.search(markers.name):
+    if not _MARKER_FOLDER.search(markers.name):
         return []
-    return [path for path in sorted(markers.parent.iterdir()) if path.is_dir() and FORCE_FOLDER.search(path.name)]
+    return [path for path in sorted(markers.parent.iterdir()) if path.is_dir() and _FORCE_FOLDER.search(path.name)]
 
 
 def _with_forces(trial: Trial, path: Path) -> Trial:

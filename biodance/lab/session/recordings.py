@@ -20,8 +20,8 @@ from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
 from biodance.records import Role, Trial
 from biodance.records.attention import WARNING
 
-STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")
-VALIDATE_WORDS = ("squat", "squats")
+_STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")
+_VALIDATE_WORDS = ("squat", "squats")
 
 
 def role_by_name(name: str) -> Role | None:
@@ -32,9 +32,9 @@ def role_by_name(name: str) -> Role | None:
     calibration.
     """
     words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
-    if any(word in STATIC_WORDS or word.startswith("static") for word in words):
+    if any(word in _STATIC_WORDS or word.startswith("static") for word in words):
         return "static"
-    if any(word in VALIDATE_WORDS for word in words):
+    if any(word in _VALIDATE_WORDS for word in words):
         return "validate"
     return None
 

@@ -15,13 +15,13 @@ from biodance.lab.session.file import SubjectEntry
 from biodance.records import Subject, Trial
 from biodance.settings import CheckLimits
 
-MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
-STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
-AGE_NAMES = ("age",)
-SEX_NAMES = ("gender", "sex")
-SAME_MASS = 0.01  # share by which two declared masses, or statures, may differ
+_MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
+_STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
+_AGE_NAMES = ("age",)
+_SEX_NAMES = ("gender", "sex")
+_SAME_MASS = 0.01  # share by which two declared masses, or statures, may differ
 LEGAL_MASS, LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
-STATURE_OF = (
+_STATURE_OF = (
     ("C7", ("c7",), 0.840),
     ("the head markers", ("head_front", "head_back"), 0.942),
     ("the acromia", ("right_acromion", "left_acromion"), 0.821),
@@ -35,7 +35,7 @@ eight people of 1.30 to 1.74 m (acromia sd 0.006, notch 0.007, iliac spines 0.01
 """
 FLOOR = (-0.05, 0.2)  # m, where the lowest marker of somebody who stands on the floor lies
 _OVER_SOLE = 0.04  # m, markers of heel and toes over the ground
-TALLER_IS_MALE = 1.70  # m
+_TALLER_IS_MALE = 1.70  # m
 _MIDDLE_INDEX = 22.5
 """kg/m2, body mass over the square of the stature: between the women (20.6) and the men (24.1) of de Leva 1996."""
 
@@ -61,7 +61,7 @@ def identify_subject(
     ordered = sorted(trials, key=lambda trial: trial.role != "static")
     sources = {**files, **{trial.source.path.name: trial.measurements for trial in ordered}}
     notes: list[str] = []
-    masses, statures = _declared(sources, MASS_NAMES, LEGAL_MASS), _declared(sources, STATURE_NAMES, LEGAL_STATURE)
+    masses, statures = _declared(sources, _MASS_NAMES, LEGAL_MASS), _declared(sources, _STATURE_NAMES, LEGAL_STATURE)
     mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
     sex = typed.sex or _declared_sex(sources)
@@ -70,7 +70,7 @@ def identify_subject(
     mass = _check_mass(mass, on_plates, notes)
     stature = stature if math.isfinite(stature) else _stature_of_markers(ordered, notes)
     mass = _middle_mass(mass, stature, trials, notes)
-    age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, AGE_NAMES, (0.0, 120.0))], [])
+    age = _choose("age", "years", [*_typed(typed.age), *_declared(sources, _AGE_NAMES, (0.0, 120.0))], [])
     if math.isnan(age):
         notes.append(
             "The age is not given: adult tables and limits are used (below 1.50 m with twice their standard "
@@ -85,12 +85,12 @@ def identify_subject(
 
 def declared_mass(measurements: Mapping[str, float]) -> float:
     """Return the body mass (kg) among the measurements of one file; NaN if it is not there or outside 5 to 400 kg."""
-    return next((d.value for d in _declared({"": measurements}, MASS_NAMES, LEGAL_MASS)), math.nan)
+    return next((d.value for d in _declared({"": measurements}, _MASS_NAMES, LEGAL_MASS)), math.nan)
 
 
 def declared_stature(measurements: Mapping[str, float]) -> float:
     """Return the stature (m) among the measurements of one file; NaN if it is not there or outside 0.4 to 2.6 m."""
-    return next((d.value for d in _declared({"": measurements}, STATURE_NAMES, LEGAL_STATURE)), math.nan)
+    return next((d.value for d in _declared({"": measurements}, _STATURE_NAMES, LEGAL_STATURE)), math.nan)
 
 
 def _typed(value: float | None) -> list[Declared]:
@@ -115,7 +115,7 @@ def _choose(quantity: str, unit: str, declared: list[Declared], notes: list[str]
     if not declared:
         return math.nan
     first = declared[0]
-    other = next((d for d in declared[1:] if abs(d.value - first.value) > SAME_MASS * first.value), None)
+    other = next((d for d in declared[1:] if abs(d.value - first.value) > _SAME_MASS * first.value), None)
     if other:
         notes.append(
             f"The {quantity} is {first.value:g} {unit} in {first.source} but {other.value:g} {unit} in {other.source}; "
@@ -170,7 +170,7 @@ def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
     for trial in (t for t in trials if t.role == "static"):
         feet = _height(trial, "right_heel", "left_heel", "right_toe", "left_toe")
         step = 0.0 if FLOOR[0] <= feet <= FLOOR[1] else feet - _OVER_SOLE
-        for what, names, share in STATURE_OF:
+        for what, names, share in _STATURE_OF:
             stature = (_height(trial, *names) - step) / share
             if LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
                 on = f", whose feet stand at {step:.2f} m" if step else ""
@@ -199,7 +199,7 @@ def _height(trial: Trial, *landmarks: str) -> float:
 
 def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:
     """Return the sex where a file holds it as a number, 0 for a woman and 1 for a man; None otherwise."""
-    for declared in _declared(sources, SEX_NAMES, (0.0, 1.0)):
+    for declared in _declared(sources, _SEX_NAMES, (0.0, 1.0)):
         if declared.value in (0.0, 1.0):
             return "M" if declared.value else "F"
     return None
@@ -207,7 +207,7 @@ def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M
 
 def _likely_sex(stature: float, notes: list[str]) -> Literal["F", "M"]:
     """Return "M" from 1.70 m on and "F" below, which is right for most adults, and say so."""
-    sex: Literal["F", "M"] = "M" if stature >= TALLER_IS_MALE else "F"
+    sex: Literal["F", "M"] = "M" if stature >= _TALLER_IS_MALE else "F"
     known = f"a stature of {stature:.2f} m is more frequent among"
     basis, people = known if math.isfinite(stature) else "without a stature taken as", "men" if sex == "M" else "women"
     notes.append(f"The sex is not given: {basis} {people}, so tables for {sex} are used. Set sex in session.toml.")

@@ -164,7 +164,7 @@ def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
     yield ""
 
 
-MARK = "registration.json"
+_MARK = "registration.json"
 """Name of the file that says that a folder was written by `biodance register`."""
 _BESIDE = (".mp", ".vsk", ".enf", ".toml")
 """What belongs to a session beside its recordings."""
@@ -182,7 +182,7 @@ def registered_folder(folder: Path, *, force: bool) -> Path:
     if folder.exists() and not folder.is_dir():
         raise SessionRefused(f"{folder}: is a file; a session needs a folder. Choose another name.")
     files = sorted(folder.iterdir()) if folder.is_dir() else []
-    if files and not (folder / MARK).is_file():
+    if files and not (folder / _MARK).is_file():
         raise SessionRefused(
             f"{folder}: holds files that biodance did not write ({files[0].name}). Choose another name."
         )
@@ -222,15 +222,15 @@ def write_registered(
     for name in FILES:
         if (own.resolve().parent / name).is_file() and not (folder / name).exists():
             shutil.copyfile(own.resolve().parent / name, folder / name)
-    (folder / MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+    (folder / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     return path
 
 
 def _emptied(folder: Path) -> None:
     """Remove what an earlier registration wrote."""
-    if (folder / MARK).is_file():
+    if (folder / _MARK).is_file():
         for file in folder.iterdir():
-            if file.is_file() and (file.suffix == ".c3d" or file.name in FILES or file.name == MARK):
+            if file.is_file() and (file.suffix == ".c3d" or file.name in FILES or file.name == _MARK):
                 file.unlink()
 
 
