@@ -133,7 +133,7 @@ def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
 
 
 def parameter_deviations(belief: Posterior) -> Array:
-    """Return the deviations (N, 3) of mass kg, CoM m per axis and moments of inertia kg·m² of every segment."""
+    """Return the standard deviations (N, 3) of mass kg, CoM m per axis and moments of inertia kg·m² of each segment."""
     out = []
     for first in range(0, belief.prior.phi.size, 10):
         cut = slice(first, first + 10)

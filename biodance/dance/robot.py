@@ -188,7 +188,9 @@ _RATE = 4.0
 
 
 def robot_rows(body: Body, motion: Motion, wrench: Array) -> Array:
-    """Return the whitened rows (6 T, 10N + 1) of [W y] for a ``motion`` and a ``wrench`` (T, 6) N, N·m."""
+    """Return the whitened rows (6 T, 10N + 1) of [W y] for a ``motion`` and a ``wrench`` (T, 6) N, N·m at ``RATE`` or
+    slower.
+    """
     rows = np.concatenate([regressor(body, motion), wrench[:, :, None]], axis=2) / ERROR[:, None]
     return np.asarray(rows.reshape(-1, rows.shape[2]))
 

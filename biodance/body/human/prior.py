@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from biodance.body.human.girths import MAN, WOMAN, published_fractions, published_people
 from biodance.body.human.opinions import Opinion, body_opinions, primitives_of, told_by
-from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of, upright_to
 from biodance.body.inertia import (
     TENSOR,
     RigidInertia,
@@ -208,7 +208,7 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
         lump = RigidInertia(mass, scale * unit.com, mass * scale**2 * unit.inertia)
         if segment == "pelvis":
             lump = stretch_inertia(lump, np.array([1.0, longer, 1.0]) / longer)
-            lump = turn_inertia(lump, _upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
+            lump = turn_inertia(lump, upright_to(skeleton.cut.get("pelvis", skeleton.origins["trunk"])))
         if segment == "trunk_head":
             tall = stretch_inertia(lump, np.array([1.0, longer, 1.0]))
             lump = replace(tall, com=lump.com + skeleton.cut.get("trunk_head", np.zeros(3)))
@@ -218,12 +218,6 @@ def scaled_lumps(reference: Reference, skeleton: Skeleton, subject: Subject) -> 
             lump = replace(lump, com=lump.com + np.array([ahead, 0.0, 0.0]))
         lumps.append(lump if side_of(segment) > 0 else mirror_inertia(lump))
     return tuple(lumps)
-
-
-def _upright_to(point: Array) -> Array:
-    """Return the rotation (3, 3) about z that turns y towards a point in the sagittal plane."""
-    sine, cosine = point[:2] / np.linalg.norm(point[:2])
-    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def disagreement(lumps: tuple[RigidInertia, ...], other: tuple[RigidInertia, ...]) -> Array:
@@ -270,13 +264,13 @@ def primitive_covariance(
 
 
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
-    """Return the deviations (3,) m of a segment's CoM in its frame: tables, people, misplaced joint centres."""
+    """Return the standard deviations (3,) m of a segment's CoM in its frame: tables, people, misplaced joints."""
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     return np.hypot(table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
 
 def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
-    """Return the deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of a segment about its true joint."""
+    """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of a segment about its joint."""
     kind, own = table_spread(kind_of(segment)), lump.inertia / lump.mass
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))

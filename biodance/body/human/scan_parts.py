@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.human.scan import Scan, clip_surface, cut_section
-from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of
+from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of, upright_to
 from biodance.body.inertia import RigidInertia, combine_inertias, turn_inertia
 from biodance.body.tables.anthropometry import read_table
 from biodance.errors import SessionRefused
@@ -205,9 +205,7 @@ def _trunk(
         for name, sign in (("upper_trunk", -1), ("head", 1))
     ]
     upright = _lump(pelvis, "lower_trunk", middle, _UP)
-    sine, cosine = to_cut[:2] / np.linalg.norm(to_cut[:2])
-    leaning = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return {"pelvis": turn_inertia(upright, leaning), "trunk_head": combine_inertias(*parts)}
+    return {"pelvis": turn_inertia(upright, upright_to(to_cut)), "trunk_head": combine_inertias(*parts)}
 
 
 def _density(part: str) -> float:

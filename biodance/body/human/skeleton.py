@@ -30,6 +30,12 @@ def side_of(segment: str) -> float:
     return -1.0 if segment.startswith("left_") else 1.0
 
 
+def upright_to(point: Array) -> Array:
+    """Return the rotation (3, 3) about z that turns y towards a point (3,) in the sagittal plane."""
+    sine, cosine = point[:2] / np.linalg.norm(point[:2])
+    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """The sizes of one person, m.

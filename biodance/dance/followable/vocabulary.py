@@ -82,7 +82,8 @@ def read_vocabulary() -> Vocabulary:
         raise BiodanceError(f"{path}: groups {', '.join(sorted(raw))}; expected {', '.join(_GROUPS)}.")
     found = {}
     for group in _GROUPS:
-        words = sorted((_word(f"{path}: {group}.{key}", key, raw[group][key]) for key in raw[group]), key=_resting)
+        words = [_word(f"{path}: {group}.{key}", key, raw[group][key]) for key in raw[group]]
+        words.sort(key=lambda word: not word.rest)
         keys = [word.key for word in words]
         if [word.rest for word in words] != [True] + [False] * (len(words) - 1):
             raise BiodanceError(f"{path}: {group} needs exactly one word with rest = true.")
@@ -90,10 +91,6 @@ def read_vocabulary() -> Vocabulary:
             raise BiodanceError(f"{path}: {group} names the mirror image {lost[0]!r}, which is not there.")
         found[group] = tuple(words)
     return found
-
-
-def _resting(word: Word) -> bool:
-    return not word.rest
 
 
 def _word(where: str, key: str, raw: dict[str, Any]) -> Word:

@@ -26,7 +26,9 @@ from biodance.spatial import cross, skew
 
 
 def condition(gram: Array) -> tuple[Array, Array]:
-    """Return cond = sqrt(largest / smallest eigenvalue) (...) of Gram matrices (..., k, k), and its gradient."""
+    """Return cond = sqrt(largest / smallest eigenvalue) of Gram matrices (..., k, k), (...), and its gradient (..., k,
+    k).
+    """
     value, vector = _spectrum(gram)
     cond = np.sqrt(value[..., -1] / value[..., 0])
     by = np.zeros_like(value)

@@ -13,7 +13,9 @@ from biodance.threads import Sendable
 _WIDTH = 0.12
 """Distance between the ankles, fraction of stature (about 1.3 times the width of the hips)."""
 STRIP, _CLEAR = 0.1, 1.25
-"""Of a sole's width: least overlap of the reduced supports of both feet and of one; room between the feet."""
+"""Of the width of a sole: how much the reduced supports of both feet and of one overlap at least; of its inner half:
+room between feet.
+"""
 _FORWARD = 0.2
 """m: how far the right foot stands in front (paper III.D, human subject)."""
 SINGLE = {"single_right": (0,), "single_left": (1,)}

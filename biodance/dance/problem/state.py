@@ -83,7 +83,9 @@ class State:
         return np.asarray((self.rotation[:, segment] @ local[:, :, None])[..., 0] + self.position[:, segment])
 
     def along(self, segment: _Index, place: Array, direction: Array) -> Array:
-        """Return (T, K, n) derivative by x of places (T, K, 3) m, fixed in the segments (K), along directions."""
+        """Return (T, K, n) derivative by x of the places (T, K, 3) m, fixed in the segments (K), along directions (T,
+        K, 3).
+        """
         if not self.sloped:
             return np.zeros((*place.shape[:2], self.chain.size))
         wrench = wrench_of_force(direction, place)
@@ -169,7 +171,9 @@ class State:
 
     @cached_property
     def feet(self) -> tuple[Array, Array]:
-        """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative by the total."""
+        """Wrenches (T, 2, 6) of the ground on each foot about the lab origin, and their derivative (T, 2, 6, 6) by the
+        total.
+        """
         return foot_forces(self.wrench, self.stance)
 
     @cached_property

@@ -59,7 +59,9 @@ def straight_way(start: Array, end: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A move to find: between ``ends`` (2, n) in ``duration`` s on the feet of ``stance``, within the ``limits``."""
+    """A move to find: from ``ends[0]`` to ``ends[1]`` (2, n) in ``duration`` s on the feet of ``stance``, within the
+    ``limits``.
+    """
 
     chain: Chain
     blocks: Blocks
@@ -86,7 +88,9 @@ class Task:
     def problem(
         self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective
     ) -> NonlinearProgramme:
-        """Return the problem of the via points of the ``free`` coordinates at ``time`` s, the others as in ``via``."""
+        """Return the problem of the via points of the ``free`` coordinates at instants ``time`` s, the others as in
+        ``via`` (2, n).
+        """
         basis, kept = basis_at(time, self.duration), tuple(limit for limit in self.limits if limit.in_motion)
         points = np.stack([self.ends[0], *via, self.ends[1]])
         points[1:3, free] = 0.0

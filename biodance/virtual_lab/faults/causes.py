@@ -22,7 +22,9 @@ from biodance.virtual_lab.truth import load_on
 
 @dataclass(frozen=True)
 class Hidden:
-    """One cause to hide: its ``name``, where (``target``), how large (``values`` by parameter, SI units)."""
+    """One cause to hide: its ``name``, where (``target``) and how large (``values`` by parameter, SI units; a place has
+    three numbers).
+    """
 
     name: str
     target: str

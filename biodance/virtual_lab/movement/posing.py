@@ -123,7 +123,9 @@ def _pelvis_turn(angle: Array, heading: float) -> Array:
 
 
 def turn_about(axis: Array, angle: Array) -> Array:
-    """Return rotations (T, 3, 3) about a unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not `spatial`'s."""
+    """Return rotations (T, 3, 3) about one unit ``axis`` (3,) by ``angle`` (T,) rad: scipy's, not those of
+    `biodance.spatial`.
+    """
     return Rotation.from_rotvec(np.multiply.outer(angle, axis)).as_matrix()
 
 

@@ -83,7 +83,9 @@ class Person:
         return float(self.loaded_body.sip.mass.sum())
 
     def with_markers_moved(self, shifts: Mapping[str, Array]) -> "Person":
-        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames."""
+        """Return the person with markers moved by ``shifts`` (3,) m in their true segments' frames; UnknownName lists
+        the labels.
+        """
         markers = self.body.markers
         position = np.array(markers.position)
         for label, shift in shifts.items():

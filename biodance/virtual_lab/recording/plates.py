@@ -117,7 +117,9 @@ def sense_plate(
 
 
 def digitise(channels: Array, plate: TruePlate, *, kind: int, bits: int) -> PlateRecording:
-    """Return channels (S, 6) N, N·m as the converter stores them: ``bits`` over ±10 V, TYPE 2 or, in volts, 4."""
+    """Return channels (S, 6) N, N·m as the converter stores them: ``bits`` over ±10 V, ``kind`` TYPE 2 or, in volts,
+    TYPE 4.
+    """
     calibration = CALIBRATION if kind == 4 else np.diag(FULL_SCALE / 10.0)
     step = 20.0 / 2**bits
     volts = np.clip(np.round(channels @ np.linalg.inv(calibration).T / step) * step, -10.0, 10.0)
