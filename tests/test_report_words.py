@@ -131,3 +131,23 @@ def test_pelvis_markers_lean_backwards_by_a_positive_angle():
         notes[np.sign(standing_tilt(leaning))] = widen_limits(body, leaning)[1][0]
     assert "20 degrees forwards" in notes[1.0]
     assert "20 degrees backwards" in notes[-1.0]
+
+
+def test_joints_that_stay_are_not_said_to_be_placed(monkeypatch):
+    from types import SimpleNamespace
+
+    from biodance.motion.ik.functional_joints import PLACED
+    from biodance.pipeline import body as module
+
+    static = SimpleNamespace(name="static", role="static")
+    read = (SimpleNamespace(trial=static, usable=True),)
+    subject = SimpleNamespace(require=lambda *_: None)
+    settings = SimpleNamespace(joints="functional", table="de_leva_1996")
+    said = []
+    for notes in ((f"{PLACED} (150 postures)",), ("Joints that the movement does not show, kept: trunk.",)):
+        scaling = SimpleNamespace(notes=notes, body=lambda: (None,))
+        monkeypatch.setattr(module, "measure_static", lambda *_, made=scaling: made)
+        monkeypatch.setattr(module, "placed_by_movement", lambda *_, made=scaling: made)
+        said.append(module.body_of(subject, read, settings, [])[1])
+    assert "joints placed by movement" in said[0]
+    assert "joints where it shows them" in said[1]

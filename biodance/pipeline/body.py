@@ -15,7 +15,7 @@ from biodance.body.human.scaling import Scaling, measure_static
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.markers.sets import read_marker_set
-from biodance.motion.ik.functional_joints import functional_joints
+from biodance.motion.ik.functional_joints import PLACED, functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
@@ -53,7 +53,8 @@ def body_of(
         if scaling is not None:
             functional = settings.joints == "functional"
             placed = attempt(steps, "joints", partial(placed_by_movement, scaling, read)) if functional else None
-            how = "joints placed by movement" if placed else "joints where it shows them"
+            moved = placed is not None and any(note.startswith(PLACED) for note in placed.notes)
+            how = f"{PLACED[:1].lower()}{PLACED[1:]}" if moved else "joints where it shows them"
             return (placed or scaling).body()[0], (
                 f"Scaled on the static trial {static.name}, {how}; masses and inertias from the table {settings.table}."
             )

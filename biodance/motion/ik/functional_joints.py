@@ -43,6 +43,8 @@ from biodance.motion.kinematics import chains, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
 
+PLACED = "Joints placed by movement"
+"""Beginning of the note on joints that the movement moved."""
 _ALIKE = 8.0
 """s of movement that count as one independent posture, because skin slides with the posture and neighbours err alike.
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
@@ -202,9 +204,7 @@ def _told(
         turns = {hinge: f" and {abs(np.degrees(angle)):.0f} deg" for hinge, angle in turned.items()}
         each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
         fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
-        notes.append(
-            f"Joints placed by movement ({fits}), from the static trial's place, axis turned: {', '.join(each)}."
-        )
+        notes.append(f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}.")
     if kept:
         names = ", ".join(joint.replace("_", " ") for joint in kept)
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")

@@ -162,7 +162,9 @@ CLAUSES: tuple[MethodClause, ...] = (
     MethodClause(
         (_settings("joints"),),
         lambda joints: (
-            "Joint centres were then corrected by the movement." if joints == "functional" else "Joints were not moved."
+            "Joint centres were then corrected by the movement where it showed them."
+            if joints == "functional"
+            else "Joints were not moved."
         ),
         {},
     ),

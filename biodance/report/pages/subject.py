@@ -21,7 +21,7 @@ _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}
 
 
 @dataclass(frozen=True)
-class Room:
+class _Room:
     """mm (of a body of 1.75 m) from the middle to the ``column`` of labels, between two of them, to the picture's edge
     (``half``), and the size of the ``letters``.
     """
@@ -32,10 +32,10 @@ class Room:
     letters: float = 50
 
 
-_WIDE, _PHONE = Room(), Room(430, 110, 1150, 85)
+_WIDE, _PHONE = _Room(), _Room(430, 110, 1150, 85)
 
 
-def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str], *, room: Room = _WIDE) -> str:
+def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[str], *, room: _Room = _WIDE) -> str:
     """Draw ``body`` from the front, its right side on the left, as SVG text; ``labels`` (segment -> lines of text)
     beside it, in the ``room`` they have; segments in ``measured`` are filled, the others white with a broken outline.
     """
@@ -77,7 +77,7 @@ def _outlines(body: Body) -> list[tuple[str, Array]]:
     return found
 
 
-def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: Room, *, right: bool) -> list[str]:
+def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: _Room, *, right: bool) -> list[str]:
     """Return the labels of one side of the body in a column, from the top down, each with a line to its part."""
     own = [name for name in middles if (name.startswith("right") or name == "trunk_head") is right]
     own.sort(key=lambda name: middles[name][1])
@@ -158,7 +158,7 @@ def subject_page(account: SubjectAccount) -> str:
     )
 
 
-def _picture(account: SubjectAccount, room: Room) -> str:
+def _picture(account: SubjectAccount, room: _Room) -> str:
     """Return the address of the picture, "" without a body; on a phone the parts have no names: the table has."""
     if account.body is None or not account.parts:
         return ""
