@@ -61,6 +61,7 @@ NONE = float("nan")
     [
         (PLACE, "standing_place", 0.009, (0.0077, 0.0017), (0.001, 0.0018), False),
         (PLACE, "foot_across", 0.009, (0.0077, 0.0017), (0.001, 0.0018), False),
+        (PLACE, "foot_across", 0.009, (0.0137, 0.0017), (0.001, 0.0018), False),  # another one of 14 mm
         (PLACE, "foot_across", 0.009, (0.060, 0.0017), (0.001, 0.0018), True),  # both show it
         (PLACE, "foot_across", 0.009, (0.0077, 0.0017), (0.069, 0.0018), True),  # its look-alike is what moves
         (PLACE, "foot_across", 0.080, (0.0077, 0.0017), (0.001, 0.0018), True),  # the movement would not show it
