@@ -146,7 +146,7 @@ def measures_of(*, wrist: float) -> Measures:
         for side in sides
         for joint in ("knee", "ankle", "elbow", "wrist")
     }
-    return Measures(0.007, 0.25, 0.16, sides, sides, sides, widths, frozenset(widths), ())
+    return Measures(0.007, 0.25, 0.16, sides, sides, sides, widths, ())
 
 
 def test_the_angles_of_a_chain_give_its_rotation_back() -> None:
