@@ -90,7 +90,7 @@ def test_a_size_that_the_movement_excludes_is_not_named(
     assert any("the movement, which would show it" in note for note in one.notes) is not named
 
 
-def test_two_sizes_of_one_cause_that_agree_must_be_more_than_laboratories_have() -> None:
+def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
     """Feet say 18 ± 5 mm and the movement 6 ± 1.5 mm: together 7 mm, which laboratories have without a fault."""
     said = replace(PLACE, parameters=(Estimate("shift", 0.018, 0.005, "m"),), set=PLACE.set[:1])
     evidence = heard(NAMES, "foot_across", 0.018, 0.005)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from identified_sessions import session_result
-from test_one_load import GAIN, NOTHING, OWN, found
+from test_load_record import GAIN, NOTHING, OWN, found
 from test_report_page import full_session, html_of
 
 from biodance.identification.load_words import say_load

@@ -9,7 +9,7 @@ from biodance.errors import BiodanceError
 def refuse_page(path: Path, *, force: bool) -> None:
     """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
     if path.exists() and not force:
-        raise BiodanceError(f"{path}: exists and nothing is overwritten. Choose another --out, or --force.")
+        raise BiodanceError(f"{path}: exists already and is not overwritten. Choose another --out, or --force.")
     refuse_missing_folder(path)
 
 
