@@ -96,7 +96,7 @@ def test_without_identification_the_table_is_exported_and_that_is_said(lab, caps
 def test_where_to_write_is_checked_before_the_work(lab, monkeypatch, capsys):
     (lab / "old.csv").write_text("mine")
     monkeypatch.setattr("biodance.pipeline.export.export", None)
-    for out, said in (("nowhere/a.csv", "there is no such folder. Make it"), ("old.csv", "nothing is overwritten")):
+    for out, said in (("nowhere/a.csv", "there is no such folder. Make it"), ("old.csv", "is not overwritten")):
         assert run(["export", str(lab / "S01"), "--format", "csv", "--out", str(lab / out)]) == NOT_DONE
         assert said in capsys.readouterr().err
     assert (lab / "old.csv").read_text() == "mine"
