@@ -2,10 +2,13 @@
 refused.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.provenance import provenance
@@ -145,8 +148,23 @@ def refused_session() -> SessionResult:
     )
 
 
+LEFT = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
+FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
+WHOLE = Diagnosis("nothing wrong", ())
+VERDICTS = (
+    WHOLE,
+    replace(WHOLE, verdict="named, complete", findings=(FOUND,)),
+    replace(WHOLE, verdict="named, incomplete", findings=(FOUND,), adequacy=LEFT),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, resembles=(FOUND,)),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, doubt="standing alone tells no cause"),
+    replace(WHOLE, verdict="unexplained"),
+)
+"""Every verdict, with what may stand beside it."""
+
 TIME = "2026-01-01T00:00:00Z"
 
 
 def html_of(result: SessionResult, created: str = TIME) -> str:
+    """Return the session's page, made at a fixed time."""
     return page(result, provenance(result, created=created))

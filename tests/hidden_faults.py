@@ -39,6 +39,7 @@ def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
 
 
 def found(folder: Path, monkeypatch: pytest.MonkeyPatch, *, without: tuple[str, ...] = ()) -> Diagnosis:
+    """Diagnose the session of a folder, with all effects but those ``without``."""
     chosen = tuple(name for name in (*effects(), *discrete_effects()) if name not in without) if without else None
     return diagnose_session(examined(folder, monkeypatch), effects=chosen).diagnosis
 

@@ -54,6 +54,15 @@ def test_markers_flung_about_say_nothing_of_names() -> None:
         assert set(exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), (static, trial), Path())))) == told
 
 
+def test_an_object_in_the_room_hides_no_exchange() -> None:
+    static, walk = visit(speed=1.5)
+    walk = renamed(walk, HEAD)
+    names, xyz = (*walk.markers.names, "corner"), walk.markers.xyz
+    far = np.full((len(xyz), 1, 3), 6.0)
+    trial = replace(walk, markers=Markers(names, walk.markers.time, np.concatenate([xyz, far], axis=1)))
+    assert set(exchanges(Recorded(Session(Subject(62.0, 1.7, "F"), (static, trial), Path())))) == {"fit"}
+
+
 def bent(trial: Trial, degrees: float) -> Trial:
     """Return the trial with the left finger's marker turned about the wrist, to the back of the hand or (below zero)
     to the palm.

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from found_loads import GAIN, NOTHING, OWN, found
 from human_cases import human_case
 from identified_sessions import session_result
 
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.effects.added_mass import AddedMass
-from biodance.identification.added_mass import LoadCandidate, LoadSearch
 from biodance.identification.load_place import nearest_segment
-from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.identification.load_words import say_load
 from biodance.motion.kinematics import poses
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -21,22 +20,6 @@ from biodance.pipeline.trial_result import Check
 from biodance.report.documents.diagnosis import diagnosis_document
 from biodance.report.documents.identification import added_mass_document
 from biodance.report.wording import sizes_in_words
-
-PLACE = np.array([0.01, -0.12, 0.02])
-NOTHING = Diagnosis("nothing wrong", ())
-GAIN = Finding("plate_gain", "Fz", (Estimate("gain", 0.04, 0.01, "1"),), (Alias("plate_gain", "Fz", 9.0),), 0.2)
-OWN = Finding(
-    "added_mass", "left_thigh", (Estimate("mass", 1.9, 0.2, "kg"),), (Alias("added_mass", "left_thigh", 30.0),), 0.1
-)
-
-
-def found(*shares: tuple[str, float], lies_on: str = "", doubts: tuple[str, ...] = ()) -> LoadSearch:
-    """Return the search that found 2.4 kg on segments with these probabilities."""
-    weight = np.exp(-0.5 * ((MASSES - 2.4) / 0.3) ** 2) * np.gradient(MASSES)
-    posterior = LoadPosterior(0.0, weight / weight.sum())
-    suspects = tuple(LoadCandidate(name, posterior, PLACE, 0.1 * PLACE, 20.0, p, 0.8) for name, p in shares)
-    return LoadSearch(suspects, 1e-6, "session before", doubts, lies_on)
-
 
 FOREARM = (("left_forearm_hand", 0.8), ("left_upper_arm", 0.2))
 

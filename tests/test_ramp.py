@@ -1,8 +1,8 @@
 """A walk on a ramp is read, tracked and judged as on the level.
 
-Truth by construction: with z' = z + s x for every point of mass, forces become Fz' = Fz + s Fx, and moments about the
-origin of the floor lose s Mz about x. That is exact, whatever the masses; a real walk on the level becomes one up or
-down a ramp, whose person is bent by the ramp's angle.
+Truth by construction: with z' = z + s x for every point of mass, forces become Fz' = Fz + s Fx, and Mx, about an
+origin on the floor, becomes Mx - s Mz (likewise with y). That is exact, whatever the masses; a real walk on the level
+becomes one up or down a ramp, whose person is bent by the ramp's angle.
 """
 
 from dataclasses import replace

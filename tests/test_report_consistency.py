@@ -9,13 +9,12 @@ from dataclasses import replace
 from io import StringIO
 
 import pytest
-from example_results import full_session
+from example_results import FOUND, LEFT, VERDICTS, WHOLE, full_session
 from rich.console import Console
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
-from biodance.diagnosis.consequence import Adequacy
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, UNUSUAL_BODY
 from biodance.pipeline.attention import _checked, headline, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -36,18 +35,6 @@ WELL = re.compile(
     re.IGNORECASE,
 )
 """What may not stand beside a failed check: an unlimited "nothing wrong", "complete" and their like."""
-LEFT = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
-FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
-WHOLE = Diagnosis("nothing wrong", ())
-VERDICTS = (
-    WHOLE,
-    replace(WHOLE, verdict="named, complete", findings=(FOUND,)),
-    replace(WHOLE, verdict="named, incomplete", findings=(FOUND,), adequacy=LEFT),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, resembles=(FOUND,)),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, doubt="standing alone tells no cause"),
-    replace(WHOLE, verdict="unexplained"),
-)
 CHECKS = tuple(
     Check(what, "walk <1>", "9 units", "at most 5 units", False, "Look.")
     for what in (

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from example_results import full_session, html_of
+from found_loads import GAIN, NOTHING, OWN, found
 from identified_sessions import session_result
-from test_load_record import GAIN, NOTHING, OWN, found
-from test_report_page import full_session, html_of
 
 from biodance.identification.load_words import say_load
 from biodance.pipeline.load import as_diagnosed

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import pytest
 from diagnosed_sessions import body
-from example_results import full_session
+from example_results import FOUND, VERDICTS, full_session
 
-from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.effects import Gate, effects
 from biodance.pipeline.attention import (
@@ -20,8 +19,6 @@ from biodance.pipeline.attention import (
 from biodance.pipeline.finding_words import EXPLAINS, in_words
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, strongest_first
-
-FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
 
@@ -37,18 +34,7 @@ STATIC = Judged("static", 3.0)
 def sessions():
     """Yield every verdict beside every check and trial, as `reconcile_with_checks` says it."""
     result = full_session()
-    left = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
-    whole = Diagnosis("nothing wrong", ())
-    some = (
-        whole,
-        replace(whole, verdict="named, complete", findings=(FOUND,)),
-        replace(whole, verdict="named, incomplete", findings=(FOUND,), adequacy=left),
-        replace(whole, verdict="unexplained", adequacy=left),
-        replace(whole, verdict="unexplained", adequacy=left, resembles=(FOUND,)),
-        replace(whole, verdict="unexplained", adequacy=left, doubt="standing alone tells no cause"),
-        replace(whole, verdict="unexplained"),
-    )
-    for one, check, row in itertools.product(some, (GOOD, BAD, HEAVY), ((STATIC,), (STATIC, WALK), (WALK,))):
+    for one, check, row in itertools.product(VERDICTS, (GOOD, BAD, HEAVY), ((STATIC,), (STATIC, WALK), (WALK,))):
         trials = tuple(replace(trial, checks=()) for trial in result.trials)
         yield one, check, row, reconcile_with_checks(one, replace(result, trials=trials, checks=(check,)), row)
 

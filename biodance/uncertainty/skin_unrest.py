@@ -43,7 +43,7 @@ class SkinUnrest:
 
     def sizes(self) -> tuple[Array, Array]:
         """Return (B,) m of the waves and of the swing: the middle marker, as one that is wrong tells nothing."""
-        return tuple(np.sqrt(_middle(one)[:, 0]) for one in (self.waves, self.swing))  # type: ignore[return-value]
+        return np.sqrt(_middle(self.waves)[:, 0]), np.sqrt(_middle(self.swing)[:, 0])
 
     def excess(self, waves: tuple[float, ...], swing: tuple[float, ...]) -> Array:
         """Return (B, 3, M): power that is more than usual, where (B,) m of ``waves`` and ``swing`` are; of the waves

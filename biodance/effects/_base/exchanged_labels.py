@@ -41,7 +41,7 @@ def exchanged_pairs(
     in which both arms hang.
     """
     markers = trial.markers
-    if markers is None or not _on_a_person(markers):
+    if markers is None or not _on_a_person(markers, trial.marker_set):
         return frozenset()
     alone = {*crossed_sides(markers), *crossed_ends(markers)}
     if arms_hang(trial):
@@ -64,9 +64,13 @@ def exchanged_pairs(
     return frozenset(alone)
 
 
-def _on_a_person(markers: Markers) -> bool:
-    """Return whether the markers lie no farther apart than those on a person, but for a few frames."""
-    xyz = markers.xyz[np.isfinite(markers.xyz).any(axis=(1, 2))]
+def _on_a_person(markers: Markers, name: str) -> bool:
+    """Return whether the markers of the set of this ``name`` (of all, without one) lie no farther apart than those on a
+    person, but for a few frames.
+    """
+    worn = set(read_marker_set(name).match(markers.names).values()) if name else set(markers.names)
+    xyz = markers.xyz[:, [label in worn for label in markers.names]]
+    xyz = xyz[np.isfinite(xyz).any(axis=(1, 2))]
     span = np.nanmax(xyz, axis=1, initial=-np.inf) - np.nanmin(xyz, axis=1, initial=np.inf)
     return bool(np.mean(span.max(axis=1, initial=0.0) > _SPAN) <= _SPANNED) if len(xyz) else False
 
