@@ -3,7 +3,8 @@
 import numpy as np
 from diagnosed_sessions import about_plate, body, gain, known, looks
 
-from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, SEVERAL_CROSSTALKS, diagnose_trials
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
+from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, diagnose_trials
 
 
 def shifted(local, session):

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
 from biodance.diagnosis.diagnosis import Alias, Finding
-from biodance.diagnosis.engine import _with_less_evidence
+from biodance.diagnosis.doubt import _with_less_evidence
 from biodance.diagnosis.evidence import evidence, linear_posterior, smallest_detectable
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model

@@ -12,7 +12,7 @@ from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strai
 from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.engine import SIZE_VARIES, _is_reportable, diagnose_trials
+from biodance.diagnosis.engine import _is_reportable, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
@@ -47,7 +47,7 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
     assert (wrong.diagnosis.verdict, wrong.diagnosis.findings) == ("unexplained", ())
     like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
     assert like.varies_with
-    assert any(SIZE_VARIES in note for note in wrong.diagnosis.notes)
+    assert any("the size of this one hangs on" in note for note in wrong.diagnosis.notes)
     if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
         by_load = next(one for one in size_dependences(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
         assert by_load.share == pytest.approx(1.0, abs=0.35)

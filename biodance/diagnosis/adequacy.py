@@ -39,6 +39,10 @@ LOUDER, _LOUDEST = 1.15, 2.0
 most the second: 95 % of the family of laboratories (`virtual_lab.recording.family`, whose sizes are drawn with a
 standard deviation of 0.4 in their natural logarithm).
 """
+TORN = STRETCHED * _LOUDEST
+"""Standard deviations beyond which a tolerance is none in any laboratory: what is small was learned in few, and may be
+as many times as large in another one as that may be loud.
+"""
 _SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
 alone spreads more.

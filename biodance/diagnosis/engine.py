@@ -11,6 +11,7 @@ from biodance.diagnosis.adequacy import (
     LOUDER,
     STRAINED,
     STRETCHED,
+    TORN,
     adequacy,
     largest_z,
     residual_scale,
@@ -22,6 +23,7 @@ from biodance.diagnosis.adequacy import (
 )
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.doubt import WITHOUT_RESEMBLED, doubt_notes, is_doubt, only_resembled
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, cause_key, causes_of, name_causes, passes_threshold, without_cause
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
@@ -47,15 +49,10 @@ OUTSIDE_TOLERANCES = (
     "What the plates measured fits only if something that is small in every laboratory is many times as large here, "
     "and none of the causes looked for is it."
 )
-SEVERAL_CROSSTALKS = (
-    "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
-    "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+OUTSIDE_EVERY_LABORATORY = (
+    "It is so large that it would be none of what is small even where all of that is twice as large."
 )
-_OF_ASSESSMENT = (UNUSUAL_BODY, OUTSIDE_TOLERANCES, SEVERAL_CROSSTALKS)
-SIZE_VARIES = (
-    "is only what this resembles: a true cause has one size in every trial, band and channel, under every load and at "
-    "every place, and the size of this one hangs on"
-)
+_OF_ASSESSMENT = (UNUSUAL_BODY, OUTSIDE_TOLERANCES, OUTSIDE_EVERY_LABORATORY)
 NOISY_LABORATORY = (
     "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
     "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
@@ -163,8 +160,7 @@ def assess(examined: Examined) -> Examined:
     reportable = [pair for pair in every if _is_reportable(naming.found, pair[0])]
     conflicts = _conflict_notes(naming.found, named=bool(reportable))
     outcome = verdict(len(reportable), largest_z(remaining), one.gates, strained=bool(conflicts))
-    dubious = [pair for pair in reportable if _one_of_several(pair[0], named) or pair[1].varies_with]
-    doubted = _with_less_evidence(dubious, reportable)
+    doubted = only_resembled(reportable, named, known)
     if (
         outcome == "unexplained"
         and conflicts == (UNUSUAL_BODY,)
@@ -176,17 +172,15 @@ def assess(examined: Examined) -> Examined:
         doubted = [pair for pair in reportable if pair in doubted or pair not in stand]
         outcome = "named, incomplete" if len(doubted) < len(reportable) else outcome
     trusted = [] if outcome == "unexplained" else [pair for pair in reportable if pair not in doubted]
-    several = any(_one_of_several(cause, named) for cause, _ in reportable)
     if doubted and outcome != "unexplained":
         outcome = "named, incomplete" if trusted else "unexplained"
+    if doubted and not (trusted or conflicts) and largest_z(remaining) <= LIMIT:
+        bare = naming.bare
+        remaining, conflicts = adequacy(bare), (WITHOUT_RESEMBLED, *_conflict_notes(bare, named=False))
     if outcome == "named, complete" and any(row.z > LIMIT for row in remaining):
         outcome = "named, incomplete"
-    earlier = (note for note in one.notes if note not in _OF_ASSESSMENT and SIZE_VARIES not in note)
-    notes = (
-        *conflicts,
-        *((SEVERAL_CROSSTALKS,) if several else ()),
-        *(_dependence_note(pair[1]) for pair in reportable if pair[1].varies_with),
-    )
+    earlier = (note for note in one.notes if note not in _OF_ASSESSMENT and not is_doubt(note))
+    notes = (*conflicts, *doubt_notes(reportable, named, known))
     found = replace(
         one,
         verdict=outcome,
@@ -205,26 +199,6 @@ def _is_reportable(found: Model, cause: NamedCause) -> bool:
     it is there.
     """
     return matters(cause.effect, cause.theta) and (bool(cause.course) or changes_wrench(found, cause))
-
-
-def _dependence_note(one: Finding) -> str:
-    """Say that a cause is only resembled, because its size hangs on something."""
-    return f"{one.effect.replace('_', ' ')} {one.target}".strip() + f" {SIZE_VARIES} {one.varies_with}."
-
-
-def _with_less_evidence(
-    doubted: list[tuple[NamedCause, Finding]], large: list[tuple[NamedCause, Finding]]
-) -> list[tuple[NamedCause, Finding]]:
-    """Return the ``doubted`` causes with every cause of less evidence than the strongest of them: it explains what a
-    wrong model of another cause left, and is no surer than that model.
-    """
-    strongest = max((finding.log_bayes_factor for _, finding in doubted), default=-np.inf)
-    return [pair for pair in large if pair in doubted or pair[1].log_bayes_factor < strongest]
-
-
-def _one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:
-    """Return whether a cause that is believed only alone (`Effect.single`) was named at several targets."""
-    return one.effect.single and sum(other.effect.name == one.effect.name for other in named) > 1
 
 
 def is_moving(case: Case) -> bool:
@@ -265,8 +239,9 @@ def _conflict_notes(found: Model, *, named: bool) -> tuple[str, ...]:
     """
     once = with_strides_once(found)
     body = (strain(once) if named else strain_at_own_noise(once)) > STRAINED
-    rest = stretch(found) > STRETCHED
-    return (*((UNUSUAL_BODY,) if body else ()), *((OUTSIDE_TOLERANCES,) if rest else ()))
+    far = stretch(found)
+    said = (UNUSUAL_BODY, body), (OUTSIDE_TOLERANCES, far > STRETCHED), (OUTSIDE_EVERY_LABORATORY, far > TORN)
+    return tuple(note for note, holds in said if holds)
 
 
 def _relative(row: Unobservable) -> float:

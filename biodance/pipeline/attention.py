@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
-from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, SEVERAL_CROSSTALKS, UNUSUAL_BODY
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, WITHOUT_RESEMBLED
+from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES, UNUSUAL_BODY
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
@@ -254,10 +255,12 @@ def _sentence(beside: str) -> str:
 
 
 def _only_strange(one: Diagnosis) -> bool:
-    """Return whether a strange body alone speaks against "nothing wrong": how unlike the table people are was learned
-    from few laboratories, and clean people of another one are beyond it.
+    """Return whether nothing that is left speaks against "nothing wrong", only a strange body, a stretched tolerance or
+    a cause that is no more than resembled: how unlike the table people are, and how large what is small everywhere, was
+    learned from few laboratories, and clean sessions of others are beyond it.
     """
-    return UNUSUAL_BODY in one.notes and OUTSIDE_TOLERANCES not in one.notes and largest_z(one.adequacy) <= LIMIT
+    strange = any(note in one.notes for note in (UNUSUAL_BODY, OUTSIDE_TOLERANCES, WITHOUT_RESEMBLED))
+    return strange and OUTSIDE_EVERY_LABORATORY not in one.notes and largest_z(one.adequacy) <= LIMIT
 
 
 def _where(one: Diagnosis) -> str:
@@ -269,6 +272,8 @@ def _where(one: Diagnosis) -> str:
         return "what the plates measured fits only if something that is small elsewhere is many times as large here"
     if SEVERAL_CROSSTALKS in one.notes and largest_z(one.adequacy) <= LIMIT:
         return "what the plates measured fits only several cross-talks at once, as of a plate that lies elsewhere"
+    if WITHOUT_RESEMBLED in one.notes and largest_z(one.adequacy) <= LIMIT:
+        return "nothing is left that matters and is unlike sessions without fault, with and without what it resembles"
     if not rows:
         return "what is left is unlike sessions without fault"
     row = rows[0]

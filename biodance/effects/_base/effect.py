@@ -140,6 +140,12 @@ class Effect:
         """
         return None
 
+    def told_size(self, theta: Array) -> Array:
+        """Return (p,) the part of the size ``theta`` (p,) that says how large a cause is, without what only corrects
+        it; by default all.
+        """
+        return theta
+
     def measured(self, theta: Array, *cases: Case) -> Array:
         """Return the size (p,) of a cause that was named with ``theta`` (p,): where the markers of all ``cases`` show
         it by themselves, that, in place of what was inferred from all rows; by default ``theta``.

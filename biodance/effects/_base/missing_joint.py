@@ -84,6 +84,10 @@ class MissingJoint(Effect, ABC):
         angle = self.shown(*cases)[0]
         return np.array([angle, theta.sum() - angle])
 
+    def told_size(self, theta: Array) -> Array:
+        """Return the angle alone."""
+        return np.array([theta[0], 0.0])
+
     def possible(self, theta: Array) -> bool:
         """Return whether markers and wrench show a movement the same way: the joint turns by the sum of both."""
         return bool(theta.sum() > 0)
