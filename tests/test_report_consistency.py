@@ -15,7 +15,8 @@ from rich.console import Console
 from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
 from biodance.diagnosis.diagnosis import Diagnosis
-from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, UNUSUAL_BODY
+from biodance.diagnosis.doubt import WITHOUT_RESEMBLED
+from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES, UNUSUAL_BODY
 from biodance.pipeline.attention import _checked, headline, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.judged_trials import TOO_SHORT
@@ -92,12 +93,17 @@ def test_diagnose_begins_with_its_headline() -> None:
     assert screen.getvalue().startswith(found.diagnosis.attention[0].text)
 
 
-def test_a_strange_body_alone_is_no_alarm_and_something_left_beside_it_is() -> None:
+@pytest.mark.parametrize(
+    "notes",
+    [(UNUSUAL_BODY,), (OUTSIDE_TOLERANCES,), (UNUSUAL_BODY, OUTSIDE_TOLERANCES), (WITHOUT_RESEMBLED,)],
+    ids=("body", "tolerance", "both", "resembled"),
+)
+def test_what_is_strange_alone_is_no_alarm_and_something_left_beside_it_is(notes: tuple[str, ...]) -> None:
     quiet = (replace(LEFT[0], z=1.0),)
-    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=(UNUSUAL_BODY,), resembles=(FOUND,))
+    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=notes, resembles=(FOUND,))
     for one, level, begins in (
         (strange, "warn", "Cannot tell whether anything is wrong"),
-        (replace(strange, notes=(UNUSUAL_BODY, OUTSIDE_TOLERANCES)), "fail", "Something is wrong"),
+        (replace(strange, notes=(*notes, OUTSIDE_EVERY_LABORATORY)), "fail", "Something is wrong"),
         (replace(strange, adequacy=LEFT), "fail", "Something is wrong"),
     ):
         first = reconcile_with_checks(one, replace(FULL, checks=()), (STATIC,)).attention[0]
