@@ -53,13 +53,14 @@ def energies(found: Model) -> Array:
 
 
 def unlikely(found: Model) -> Array:
-    """Return (B, 6): how far `energies` are from sessions without fault that are as long as this one, in standard
-    deviations.
+    """Return (B, 6): how far `energies` are from sessions without fault that are as long and as loud as this one, in
+    standard deviations: what is louder in all bands and channels alike, up to `LOUDER`, is no sign of one of them.
 
     The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Mean
     squares are skewed; their cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
     """
-    where, known, mean = found.problem.spectrum, found.tolerances, energies(found)
+    where, known = found.problem.spectrum, found.tolerances
+    mean = energies(found) / min(residual_scale(found), LOUDER) ** 2
     count = np.maximum(1, np.bincount(where.band, minlength=len(BANDS)))[:, None]
     chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / _SECONDS)
     spread = np.sqrt(known.energy_sd**2 + chance)

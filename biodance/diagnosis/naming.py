@@ -11,7 +11,7 @@ from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Alias
-from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding
+from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding, with_unlike_causes
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import ScoredCandidate, screen
 from biodance.discovery import Chosen
@@ -101,8 +101,9 @@ def name_causes(
         if not passes_threshold(ranking, tolerances):
             break
         accepted.append(ranking)
+        settled = with_unlike_causes(settled, tolerances)
         again = needs_rebuilding(settled) and strain(settled) <= STRAINED
-        found, causes = rebuild_model(settled, tolerances, chosen) if again else (settled, causes)
+        found, causes = rebuild_model(settled, settled.tolerances, chosen) if again else (settled, causes)
         ranking = Round(
             tuple(one for one in screen(found, causes) if one.names not in {cause_key(n) for n in found.named})
         )
