@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, known, looks, redrawn
 
-from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
+from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, energies, strain, unlikely, verdict
+from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.effects import Gate
@@ -23,6 +24,27 @@ def test_chance_spreads_more_in_a_short_session() -> None:
         worst.append(adequacy(found)[0].z)
     assert max(worst) < LIMIT
     assert max(worst) > 1.0, "the rows still spread"
+
+
+def test_what_is_louder_in_all_bands_alike_is_no_alarm_up_to_what_laboratories_differ_by() -> None:
+    """Numbers that spread by a tenth: a seventh more everywhere is nothing, a half more is 3.6 standard deviations
+    beyond that, and a seventh more in Fy alone is three.
+    """
+    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    left, nothing, rows = found.posterior.residual, 0 * found.posterior.mean, 6 * found.problem.spectrum.band.size
+    usual = replace(found.tolerances, energy=energies(found), energy_sd=0.1 * energies(found))
+
+    def z(louder: np.ndarray) -> np.ndarray:
+        y = np.array(left)
+        y[:rows] = (left[:rows].reshape(-1, 6) * louder).ravel()
+        posterior = LinearPosterior(found.posterior.X, y, found.posterior.factor, nothing)
+        return unlikely(replace(found, tolerances=usual, posterior=posterior))
+
+    assert np.abs(z(np.full(6, 1.14))).max() < 0.1
+    assert z(np.full(6, 1.5)).min() > 3.0
+    one = z(1 + 0.14 * np.eye(6)[1])
+    assert one[:, 1].min() > 2.0
+    assert np.abs(np.delete(one, 1, axis=1)).max() < 0.1
 
 
 def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:

@@ -121,6 +121,8 @@ class Model:
 
     def under(self, tolerances: Tolerances) -> "Model":
         """Return the model with the noise of the plates as in ``tolerances``, all else as it is."""
+        if tolerances is self.tolerances:
+            return self
         band, mass = self.problem.spectrum.band, _body_mass(self.problem)
         turn = tolerances.whiteners(mass) @ np.linalg.inv(self.tolerances.whiteners(mass))
         both = np.concatenate([self.posterior.X, self.posterior.y[:, None]], axis=1)

@@ -84,11 +84,9 @@ def name_causes(
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
-    first, first_causes = build_model(problem, tolerances, chosen, every)
-    found, causes = first, first_causes
-    screening = Round(screen(found, causes))
+    first, first_causes = found, causes = build_model(problem, tolerances, chosen, every)
+    ranking = screening = Round(screen(found, causes))
     accepted: list[Round] = []
-    ranking = screening
     if rounds and passes_threshold(screening, tolerances) and is_much_heavier(found):
         found = replace(found, problem=found.problem.with_matter(found.phi))
         found, causes = rebuild_model(found, tolerances, chosen)
@@ -108,6 +106,8 @@ def name_causes(
             tuple(one for one in screen(found, causes) if one.names not in {cause_key(n) for n in found.named})
         )
     found, kept = drop_weak_causes(found, tuple(accepted))
+    if len(kept) < len(accepted):
+        found = settle(with_unlike_causes(found, tolerances), found.named)
     return Naming(first, found, kept, screening, first_causes, bare)
 
 
