@@ -75,7 +75,7 @@ def test_the_noise_grows_in_the_bands_and_channels_of_the_cause_alone_and_goes_w
 
 
 def test_a_small_cause_changes_nothing() -> None:
-    found, _, _ = named(1.0)
+    found, _, _ = named(0.5)
     assert with_unlike_causes(found, found.tolerances) is found
 
 
