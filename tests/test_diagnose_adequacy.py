@@ -37,7 +37,7 @@ def test_chance_spreads_more_in_a_short_session() -> None:
     assert max(worst) > 1.0, "the rows still spread"
 
 
-def test_what_is_louder_in_all_bands_alike_is_no_alarm_up_to_what_laboratories_differ_by() -> None:
+def test_a_session_louder_in_all_bands_alike_is_no_alarm() -> None:
     """Numbers that spread by a tenth: a seventh more everywhere is nothing, a half more three standard deviations
     beyond that, and a seventh more in Fy alone two.
     """

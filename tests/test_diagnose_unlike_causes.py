@@ -41,7 +41,7 @@ def told(newton: float, late: float):
     return diagnose_trials(body(), some, tolerances=known(), effects=every)
 
 
-def test_what_a_model_that_is_not_quite_right_leaves_is_neither_an_alarm_nor_a_cause() -> None:
+def test_what_the_model_of_a_name_leaves_is_nothing() -> None:
     """Of 50 N that are 0.1 rad late, 5 N are left, eight times the noise."""
     one = told(50.0, 0.1).diagnosis
     assert [finding.effect for finding in one.findings] == ["cable"]
@@ -60,7 +60,7 @@ def named(newton: float):
     return settle(bare, (NamedCause(Cable(), np.array([newton]), np.empty((0, 0))),)), bare, every
 
 
-def test_the_noise_grows_in_the_bands_and_channels_of_the_cause_alone_and_goes_with_its_name() -> None:
+def test_the_noise_grows_where_the_cause_is_and_goes_with_it() -> None:
     found, bare, _ = named(50.0)
     wide = with_unlike_causes(found, found.tolerances)
     sd = np.sqrt(np.diagonal(wide.tolerances.noise, axis1=1, axis2=2))
