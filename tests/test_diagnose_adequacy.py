@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, known, looks, redrawn
 
-from biodance.diagnosis.adequacy import LIMIT, STRAINED, adequacy, strain, verdict
+from biodance.diagnosis.adequacy import (
+    LIMIT,
+    STRAINED,
+    adequacy,
+    energies,
+    loudness,
+    strain,
+    strain_at_loudness,
+    strain_at_own_noise,
+    unlikely,
+    verdict,
+)
+from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.effects import Gate
@@ -23,6 +35,27 @@ def test_chance_spreads_more_in_a_short_session() -> None:
         worst.append(adequacy(found)[0].z)
     assert max(worst) < LIMIT
     assert max(worst) > 1.0, "the rows still spread"
+
+
+def test_a_session_louder_in_all_bands_alike_is_no_alarm() -> None:
+    """Numbers that spread by a tenth: a seventh more everywhere is nothing, a half more three standard deviations
+    beyond that, and a seventh more in Fy alone two.
+    """
+    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    left, nothing, rows = found.posterior.residual, 0 * found.posterior.mean, 6 * found.problem.spectrum.band.size
+    usual = replace(found.tolerances, energy=energies(found), energy_sd=0.1 * energies(found))
+
+    def z(louder: np.ndarray) -> np.ndarray:
+        y = np.array(left)
+        y[:rows] = (left[:rows].reshape(-1, 6) * louder).ravel()
+        posterior = LinearPosterior(found.posterior.X, y, found.posterior.factor, nothing)
+        return unlikely(replace(found, tolerances=usual, posterior=posterior))
+
+    assert np.abs(z(np.full(6, 1.14))).max() < 0.2
+    assert z(np.full(6, 1.5))[1:].min() > 3.0
+    one = z(1 + 0.14 * np.eye(6)[1])
+    assert one[2:, 1].min() > 1.9
+    assert np.abs(np.delete(one, 1, axis=1)).max() < 0.2
 
 
 def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
@@ -42,6 +75,24 @@ def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
     assert 0.8 < usual.std() < 1.2
     assert usual.max() < STRAINED
     assert np.median([strained(2.0) for _ in range(20)]) > STRAINED
+
+
+def test_a_strange_body_is_excused_by_a_loud_session_and_not_by_one_loud_channel() -> None:
+    """Noise everywhere moves the body; noise of Fy alone is what a fault leaves there."""
+    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    rows, rng = 6 * found.problem.spectrum.band.size, np.random.default_rng(7)
+    drawn = [redrawn(found, rng, unlike=3.0, loud=1.1) for _ in range(20)]
+    louder = [one for one in drawn if loudness(one) > 1.05 and strain(one) > STRAINED]
+    assert len(louder) > 5
+    assert all(strain_at_loudness(one) < strain(one) for one in louder)
+    assert any(strain_at_loudness(one) > STRAINED for one in louder)
+    quiet = redrawn(found, rng, unlike=3.0, loud=0.8)
+    y = np.array(quiet.posterior.y)
+    y[1:rows:6] += 3.0 * rng.normal(size=rows // 6)
+    one_channel = replace(quiet, posterior=LinearPosterior.for_target(quiet.posterior.X, quiet.posterior.factor, y))
+    assert strain(one_channel) > STRAINED
+    assert strain_at_loudness(one_channel) == pytest.approx(strain(one_channel), rel=1e-9)
+    assert strain_at_own_noise(one_channel) < strain(one_channel)
 
 
 def test_a_strained_body_is_never_complete() -> None:

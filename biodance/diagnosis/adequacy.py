@@ -57,13 +57,14 @@ def energies(found: Model) -> Array:
 
 
 def unlikely(found: Model) -> Array:
-    """Return (B, 6): how far `energies` are from sessions without fault that are as long as this one, in standard
-    deviations.
+    """Return (B, 6): how far `energies` are from sessions without fault that are as long and as loud as this one, in
+    standard deviations: what is louder in all bands and channels alike, up to `LOUDER`, is no sign of one of them.
 
     The mean of n squares has the variance 2 energy² / n, of which the learned spread holds that of long sessions. Mean
     squares are skewed; their cube root is nearly normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
     """
-    where, known, mean = found.problem.spectrum, found.tolerances, energies(found)
+    where, known = found.problem.spectrum, found.tolerances
+    mean = energies(found) / loudness(found) ** 2
     count = np.maximum(1, np.bincount(where.band, minlength=len(BANDS)))[:, None]
     chance = 2 * known.energy**2 / count * max(0.0, 1 - where.seconds / _SECONDS)
     spread = np.sqrt(known.energy_sd**2 + chance)
@@ -77,6 +78,11 @@ def residual_scale(found: Model) -> float:
     """
     square = float(np.median(energies(found) / found.tolerances.energy))
     return float(np.clip(np.sqrt(square), 1.0, _LOUDEST))
+
+
+def loudness(found: Model) -> float:
+    """Return the `residual_scale` as far as it is no sign of anything: at most `LOUDER`."""
+    return min(residual_scale(found), LOUDER)
 
 
 def sizes(found: Model) -> Array:
@@ -155,6 +161,14 @@ def strain(found: Model) -> float:
         return 0.0
     spread = 2 / 9 * float(np.sum(weight**2) / weight.sum() ** 2)
     return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
+
+
+def strain_at_loudness(found: Model) -> float:
+    """Return `strain`; where it exceeds `STRAINED`, recompute it with the noise of a session as loud as this one is in
+    all bands and channels alike (`loudness`): no fault of one band or channel excuses a strange body.
+    """
+    plain = strain(found)
+    return plain if plain <= STRAINED else strain(_weighed(found, np.full((len(BANDS), 6), 1 / loudness(found))))
 
 
 def strain_at_own_noise(found: Model) -> float:

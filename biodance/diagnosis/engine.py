@@ -15,7 +15,7 @@ from biodance.diagnosis.adequacy import (
     adequacy,
     largest_z,
     residual_scale,
-    strain,
+    strain_at_loudness,
     strain_at_own_noise,
     stretch,
     verdict,
@@ -235,10 +235,10 @@ def without_name(examined: Examined, index: int) -> Examined:
 
 def _conflict_notes(found: Model, *, named: bool) -> tuple[str, ...]:
     """Say what had to be unlike people or laboratories for the rest to fit; where a cause is ``named``, it has to fit
-    without any excuse.
+    without any excuse but how loud the session is.
     """
     once = with_strides_once(found)
-    body = (strain(once) if named else strain_at_own_noise(once)) > STRAINED
+    body = (strain_at_loudness(once) if named else strain_at_own_noise(once)) > STRAINED
     far = stretch(found)
     said = (UNUSUAL_BODY, body), (OUTSIDE_TOLERANCES, far > STRETCHED), (OUTSIDE_EVERY_LABORATORY, far > TORN)
     return tuple(note for note, holds in said if holds)

@@ -18,10 +18,17 @@ from biodance.effects import Effect
 from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.joints import joint_of
+from biodance.uncertainty.session_noise import with_own_noise
 from biodance.uncertainty.tolerances import HABIT, Tolerances, in_state, key_of, mean_key, whitened
 
 _HEAVIER = 0.3
 """Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
+UNLIKE = 0.07
+"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at
+are no better at the upper edge of the bands."""
+_NOTICED = 0.1
+"""Share by which the noise of any channel and band must grow before it is taken for larger.
+"""
 _STALE = 0.03
 """Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
 this share.
@@ -111,6 +118,18 @@ class Model:
             for p in columns.parts
         )
         return replace(columns, parts=tuple(parts))
+
+    def under(self, tolerances: Tolerances) -> "Model":
+        """Return the model with the noise of the plates as in ``tolerances``, all else as it is."""
+        if tolerances is self.tolerances:
+            return self
+        band, mass = self.problem.spectrum.band, _body_mass(self.problem)
+        turn = tolerances.whiteners(mass) @ np.linalg.inv(self.tolerances.whiteners(mass))
+        both = np.concatenate([self.posterior.X, self.posterior.y[:, None]], axis=1)
+        wrench = both[: 6 * band.size].reshape(band.size, 6, -1)
+        for b, matrix in enumerate(turn.astype(both.dtype)):
+            wrench[band == b] = matrix @ wrench[band == b]
+        return replace(self, tolerances=tolerances, posterior=linear_posterior(both[:, :-1], both[:, -1]))
 
     def without_causes(self, named: tuple[NamedCause, ...]) -> "Model":
         """Return the model with the contributions of the causes ``named`` removed from the target."""
@@ -211,6 +230,23 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     first = problem.sip.shape[1]
     own = {n: (slice(first + c.start, first + c.stop), u * sizes[c]) for n, (c, u) in known.causes.items()}
     return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected, tolerated=own)
+
+
+def with_unlike_causes(found: Model, known: Tolerances) -> Model:
+    """Return the model with the noise of the ``known`` tolerances and, beside it, what the named causes leave because
+    no cause is quite like its model: `UNLIKE` of what each adds to the wrench, per band. Causes that come and go have
+    a course of their own, which fits what is there.
+    """
+    band = found.problem.spectrum.band
+    added = np.zeros_like(known.noise)
+    for one in (one for one in found.named if not one.course):
+        rows = UNLIKE * removed(found.problem, one.effect, one.theta)[: 6 * band.size].reshape(-1, 6)
+        for b in range(1, len(added)):
+            added[b] += rows[band == b].T @ rows[band == b] / max(1, np.sum(band == b))
+    wider = with_own_noise(known, added, _body_mass(found.problem))
+    noise = np.diagonal(found.tolerances.noise, axis1=1, axis2=2)
+    grown = np.diagonal(wider.noise, axis1=1, axis2=2) / noise
+    return found.under(wider) if np.abs(grown - 1).max() > _NOTICED else found
 
 
 def is_much_heavier(found: Model) -> bool:

@@ -11,7 +11,7 @@ from biodance.diagnosis.adequacy import STRAINED, strain
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Alias
-from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding
+from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding, with_unlike_causes
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import ScoredCandidate, screen
 from biodance.discovery import Chosen
@@ -84,11 +84,9 @@ def name_causes(
 
     What a body predicts that is unlike people is not believed: causes are then not predicted again.
     """
-    first, first_causes = build_model(problem, tolerances, chosen, every)
-    found, causes = first, first_causes
-    screening = Round(screen(found, causes))
+    first, first_causes = found, causes = build_model(problem, tolerances, chosen, every)
+    ranking = screening = Round(screen(found, causes))
     accepted: list[Round] = []
-    ranking = screening
     if rounds and passes_threshold(screening, tolerances) and is_much_heavier(found):
         found = replace(found, problem=found.problem.with_matter(found.phi))
         found, causes = rebuild_model(found, tolerances, chosen)
@@ -101,12 +99,15 @@ def name_causes(
         if not passes_threshold(ranking, tolerances):
             break
         accepted.append(ranking)
+        settled = with_unlike_causes(settled, tolerances)
         again = needs_rebuilding(settled) and strain(settled) <= STRAINED
-        found, causes = rebuild_model(settled, tolerances, chosen) if again else (settled, causes)
+        found, causes = rebuild_model(settled, settled.tolerances, chosen) if again else (settled, causes)
         ranking = Round(
             tuple(one for one in screen(found, causes) if one.names not in {cause_key(n) for n in found.named})
         )
     found, kept = drop_weak_causes(found, tuple(accepted))
+    if len(kept) < len(accepted):
+        found = settle(with_unlike_causes(found, tolerances), found.named)
     return Naming(first, found, kept, screening, first_causes, bare)
 
 

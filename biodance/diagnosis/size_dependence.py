@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
-from biodance.diagnosis.model import Model, NamedCause
+from biodance.diagnosis.model import UNLIKE, Model, NamedCause
 from biodance.diagnosis.naming import cause_key
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import absorbed
@@ -30,9 +30,6 @@ from biodance.uncertainty.bands import BANDS
 
 _SAME = 1e-6
 """Share of the largest trace that must be left of one beside everything else, to be asked about at all."""
-_UNLIKE = 0.07
-"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at
-are no better at the upper edge of the bands."""
 _STEP = 0.1
 """m of place, as wide as a foot."""
 
@@ -84,7 +81,7 @@ def _of_one(found: Model, named: NamedCause) -> Iterator[SizeDependence]:
     s, alone = Z.T @ found.posterior.residual, np.sum(Z**2, axis=0) - np.sum(half**2, axis=0)
     other = s + _lost_to_errors(found, named, over)
     s = np.where(s * other > 0, np.where(np.abs(s) < np.abs(other), s, other), 0.0)
-    unlike = max(_UNLIKE, found.tolerances.model_error(named.effect.name))
+    unlike = max(UNLIKE, found.tolerances.model_error(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
     seen = alone - np.sum(absorbed(found, Z, half) ** 2, axis=0)
     for name, score, own in zip(over, s, seen, strict=True):

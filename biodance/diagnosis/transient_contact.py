@@ -75,7 +75,8 @@ def with_transient_contact(naming: Naming, chosen: Chosen[Effect] = None) -> Nam
     """
     if largest_z(adequacy(naming.found)) <= LIMIT:
         return naming
-    best, steady = naming, log_bayes_factor_between(naming.found, naming.bare)
+    best, bare = naming, naming.bare.under(naming.found.tolerances)
+    steady = log_bayes_factor_between(naming.found, bare)
     for base, accepted, than in ((naming.bare, (), steady), (naming.found, naming.accepted, 0.0)):
         tried = _with(naming, base, accepted, chosen, than=than)
         if tried is not None and largest_z(adequacy(tried.found)) < largest_z(adequacy(best.found)):
