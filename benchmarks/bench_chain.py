@@ -105,7 +105,7 @@ def session(folder: Path, number: int, subject: Subject, motion: str, way: Way) 
 
 def row(folder: Path, number: int, subject: Subject, motion: str, way: Way) -> dict[str, Any]:
     """Return what a session gave: true, table's and identified mass (N,) kg and CoM (N, 3) m with standard deviations,
-    and the residuals of the kept squats, table and identified, N and N·m.
+    and the residuals of the kept squats, table and identified, N and N·m (NaN where none can be used).
     """
     kept = folder / "rows" / f"{number}_{motion}_{way.name}.json"
     if not kept.exists():
@@ -136,7 +136,8 @@ def identified(place: Path) -> dict[str, Any]:
         return np.array([getattr(k[0], name) for k in rows]).reshape(len(true.segments), -1)
 
     mass, com = ("mass",), ("com x", "com y", "com z")
-    rms = np.array([[v.table_agreement.rms, v.identified_agreement.rms] for v in one.validations]).mean(axis=0)
+    pairs = [[v.table_agreement.rms, v.identified_agreement.rms] for v in one.validations] or np.full((1, 2, 6), np.nan)
+    rms = np.mean(pairs, axis=0)
     phi = true.phi.reshape(-1, 10)
     table = {"mass": body.sip.mass[:, None], "com": body.sip.com}
     return {
