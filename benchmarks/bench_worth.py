@@ -97,10 +97,11 @@ def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[s
     static = next(one.motion for one in result.trials if one.trial.role == "static")
     assert body is not None
     assert static is not None
-    mass, com, _ = truth(body, static, json.loads(place.with_name(f"{place.name}.truth.json").read_text())["segments"])
+    document = json.loads(place.with_name(f"{place.name}.truth.json").read_text())
+    mass, com, own_com = truth(body, static, document["segments"])
     sd = deviations(sip)
     return {
-        "true": {"mass": mass[:, None], "com": com},
+        "true": {"mass": mass[:, None], "com": com, "own_com": own_com},
         "table": {"mass": body.sip.mass[:, None], "com": body.sip.com},
         "identified": {"mass": sip.mass[:, None], "com": sip.com},
         "sd": {"mass": sd[:, :1], "com": sd[:, 1:]},
