@@ -78,6 +78,7 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
         np.concatenate([a, b])[order]
         for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
     )
+    q = problem.chart.continue_sets(q)
     status = np.where(verdict.determined, FrameStatus.SOLVED, FrameStatus.LEANING).astype(np.int8)
     status[slope > tolerance] = FrameStatus.STOPPED
     residual = np.where(chosen.seen, marker_distances(problem, q), np.nan)

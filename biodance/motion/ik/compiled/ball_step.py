@@ -17,6 +17,10 @@ _UPRIGHT = 0.3
 """Cosine of the second angle above which the angles are a good measure of the rotation."""
 
 
+_EDGE = 1e-9
+"""rad beyond a limit that are rounding."""
+
+
 @compiled
 def quaternion_of(sign, one, two, three):
     """Return the quaternion x, y, z, w of Cardan angles, rad."""
@@ -66,7 +70,7 @@ def beyond(angle, lower, upper):
 
 @compiled
 def angles_of(quaternion, sign, near, lower, upper, out):
-    """Fill ``out`` (3,) with that set of Cardan angles which lies inside the limits; if both or none do, the one
+    """Fill ``out`` (3,) with that set of Cardan angles which lies less outside the limits; if both do alike, the one
     closer to ``near``.
     """
     x, y, z, w = quaternion
@@ -85,7 +89,7 @@ def angles_of(quaternion, sign, near, lower, upper, out):
     other = beyond(a1, lower[0], upper[0]) + beyond(b1, lower[1], upper[1]) + beyond(c1, lower[2], upper[2])
     away = abs(a0 - near[0]) + abs(b0 - near[1]) + abs(c0 - near[2])
     away_other = abs(a1 - near[0]) + abs(b1 - near[1]) + abs(c1 - near[2])
-    if other < outside or (other == outside and away_other < away):
+    if other < outside - _EDGE or (other < outside + _EDGE and away_other < away):
         out[0], out[1], out[2] = a1, b1, c1
     else:
         out[0], out[1], out[2] = a0, b0, c0
