@@ -70,53 +70,29 @@ def _unit(quaternion: Array) -> Array:
 
 
 def ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
-    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B): of the two sets that every rotation has (and
-    any number of full turns) the one closest to ``near`` (3, G, B).
+    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
+
+    Every rotation has two sets of Cardan angles (and any number of full turns): that closer to ``near`` (3, G, B) is
+    taken.
     """
     x, y, z, w = quaternion
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
-    one = sign * np.stack(
+    one = np.stack(
         [
             np.arctan2(2 * (x * w - y * z), 1 - 2 * (x * x + y * y)),
             np.arcsin(sine),
             np.arctan2(2 * (z * w - x * y), 1 - 2 * (y * y + z * z)),
         ]
     )
-    return np.where(_apart(equal_set(one), near) < _apart(one, near), *(_turned_near(a, near) for a in (equal_set(one), one)))
-
-
-def equal_set(angles: Array) -> Array:
-    """Return the other Cardan angles (3, G, B) rad, up to full turns, of the rotations of ``angles`` (3, G, B)."""
-    return np.stack([np.pi + angles[0], np.pi - angles[1], np.pi + angles[2]])
-
-
-def _apart(one: Array, other: Array) -> Array:
-    """Return how far sets of Cardan angles (3, G, B) rad lie apart (G, B), full turns left out."""
-    return np.abs(_turned_near(one - other, np.zeros(1))).sum(axis=0)
+    first = _turned_near(sign * one, near)
+    other = _turned_near(sign * (np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one), near)
+    away, other_away = (np.abs(angles - near).sum(axis=0) for angles in (first, other))
+    return np.where(other_away < away, other, first)
 
 
 def _turned_near(angles: Array, middle: Array) -> Array:
     """Return ``angles`` plus full turns, within half a turn of ``middle``."""
     return middle + (angles - middle + np.pi) % (2 * np.pi) - np.pi
-
-
-_TIE = 1e-6
-"""rad: of two sets equally near to the frame before the one with the smaller second angle is taken."""
-
-
-def _continuing(small: Array, large: Array, small_allowed: Array, large_allowed: Array) -> Array:
-    """Return (G, B) whether each frame continues with the ``large`` (3, G, B) rad of its two equal sets, not the
-    ``small``: as the only one allowed, else as the nearest to what the frame before it has.
-
-    The two sets of a frame lie to those of the next as each other's image: whether to change over is known beforehand.
-    """
-    before = np.concatenate([np.zeros_like(small[..., :1]), small[..., :-1]], axis=-1)
-    change = np.cumsum(_apart(large, before) < _apart(small, before) - _TIE, axis=-1)
-    fixed = np.where(small_allowed & large_allowed, -1, np.arange(small.shape[-1]))
-    last = np.maximum.accumulate(fixed, axis=-1)
-    since = change - np.where(last < 0, 0, np.take_along_axis(change, np.maximum(last, 0), axis=-1))
-    start = (last >= 0) & ~np.take_along_axis(small_allowed, np.maximum(last, 0), axis=-1)
-    return np.asarray(start ^ (since % 2 == 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,14 +117,10 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G,
-    1) rad of the balls.
-    """
+    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others."""
 
     joints: Balls
     single: Index
-    lower: Array
-    upper: Array
     n_root: int
 
     @property
@@ -177,8 +149,8 @@ class Chart:
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
     def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B); quaternions are normalised here; of equal sets of Cardan angles those closest to ``near``
-        (n, B) rad are taken.
+        """Return q (nq, B); quaternions are normalised here; of equal sets of Cardan angles that closer to ``near``
+        (n, B) rad is taken.
         """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
@@ -187,41 +159,10 @@ class Chart:
             angles[self.joints.first + k] = ball[k]
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles
 
-    def continue_sets(self, q: Array) -> Array:
-        """Return q (B, nq), consecutive postures within the limits, each ball joint with that of its two equal sets of
-        Cardan angles, among those within the limits, which goes on from the frame before (the first from zero).
-
-        Rotations stay as they are. A choice frame by frame hangs on the last digits of the search: both sets fit alike.
-        """
-        first = q.shape[1] - self.joint_count
-        found = self.joints.angles_of(q[:, first:].T)
-        other = self._within_a_turn(equal_set(found))
-        turned_over = np.cos(found[1]) < 0
-        small, large = np.where(turned_over, other, found), np.where(turned_over, found, other)
-        allowed = [((self.lower <= one) & (one <= self.upper)).all(axis=0) for one in (small, large)]
-        taken = np.where(_continuing(small, large, *allowed), large, small)
-        out = np.array(q)
-        for k in range(3):
-            out[:, first + self.joints.first + k] = taken[k].T
-        return out
-
-    def _within_a_turn(self, angles: Array) -> Array:
-        """Return ``angles`` (3, G, B) rad plus full turns, around the middle of their limits or, where these are wider
-        than a turn, of zero.
-        """
-        narrow = self.upper - self.lower < 2 * np.pi
-        return _turned_near(angles, np.where(narrow, 0.5 * (self.lower + self.upper), 0.0))
-
 
 @lru_cache(maxsize=8)
 def chart_of(body: Body) -> Chart:
     """Return the chart of ``body``."""
-    joints, limits = balls(body), body.limits
+    joints = balls(body)
     in_balls = np.concatenate([joints.first + k for k in range(3)])
-    return Chart(
-        joints,
-        np.setdiff1d(np.arange(len(body.joints)), in_balls),
-        joints.angles_of(limits.lower[:, None]),
-        joints.angles_of(limits.upper[:, None]),
-        body.n_root,
-    )
+    return Chart(joints, np.setdiff1d(np.arange(len(body.joints)), in_balls), body.n_root)
