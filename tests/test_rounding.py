@@ -1,0 +1,93 @@
+"""No result hangs on rounding: markers that differ by a millionth of a micrometre, or stand in another order, give the
+same angles and the same parameters.
+
+Arms held out sideways are the hard case: two sets of shoulder angles are then one posture, and both lie within the
+limits.
+"""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from marker_trials import RATE, markers_of
+from scipy.interpolate import CubicSpline
+
+from biodance.body.body import Body
+from biodance.body.human.human import human
+from biodance.body.human.limits import with_tracking_limits
+from biodance.identification.identification import identify_body
+from biodance.identification.statistics import Fit
+from biodance.motion.ik.compiled.ball_step import continue_angles
+from biodance.motion.ik.compiled.chain import chain_of
+from biodance.motion.kinematics import poses
+from biodance.motion.regressor import predict_wrench
+from biodance.motion.track import track
+from biodance.records import Array, Markers, Motion, Sip, Source, Subject, Trial, Wrench
+
+FRAMES = 1600
+SMALLEST = 1e-12
+"""m by which the markers are moved: far below what any camera sees, far above the last digit."""
+
+
+@cache
+def woman() -> Body:
+    """Return a person in the ranges of tracking."""
+    return with_tracking_limits(human(Subject(62.0, 1.70, "F", 30.0)))
+
+
+def arms_out(frames: int = FRAMES, *, seed: int = 0) -> Array:
+    """Return q (frames, nq): slow movement, both upper arms within 40 degrees of straight out sideways."""
+    body, rng, time = woman(), np.random.default_rng(seed), np.arange(frames) / RATE
+    knots = np.arange(0.0, time[-1] + 2.0, 1.0)
+    middle, reach = np.zeros(len(body.joints)), np.full(len(body.joints), 0.25)
+    for side in ("left", "right"):
+        for angle, centre, way in (("flexion", 60.0, 40.0), ("adduction", -90.0, 40.0), ("rotation", 0.0, 60.0)):
+            j = body.joint_index(f"{side}_shoulder_{angle}")
+            middle[j], reach[j] = np.radians(centre), np.radians(way)
+    angles = np.clip(middle + reach * rng.uniform(-1, 1, (knots.size, middle.size)), body.limits.lower, body.limits.upper)
+    q = np.tile(body.neutral, (frames, 1))
+    q[:, 7:] = np.clip(CubicSpline(knots, angles)(time), body.limits.lower, body.limits.upper)
+    return q
+
+
+def recorded(*, seed: int = 0) -> Markers:
+    """Return the markers of that movement as cameras see them."""
+    rng = np.random.default_rng(100 + seed)
+    return markers_of(woman(), arms_out(seed=seed), noise=rng.normal(0, 0.002, (FRAMES, len(woman().markers.names), 3)))
+
+
+def moved(markers: Markers, seed: int) -> Markers:
+    """Return the markers in another order, each moved by next to nothing."""
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(markers.names))
+    xyz = markers.xyz[:, order] + SMALLEST * rng.normal(size=markers.xyz.shape)
+    return Markers(tuple(markers.names[k] for k in order), markers.time, xyz)
+
+
+def tracked(markers: Markers) -> Motion:
+    """Return the motion of the person under ``markers``."""
+    return track(woman(), Trial("dance", "fit", markers, (), Source(Path("/lab/dance.c3d"), "00" * 32, "C3D", RATE)))
+
+
+def identified(motion: Motion, wrench: Wrench) -> Sip:
+    """Return the parameters of the person in ``motion``."""
+    return identify_body(woman(), (Fit("dance", motion, wrench, np.ones(FRAMES, dtype=bool)),)).sip
+
+
+@pytest.mark.parametrize("dance", range(3))
+def test_angles_and_parameters_do_not_hang_on_last_digits(dance):
+    markers = recorded(seed=dance)
+    motion = tracked(markers)
+    noise = np.random.default_rng(dance).normal(size=(FRAMES, 6)) * [1, 1, 2, 0.5, 0.5, 0.3]
+    heavier = predict_wrench(woman(), motion, 1.05 * woman().sip.phi).value
+    wrench = Wrench(motion.time, heavier + noise)
+    plain = identified(motion, wrench)
+    sd = np.sqrt(np.diag(plain.covariance))
+    for seed in range(3):
+        other = tracked(moved(markers, seed))
+        np.testing.assert_allclose(other.q, motion.q, rtol=0, atol=1e-7)
+        change = np.abs(identified(other, wrench).phi - plain.phi)
+        assert change.max() > 0  # the numbers did take another way
+        assert (change < 1e-6 * sd).all()
