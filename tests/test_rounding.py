@@ -20,6 +20,7 @@ from biodance.identification.identification import identify_body
 from biodance.identification.statistics import Fit
 from biodance.motion.ik.compiled.ball_step import continue_angles
 from biodance.motion.ik.compiled.chain import chain_of
+from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.ik.marker_problem import Minimum, better
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
@@ -118,18 +119,33 @@ def test_of_two_equal_sets_of_angles_the_one_that_goes_on_from_the_frame_before_
     for k, side in enumerate(("left", "right")):
         at = 7 + body.joint_index(f"{side}_shoulder_flexion") + np.arange(3)
         mixed[np.ix_(flipped[:, k], at)] = other[np.ix_(flipped[:, k], at)]
+    mixed_before = np.array(mixed)
     for one in (plain, mixed):
         continue_angles(chain, one)
     np.testing.assert_allclose(mixed, plain, rtol=0, atol=1e-12)
     np.testing.assert_allclose(poses(body, plain).rotation, poses(body, q).rotation, atol=1e-12)
     assert (plain[:, 7:] >= body.limits.lower).all()
     assert (plain[:, 7:] <= body.limits.upper).all()
-    image, inside = other_sets(plain)
+    assert goes_on(plain).all()
+    assert not goes_on(mixed_before).all()
+
+
+def goes_on(q: Array) -> Array:
+    """Return (T, 2) whether the angles of each shoulder are nearer to those of the frame before (the first to zero)
+    than the other set, where this is within the limits.
+    """
+    other, inside = other_sets(q)
+    found = ~inside
     for k, side in enumerate(("left", "right")):
-        at = 7 + body.joint_index(f"{side}_shoulder_flexion") + np.arange(3)
-        before = np.concatenate([np.zeros((1, 3)), plain[:-1, at]])
-        taken, left = (np.abs(one[:, at] - before).sum(axis=1) for one in (plain, image))
-        assert (taken <= left + 1e-9)[inside[:, k]].all()
+        at = 7 + woman().joint_index(f"{side}_shoulder_flexion") + np.arange(3)
+        before = np.concatenate([np.zeros((1, 3)), q[:-1, at]])
+        found[:, k] |= np.abs(q[:, at] - before).sum(axis=1) <= np.abs(other[:, at] - before).sum(axis=1) + 1e-6
+    return found
+
+
+@pytest.mark.parametrize("dance", range(3))
+def test_tracked_angles_go_on_from_frame_to_frame(dance):
+    assert goes_on(solve_ik(woman(), recorded(seed=dance)).q).all()
 
 
 def test_of_minima_that_differ_by_rounding_the_first_is_taken():
