@@ -39,6 +39,10 @@ LOUDER, _LOUDEST = 1.15, 2.0
 most the second: 95 % of the family of laboratories (`virtual_lab.recording.family`, whose sizes are drawn with a
 standard deviation of 0.4 in their natural logarithm).
 """
+_TIE = 1e-9
+"""Share by which powers may differ and still be equal: the first of them is told. A slow band of a short trial may hold
+one cosine, which is as large at the end as at the start.
+"""
 _SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
 alone spreads more.
@@ -132,8 +136,9 @@ def _when(found: Model, row: Adequacy) -> float:
         start += int(np.sum(band >= 0))
         full[band != BANDS.edges.index(row.band_hz[0])] = 0.0
         power = uniform_filter1d(bands.samples(full) ** 2, max(1, round(bands.rate)))
-        if power.max() > best:
-            best, second = float(power.max()), float(time[pick[int(np.argmax(power))]])
+        largest = float(power.max())
+        if largest > best * (1 + _TIE):
+            best, second = largest, float(time[pick[int(np.argmax(power >= largest * (1 - _TIE)))]])
     return second
 
 
