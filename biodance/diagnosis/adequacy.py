@@ -43,6 +43,10 @@ TORN = STRETCHED * _LOUDEST
 """Standard deviations beyond which a tolerance is none in any laboratory: what is small was learned in few, and may be
 as many times as large in another one as that may be loud.
 """
+_TIE = 1e-9
+"""Share by which powers may differ and still be equal: the first of them is told. A slow band of a short trial may hold
+one cosine, which is as large at the end as at the start.
+"""
 _SECONDS = 70.0
 """s of measured contact in the sessions from which the spread of null sessions was learned; in a shorter one chance
 alone spreads more.
@@ -142,8 +146,9 @@ def _when(found: Model, row: Adequacy) -> float:
         start += int(np.sum(band >= 0))
         full[band != BANDS.edges.index(row.band_hz[0])] = 0.0
         power = uniform_filter1d(bands.samples(full) ** 2, max(1, round(bands.rate)))
-        if power.max() > best:
-            best, second = float(power.max()), float(time[pick[int(np.argmax(power))]])
+        largest = float(power.max())
+        if largest > best * (1 + _TIE):
+            best, second = largest, float(time[pick[int(np.argmax(power >= largest * (1 - _TIE)))]])
     return second
 
 

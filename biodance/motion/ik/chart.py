@@ -69,11 +69,11 @@ def _unit(quaternion: Array) -> Array:
     return np.moveaxis(unit_quaternion(np.moveaxis(quaternion, 0, -1)), -1, 0)
 
 
-def ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, upper: Array) -> Array:
+def ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
     """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
 
-    Every rotation has two sets of Cardan angles (and any number of full turns). The one inside ``lower``, ``upper`` (3,
-    G, 1) is taken, if both or none are: the one closer to ``near`` (3, G, B).
+    Every rotation has two sets of Cardan angles (and any number of full turns): that closer to ``near`` (3, G, B) is
+    taken.
     """
     x, y, z, w = quaternion
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
@@ -84,14 +84,10 @@ def ball_angles(quaternion: Array, sign: Array, near: Array, lower: Array, upper
             np.arctan2(2 * (z * w - x * y), 1 - 2 * (y * y + z * z)),
         ]
     )
-    narrow = upper - lower < 2 * np.pi
-    middle = np.where(narrow, 0.5 * (np.where(narrow, lower, 0.0) + np.where(narrow, upper, 0.0)), near)
-    first = _turned_near(sign * one, middle)
-    other = _turned_near(sign * (np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one), middle)
-    outside = [np.maximum(np.maximum(lower - a, a - upper), 0.0).sum(axis=0) for a in (first, other)]
-    away = [np.abs(a - near).sum(axis=0) for a in (first, other)]
-    take_other = (outside[1] < outside[0]) | ((outside[1] == outside[0]) & (away[1] < away[0]))
-    return np.where(take_other, other, first)
+    first = _turned_near(sign * one, near)
+    other = _turned_near(sign * (np.pi + np.array([1.0, -1.0, 1.0])[:, None, None] * one), near)
+    away, other_away = (np.abs(angles - near).sum(axis=0) for angles in (first, other))
+    return np.where(other_away < away, other, first)
 
 
 def _turned_near(angles: Array, middle: Array) -> Array:
@@ -121,14 +117,10 @@ class Smooth:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others, limits (3, G,
-    1) rad of the balls.
-    """
+    """Maps q to smooth coordinates and back: ``joints`` the ball joints, ``single`` (m,) the others."""
 
     joints: Balls
     single: Index
-    lower: Array
-    upper: Array
     n_root: int
 
     @property
@@ -157,12 +149,12 @@ class Chart:
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
     def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B); quaternions are normalised here; ``near`` (n, B) rad decides between equal sets of
-        Cardan angles.
+        """Return q (nq, B); quaternions are normalised here; of equal sets of Cardan angles that closer to ``near``
+        (n, B) rad is taken.
         """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        ball = ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near), self.lower, self.upper)
+        ball = ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))
         for k in range(3):
             angles[self.joints.first + k] = ball[k]
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles
@@ -171,12 +163,6 @@ class Chart:
 @lru_cache(maxsize=8)
 def chart_of(body: Body) -> Chart:
     """Return the chart of ``body``."""
-    joints, limits = balls(body), body.limits
+    joints = balls(body)
     in_balls = np.concatenate([joints.first + k for k in range(3)])
-    return Chart(
-        joints,
-        np.setdiff1d(np.arange(len(body.joints)), in_balls),
-        joints.angles_of(limits.lower[:, None]),
-        joints.angles_of(limits.upper[:, None]),
-        body.n_root,
-    )
+    return Chart(joints, np.setdiff1d(np.arange(len(body.joints)), in_balls), body.n_root)

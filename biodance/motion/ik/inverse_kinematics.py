@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.motion.ik.compiled.ball_step import continue_angles
 from biodance.motion.ik.determination import determination
 from biodance.motion.ik.marker_problem import MarkerProblem, Minimum, marker_distances, marker_problem, minimise_markers
 from biodance.motion.ik.search import from_guess, interpolate_postures, search
@@ -78,6 +79,7 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
         np.concatenate([a, b])[order]
         for a, b in ((found.q, leaning.q), (found.slope, leaning.slope), (found.steps, leaning.steps))
     )
+    continue_angles(problem.chain, q)
     status = np.where(verdict.determined, FrameStatus.SOLVED, FrameStatus.LEANING).astype(np.int8)
     status[slope > tolerance] = FrameStatus.STOPPED
     residual = np.where(chosen.seen, marker_distances(problem, q), np.nan)

@@ -91,9 +91,13 @@ def marker_distances(problem: MarkerProblem, q: Array) -> Array:
     return out
 
 
+_EQUAL = 1e-9
+"""Share by which the costs of one posture may differ: what the tolerance of the descent leaves."""
+
+
 def better(one: Minimum, other: Minimum) -> Minimum:
-    """Return frame by frame the minimum of lower cost."""
-    first = one.cost <= other.cost
+    """Return frame by frame the minimum of lower cost; of equal ones, ``one``."""
+    first = one.cost <= other.cost * (1 + _EQUAL)
     return Minimum(
         np.where(first[:, None], one.q, other.q),
         np.where(first, one.cost, other.cost),

@@ -17,6 +17,10 @@ _UPRIGHT = 0.3
 """Cosine of the second angle above which the angles are a good measure of the rotation."""
 
 
+_EQUAL = 1e-6
+"""rad: angles that differ by less are equal; which is larger may be rounding."""
+
+
 @compiled
 def quaternion_of(sign, one, two, three):
     """Return the quaternion x, y, z, w of Cardan angles, rad."""
@@ -66,7 +70,7 @@ def beyond(angle, lower, upper):
 
 @compiled
 def angles_of(quaternion, sign, near, lower, upper, out):
-    """Fill ``out`` (3,) with that set of Cardan angles which lies inside the limits; if both or none do, the one
+    """Fill ``out`` (3,) with that set of Cardan angles which lies less outside the limits; if both do alike, the one
     closer to ``near``.
     """
     x, y, z, w = quaternion
@@ -85,7 +89,7 @@ def angles_of(quaternion, sign, near, lower, upper, out):
     other = beyond(a1, lower[0], upper[0]) + beyond(b1, lower[1], upper[1]) + beyond(c1, lower[2], upper[2])
     away = abs(a0 - near[0]) + abs(b0 - near[1]) + abs(c0 - near[2])
     away_other = abs(a1 - near[0]) + abs(b1 - near[1]) + abs(c1 - near[2])
-    if other < outside or (other == outside and away_other < away):
+    if other < outside - _EQUAL or (other < outside + _EQUAL and away_other < away):
         out[0], out[1], out[2] = a1, b1, c1
     else:
         out[0], out[1], out[2] = a0, b0, c0
@@ -146,3 +150,29 @@ def turned(angles, step, sign, lower, upper, out):
     if which >= 0:
         hold(rotation, sign, which, lower, upper, out)
     return (out <= lower).any() or (out >= upper).any()
+
+
+@compiled
+def continue_angles(chain, q):
+    """Give each ball joint of consecutive postures q (T, nq) within the limits that of its two equal sets of Cardan
+    angles which goes on from the frame before (the first one from zero).
+
+    Both sets are one rotation and fit the markers alike, so that which one a frame's own search ends at is rounding. A
+    set outside the limits is not taken; of two equally near ones that with the second angle within a quarter turn.
+    """
+    first = q.shape[1] - chain.parent.shape[0]
+    before, other = np.empty(3), np.empty(3)
+    for b in range(chain.ball.shape[0]):
+        j = chain.ball[b]
+        before[:] = 0.0
+        for t in range(q.shape[0]):
+            own, nearer, inside = q[t, first + j : first + j + 3], 0.0, True
+            for k in range(3):
+                lower, upper = chain.lower[j + k], chain.upper[j + k]
+                turned_over = np.pi - own[k] if k == 1 else np.pi + own[k]
+                other[k] = near_to(turned_over, middle_of(lower, upper, before[k]))
+                inside = inside and beyond(other[k], lower, upper) == 0
+                nearer += abs(own[k] - before[k]) - abs(other[k] - before[k])
+            if inside and (nearer > _EQUAL or (nearer > -_EQUAL and np.cos(own[1]) < 0)):
+                own[:] = other
+            before[:] = own
