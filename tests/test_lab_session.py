@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lab_sessions import GRAVITY, MASS, plate, roles, said, table_of, two_trials, write_trial
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from biodance.errors import SessionRefused
 from biodance.lab.opensim.mot import write_mot
@@ -271,3 +272,14 @@ def test_two_runs_never_write_into_one_folder(tmp_path, folder):
         other.communicate(b"\n")
     assert results_folder(out, folder) == out  # that one has ended
     assert lock.read_text().startswith(f"{os.getpid()} ")
+
+
+def test_reading_keeps_to_one_thread_of_linear_algebra(tmp_path: Path) -> None:
+    folder, seen = two_trials(tmp_path), list[int]()
+
+    def count(_: str) -> None:
+        seen.extend(one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas")
+
+    with threadpool_limits(2, user_api="blas"):
+        read_session(folder, tell=count)
+    assert set(seen) == {1}

@@ -182,7 +182,7 @@ class Banded:
             out[columns] += (size * block.T) @ values[rows]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def derivatives(count: int) -> tuple[Banded, Banded]:
     """Return (n, n) twice: second and first derivative, at ``count`` samples one unit apart, of the quintic spline
     through them.

@@ -163,8 +163,13 @@ class Flesh(_WithAngles):
         return np.zeros((len(self.body.markers.names), 3, len(self.groups)))
 
     def _slopes(self, trial: Response) -> Iterator[tuple[Array, Index]]:
-        for s, near in enumerate(_near(self.body)):
+        for s, near in enumerate(self._beside):
             yield trial.place[:, s] @ trial.pose.rotation[:, s], near
+
+    @cached_property
+    def _beside(self) -> tuple[Index, ...]:
+        """For every segment the angles beside it."""
+        return _near(self.body)
 
     def squares(self, trial: Response) -> Array:
         """Return zeros: no marker sees it."""

@@ -31,6 +31,7 @@ from biodance.lab.session.subject import identify_subject
 from biodance.lab.vicon import EclipseNotes
 from biodance.records import Role, Session, Trial
 from biodance.settings import Settings
+from biodance.threads import one_thread
 
 
 def visit_words(folder: Path, trials: Iterable[str]) -> Mapping[str, str]:
@@ -66,6 +67,7 @@ def _made(notes: EclipseNotes) -> str:
     return "-".join([found[1], found[2].zfill(2), found[3].zfill(2)]) if found else ""
 
 
+@one_thread()
 def read_session(
     folder: str | Path,
     *,
