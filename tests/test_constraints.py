@@ -18,7 +18,7 @@ def pinned() -> dict[str, str]:
 
 
 def left_out(python: str) -> list[str]:
-    """The pins whose installed release refuses a version of Python; what another release is installed of is not asked."""
+    """The pins that refuse a version of Python, among those that are installed in just that release."""
     found = []
     for name, release in pinned().items():
         try:
