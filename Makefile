@@ -38,7 +38,9 @@ $(BUNDLE)/NOTICES.txt: web/package-lock.json web/pose.js web/build.mjs | $(STAMP
 bundle-if-possible: $(STAMP)
 	@$(MAKE) --no-print-directory bundle || echo "Without npm the page that leads does not follow the person; all else works."
 
+TOO_OLD := biodance needs Python 3.11 to 3.13. Name one: make PYTHON=python3.12 ... (see README.md). $(PYTHON) is
 $(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit("$(TOO_OLD) " + sys.version.split()[0])'
 	@[ $(ROOM) = no ] || $(PYTHON) .ci/room.py $(VENV)=$(if $(wildcard $(VENV)),1,3) "$${TMPDIR:-/tmp}=1" # of 2.8 and 0.8 GB
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip

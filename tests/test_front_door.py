@@ -1,6 +1,7 @@
 """The front door: few names, quick, the same for people, editors and type checkers; a visit diagnosed in five lines."""
 
 import ast
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -162,6 +163,7 @@ def test_a_visit_is_exported_as_it_is_in_memory(result, tmp_path):
         biodance.export(result, tmp_path / "no.osim", format="osim", trial="squat_1")
 
 
+@pytest.mark.skipif(shutil.which("git") is None, reason="there is no git here")
 def test_the_commit_is_that_of_the_checkout_and_unknown_in_a_wheel(tmp_path):
     git = ["git", "-c", "user.name=a", "-c", "user.email=a@b"]
     package = tmp_path / "biodance"

@@ -107,8 +107,8 @@ def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -
     return RigidInertia(volume, np.array([0.0, middle, 0.0]), np.diag([yy + zz, xx + zz, xx + yy]))
 
 
-_CONTRADICTION = 0.15
-"""Share of the body mass by which the girths may miss it."""
+CONTRADICTION = 0.15
+"""Share of the body mass by which girths, or a scan, may miss it."""
 _TRUNK = ("pelvis", "trunk_head")
 _HEAD = 0.16
 """Of the stature: from the middle of the neck to the vertex."""
@@ -148,13 +148,13 @@ def girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -
     every = {segment: _opinion(segment, reference, skeleton, subject, girths) for segment in SEGMENTS}
     opinions = {segment: one for segment, one in every.items() if one.said}
     total = sum(one.mass for one in every.values())
-    if abs(total / subject.mass - 1) > _CONTRADICTION:
+    if abs(total / subject.mass - 1) > CONTRADICTION:
         table = {segment: reference.segments[kind_of(segment)].mass * subject.mass for segment in opinions}
         over = {segment: one.mass - table[segment] for segment, one in opinions.items()}
         worst = max(over, key=lambda segment: abs(over[segment]))
         raise SessionRefused(
             f"[subject] girths_cm: the girths make a body of {total:.1f} kg, but the body mass is {subject.mass:.1f} "
-            f"kg ({100 * (total / subject.mass - 1):+.0f} %, at most {100 * _CONTRADICTION:.0f} % is believed). "
+            f"kg ({100 * (total / subject.mass - 1):+.0f} %, at most {100 * CONTRADICTION:.0f} % is believed). "
             f"Farthest from the table: {worst} by {over[worst]:+.1f} kg ({', '.join(opinions[worst].said)}). Measure "
             "these girths again, or correct mass_kg."
         )

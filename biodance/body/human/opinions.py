@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.human.girths import SegmentOpinion, girth_opinions, mean_fraction
+from biodance.body.human.girths import CONTRADICTION, SegmentOpinion, girth_opinions, mean_fraction
 from biodance.body.human.scan import read_scan
 from biodance.body.human.scan_parts import ScannedBody, cut_scan
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
@@ -56,8 +56,6 @@ def _area(outline: FootSizes, sex: Sex) -> float:
     return 0.5 * abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1)))
 
 
-_CONTRADICTION = 0.15
-"""Share of the body mass by which a scan may miss it."""
 _NEIGHBOURS = {
     "hip": ("pelvis", "thigh"),
     "knee": ("thigh", "shank"),
@@ -129,11 +127,11 @@ def scan_opinion(body: ScannedBody, subject: Subject) -> Opinion:
     """
     lumps = [body.lumps[name] for name in SEGMENTS]
     mass = np.array([lump.mass for lump in lumps])
-    if abs(mass.sum() / subject.mass - 1) > _CONTRADICTION:
+    if abs(mass.sum() / subject.mass - 1) > CONTRADICTION:
         raise SessionRefused(
             f"[subject] scan: the scan weighs {mass.sum():.1f} kg by volume and density, but the body mass is "
             f"{subject.mass:.1f} kg ({100 * (mass.sum() / subject.mass - 1):+.0f} %, at most "
-            f"{100 * _CONTRADICTION:.0f} % is believed). Is it the same person, in tight clothes, and mass_kg right?"
+            f"{100 * CONTRADICTION:.0f} % is believed). Is it the same person, in tight clothes, and mass_kg right?"
         )
     value = np.concatenate([primitives_of(lump) for lump in lumps])
     com_sd, share, sd = error_size("scan_com", "any"), error_size("scan_inertia", "any"), list[float]()

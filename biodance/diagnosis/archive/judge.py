@@ -10,6 +10,7 @@ from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History, Stra
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit, in_order
 from biodance.diagnosis.archive.series import series_of
+from biodance.settings.groups import STANDARD_GRAVITY
 from biodance.threads import one_thread
 
 _HORIZONTAL = ("offset_x", "offset_y")
@@ -87,7 +88,7 @@ _WORDS = {
 def condition_finding(one: ConditionEffect) -> PlateFinding:
     """Return what a kind of trial reads as a finding."""
     known, shared = PLATE_QUANTITIES[one.quantity], one.shared
-    kilograms = f" ({shared.mean / 9.80665:+.2f} kg)".replace("-", "−") if one.quantity == "offset_z" else ""
+    kilograms = f" ({shared.mean / STANDARD_GRAVITY:+.2f} kg)".replace("-", "−") if one.quantity == "offset_z" else ""
     what = (
         " Something of that weight lies on the plate in these trials and was not zeroed (a pad, a mat): zero the plate "
         "with it on, or take its weight off."

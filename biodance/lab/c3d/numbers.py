@@ -52,7 +52,7 @@ def read_numbers(content: bytes, layout: Layout) -> Numbers:
 _PATIENCE = 60.0
 """s after which the child is given up."""
 READ = """
-import sys, warnings
+import io, sys, warnings
 import ezc3d, numpy
 warnings.simplefilter("ignore")
 try:
@@ -60,8 +60,10 @@ try:
 except Exception as error:
     sys.exit(" ".join(str(error).split())[:120] or type(error).__name__)
 points, analogs = data["points"], data["analogs"]
-numpy.save(sys.stdout.buffer, points[:3].transpose(2, 1, 0).astype("f4"))
-numpy.save(sys.stdout.buffer, analogs[0].T.astype("f4"))
+answer = io.BytesIO()  # not stdout itself: numpy asks a file for its position, and a pipe has none
+numpy.save(answer, points[:3].transpose(2, 1, 0).astype("f4"))
+numpy.save(answer, analogs[0].T.astype("f4"))
+sys.stdout.buffer.write(answer.getvalue())
 """
 
 
