@@ -23,10 +23,10 @@ from third_lab import make_session
 
 from biodance.body.body import Body
 from biodance.body.inertia import RigidInertia, inertial_parameters, rigid_inertia
-from biodance.identification.calibration import discounted, give_back
+from biodance.identification.calibration import discounted, undo_dilution
 from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
-from biodance.identification.loads import may_carry
+from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import mismatch
 from biodance.identification.placement import more_probable_table
 from biodance.identification.posterior import posterior
@@ -71,10 +71,10 @@ def gather(kind: str, seed: int, folder: Path) -> Kept:
     body, fits = result.body, [trial_fit(one) for one in result.trials if one.trial.role == "fit"]
     used, about, _ = usable(body, tuple(fit for fit in fits if fit is not None))
     total, before = statistics_together(body, used, layout_for(about)), widened(body.sip, body.joint_errors)
-    room = may_carry(body, before)
+    room = with_unknown_load(body, before)
     noise, _ = learn_noise(total, room)
     found = mismatch(body, used, noise)
-    got = give_back(body, total, discounted(total, noise, found, room), found, before, open_table=True)
+    got = undo_dilution(body, total, discounted(total, noise, found, room), found, before, open_table=True)
     return Kept(body, got.data, more_probable_table(got.data, before, body)[0], mass, com)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
+from biodance.identification.base_parameters import structural_base
 from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
@@ -31,35 +32,52 @@ _SPREAD = 0.3
 _PARTS = (("pelvis", "trunk_head"), ("thigh", "shank", "foot"), ("upper_arm", "forearm_hand"))
 
 
-def undiluted(total: Statistics, phi: Array, segments: tuple[str, ...]) -> Statistics:
+def undiluted(total: Statistics, phi: Array, table: Sip, shown: Array) -> Statistics:
     """Return the statistics with the regressor as it is to be expected without the noise of its kinematics.
 
     Parameters
     ----------
     total : Statistics
-        As measured, p = 10 parameters of each of N ``segments``.
+        As measured, p = 10 parameters of each of N segments.
     phi : (p,) array
         SIP under which the gains are measured: those of a fit to ``total``.
-    segments : tuple of str
-        Names, in order.
+    table : Sip
+        What is known of the N segments before the data.
+    shown : (nb, p) array
+        Base parameters per SIP: what movement can show (`BaseParameters.regroup`).
 
     Returns
     -------
     Statistics
         The columns of trunk, legs and arms times their gains (0 to 1), in every band from 1 Hz and every channel of
-        the wrench; slower bands and the wrench as they were.
+        the wrench; slower bands and the wrench as they were. Matter at a joint moves alike on either side of it,
+        whatever the gains: they act on what the ``table`` expects given the base parameters, so that no gain shows
+        what no movement can.
     """
-    kinds = [kind_of(name) for name in segments]
+    kinds = [kind_of(name) for name in table.segments]
     parts = np.repeat([[kind in part for kind in kinds] for part in _PARTS], 10, axis=1)
-    scale = np.ones(total.gram.shape[:3])
-    for band in np.flatnonzero(np.array(total.layout.bands.edges[:-1]) >= _FAST):
-        if total.count[band]:
-            for channel in range(6):
-                gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
-                scale[band, channel, :-1] = np.where(parts.any(axis=0), gain @ parts, 1.0)
-    gram = total.gram * scale[..., None, None]
-    gram *= scale[:, None, None]
+    expected = _expected(table, shown)
+    gram = np.array(total.gram)
+    for band in np.flatnonzero((np.array(total.layout.bands.edges[:-1]) >= _FAST) & (total.count > 0)):
+        turn = np.zeros((6, *expected.shape))
+        for channel in range(6):
+            gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
+            lost = np.append(np.where(parts.any(axis=0), gain @ parts - 1.0, 0.0), 0.0)
+            turn[channel] = np.eye(len(lost)) + lost[:, None] * expected
+        gram[band] = np.einsum("cia,cidj,djb->cadb", turn, gram[band], turn, optimize=True)
     return Statistics(gram, total.count, total.layout)
+
+
+def _expected(table: Sip, shown: Array) -> Array:
+    """Return the matrix (p + 1, p + 1) that gives from (phi, -1) the parameters that the ``table`` expects of a body
+    with the base parameters ``shown @ phi``, and -1.
+    """
+    spread = table.covariance @ shown.T
+    regression = spread @ np.linalg.solve(shown @ spread, shown)
+    expected = np.eye(len(table.phi) + 1)
+    expected[:-1, :-1] = regression
+    expected[:-1, -1] = regression @ table.phi - table.phi
+    return expected
 
 
 def gains_move_masses(before: Posterior, after: Posterior) -> bool:
@@ -118,12 +136,12 @@ def undo_dilution(
     that moves a mass by more than its standard deviation. ``before`` is the table, whose open questions the data
     answer if ``open_table``.
     """
-    room = with_unknown_load(body, before)
+    room, shown = with_unknown_load(body, before), structural_base(body).regroup
     now = measured
     for _ in range(_ROUNDS):
         table = more_probable_table(now.data, before, body)[0] if open_table else before
         belief = posterior(now.data, table)
-        real = undiluted(total, _with_probable_load(belief, now.data, body).mean, body.segments)
+        real = undiluted(total, _with_probable_load(belief, now.data, body).mean, table, shown)
         now = discounted(real, learn_noise(real, room, rounds=_AGAIN)[0], found, room)
         if gains_move_masses(belief, posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
