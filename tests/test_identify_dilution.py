@@ -67,7 +67,7 @@ def test_a_movement_seen_as_it_was_keeps_its_regressor() -> None:
     total, rng = recorded(0.0), np.random.default_rng(11)
     same = undiluted(total, BODY.sip.phi, TABLE, SHOWN)
     for phi in rng.multivariate_normal(TABLE.phi, TABLE.covariance, size=5):
-        np.testing.assert_allclose(left(same, phi), left(total, phi), rtol=0.1)
+        np.testing.assert_allclose(left(same, phi), left(total, phi), rtol=0.15)
 
 
 def test_what_the_plates_do_not_show_is_taken_off_the_regressor(shaken: Statistics) -> None:
