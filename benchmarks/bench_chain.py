@@ -151,16 +151,16 @@ def identified(place: Path) -> dict[str, Any]:
         },
         "squats": [[float(np.linalg.norm(r[:3])), float(np.linalg.norm(r[3:]))] for r in rms],
         "sizes": vars(one.identification.sizes),
-        "pull": pulled(one.identification.belief, phi),
+        "pull": pulled(one.identification.posterior, phi),
     }
 
 
-def pulled(belief: Posterior, true: Array) -> dict[str, Array]:
-    """Return the errors of mass (N,) kg and CoM (N, 3) m that the table leaves in a ``belief``, linearised about the
+def pulled(posterior: Posterior, true: Array) -> dict[str, Array]:
+    """Return the errors of mass (N,) kg and CoM (N, 3) m that the table leaves in a ``posterior``, linearised about the
     ``true`` parameters (N, 10); the rest of its error is what the data add.
     """
-    before = belief.prior.phi - true.ravel()
-    left = belief.covariance @ np.linalg.pinv(belief.prior.covariance, rcond=1e-10) @ before
+    before = posterior.prior.phi - true.ravel()
+    left = posterior.covariance @ np.linalg.pinv(posterior.prior.covariance, rcond=1e-10) @ before
     rows = [segment_quantities(own)[1][:4] @ part for own, part in zip(true, left.reshape(-1, 10), strict=True)]
     return {"mass": np.array(rows)[:, 0], "com": np.array(rows)[:, 1:]}
 

@@ -30,7 +30,7 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.solids import segment_solids
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import belief_after, shares, typical_noise
+from biodance.dance.expectation import posterior_after, shares, typical_noise
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
@@ -246,7 +246,7 @@ def main(folder: str, dancers: str) -> None:
             when = np.arange(0.0, motion.time[-1], 1 / PICTURES)
             np.savez(kept, when=when, points=points_seen(pictures(body, motion, when)))
         found, worth = np.load(kept), worth_of(body, motion, noise=noise)
-        told = shares(belief_after(body, worth.H, worth.disturbed))  # of this engine, whoever drew the pictures
+        told = shares(posterior_after(body, worth.H, worth.disturbed))  # of this engine, whoever drew the pictures
         rows.append((told, graded(dance, found["when"], found["points"])))
         print(seed, rows[-1][0].round(2), rows[-1][1].round(2), flush=True)
         truth, score = (np.array(each) for each in zip(*rows, strict=True))

@@ -40,7 +40,7 @@ from biodance.identification.knowledge import SIGMAS, segment_quantities
 from biodance.identification.mismatch import evidence_of_scale
 from biodance.identification.paper_programme import paper_programme
 from biodance.identification.physical import physical_fit
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, layout_for, standing_point, statistics
 from biodance.identification.torques import torque_bands, torque_regressor
 from biodance.lab.plain_text import write_new
@@ -112,11 +112,11 @@ def examine(subject: Subject, seed: int) -> tuple[Row, Identification, Gathered]
     squat = {
         name: rms(one.body, one.validations, about, phi) for name, phi in (*estimates.items(), ("floor", one.true))
     }
-    before = found.belief.prior
+    before = found.posterior.prior
     held = []
     for scale in SCALES:
-        belief = posterior(found.data, Sip(before.segments, before.phi, scale**2 * before.covariance))
-        held.append(rms(one.body, one.validations, about, physical_fit(belief, one.body).sip.phi))
+        posterior = find_posterior(found.data, Sip(before.segments, before.phi, scale**2 * before.covariance))
+        held.append(rms(one.body, one.validations, about, physical_fit(posterior, one.body).sip.phi))
     row = Row(
         error={name: errors(phi, one.true) for name, phi in estimates.items()},
         squat=squat,
@@ -127,7 +127,7 @@ def examine(subject: Subject, seed: int) -> tuple[Row, Identification, Gathered]
         status=(found.status, paper.status),
         evidence=evidence_of_scale(found.data, before, SCALES),
         held_out=np.array(held),
-        from_data=float(found.belief.information.mean()),
+        from_data=float(found.posterior.information.mean()),
         **torques(one, found),
     )
     return row, found, got
@@ -165,9 +165,9 @@ def timing(found: Identification, one: TrackedVisit) -> dict[str, float]:
     start = time.process_time()
     data = statistics(one.body, long, layout_for(layout.about)).information(layout)
     until_r = time.process_time() - start
-    physical_fit(found.belief, one.body)
+    physical_fit(found.posterior, one.body)
     start = time.process_time()
-    physical_fit(found.belief, one.body)
+    physical_fit(found.posterior, one.body)
     programme = time.process_time() - start
     start = time.process_time()
     identify_body(one.body, one.fits)

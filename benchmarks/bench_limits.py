@@ -21,9 +21,9 @@ from hidden_sessions import CACHE, examined
 from biodance.body.body import Body
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.engine import Examined, diagnose_trials
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.effects import Case, Effect
-from biodance.pipeline.judged_trials import cases_of, chosen_looks
+from biodance.pipeline.judged_trials import cases_of, chosen_windows
 from biodance.records import Array
 
 TIMES = (1.0, 3.0, 10.0)
@@ -77,14 +77,17 @@ def size(effect: Effect, row: Unobservable, times: float) -> Array:
     return theta
 
 
-def with_hidden(cases: tuple[Case, ...], looks: tuple[Look, ...], effect: Effect, theta: Array) -> tuple[Look, ...]:
+def with_hidden(
+    cases: tuple[Case, ...], windows: tuple[TrialWindow, ...], effect: Effect, theta: Array
+) -> tuple[TrialWindow, ...]:
     """Return the trials with a cause in what was measured, or held against a body with its geometry wrong."""
-    if effect.placed:
+    if effect.taken_up_by_calibration:
         return tuple(
-            replace(look, motion=effect.corrected(case, -theta).motion) for case, look in zip(cases, looks, strict=True)
+            replace(window, motion=effect.corrected(case, -theta).motion)
+            for case, window in zip(cases, windows, strict=True)
         )
     return tuple(
-        replace(look, trial=_faulty(case, effect, theta).trial) for case, look in zip(cases, looks, strict=True)
+        replace(window, trial=_faulty(case, effect, theta).trial) for case, window in zip(cases, windows, strict=True)
     )
 
 
@@ -97,14 +100,14 @@ def _faulty(case: Case, effect: Effect, theta: Array) -> Case:
 
 def held(body: Body, cases: tuple[Case, ...], effect: Effect, theta: Array) -> Body:
     """Return the body that the trials are held against."""
-    return effect.corrected(cases[0], -theta).body if effect.placed else body
+    return effect.corrected(cases[0], -theta).body if effect.taken_up_by_calibration else body
 
 
-def asked(number: int, trials: int) -> tuple[Body, tuple[Look, ...]]:
+def asked(number: int, trials: int) -> tuple[Body, tuple[TrialWindow, ...]]:
     """Return body and trials of a session without fault."""
     result = examined(nulls()[number])
     assert result.body is not None
-    return result.body, chosen_looks(result.trials)[:trials]
+    return result.body, chosen_windows(result.trials)[:trials]
 
 
 def table(found: list[Told]) -> list[str]:
@@ -139,10 +142,10 @@ def main() -> None:
     kept = CACHE / f"limits-{chosen.run}.jsonl"
     rows = kept.read_text().splitlines() if kept.is_file() else []
     found = [Told(**json.loads(row) | {"named": tuple(json.loads(row)["named"])}) for row in rows]
-    body, looks = asked(chosen.null, chosen.trials)
-    clean = diagnose_trials(body, looks)
+    body, windows = asked(chosen.null, chosen.trials)
+    clean = diagnose_trials(body, windows)
     print("clean:", clean.diagnosis.told, flush=True)
-    cases = cases_of(body, looks)
+    cases = cases_of(body, windows)
     for effect, row in best_seen(clean):
         hidden = f"{effect.name} {effect.target}".strip()
         for times in chosen.times:
@@ -150,7 +153,9 @@ def main() -> None:
             if known or (chosen.effects and effect.name not in chosen.effects):
                 continue
             theta = size(effect, row, times)
-            one = diagnose_trials(held(body, cases, effect, theta), with_hidden(cases, looks, effect, theta)).diagnosis
+            one = diagnose_trials(
+                held(body, cases, effect, theta), with_hidden(cases, windows, effect, theta)
+            ).diagnosis
             names = tuple(f"{f.effect} {f.target}".strip() for f in one.findings)
             found.append(Told(hidden, row.limit, row.unit, times, one.verdict, names))
             with kept.open("a") as stream:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import belief_after, shares, typical_noise
+from biodance.dance.expectation import posterior_after, shares, typical_noise
 from biodance.dance.imprecision import USUAL_IMPRECISION, PlannedDance, draw_clock
 from biodance.dance.scoring import Worth, score_performance, worth_of
 from biodance.motion.regressor import predict_wrench
@@ -43,7 +43,7 @@ def gained(plan: PlannedDance, known: Worth, moves: tuple[int, ...], noise: Nois
 
 
 def _share(plan: PlannedDance, known: Worth) -> Array:
-    return shares(belief_after(plan.dance.body, known.H, known.disturbed))
+    return shares(posterior_after(plan.dance.body, known.H, known.disturbed))
 
 
 def main(path: str, performers: str = "20") -> None:

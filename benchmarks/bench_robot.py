@@ -17,7 +17,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import rigid_inertia, smallest_eigenvalues
-from biodance.body.robot.likeness import Likeness, likeness
+from biodance.body.robot.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import rehearse
 from biodance.dance.robot import _RATE, ERROR, person_sized, robot_rows, shrunk
@@ -25,7 +25,7 @@ from biodance.identification.base_parameters import estimate_base, structural_ba
 from biodance.identification.information import Information, fold
 from biodance.identification.paper_programme import paper_programme
 from biodance.identification.physical import physical_fit
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.motion.regressor import regressor
 from biodance.records import CHANNELS, Array
 
@@ -89,11 +89,11 @@ def judge(dance: Dance, unseen: Dance, seed: int) -> dict[str, Array]:
     data = Information(fold(robot_rows(body, motion, wrench)), 6 * len(W))
     base = estimate_base(data, structural_base(body))
     z = (base.value - base.base.regroup @ truth) / base.sd
-    belief = posterior(data, body.sip)
-    ours = physical_fit(belief, body).sip.phi
+    posterior = find_posterior(data, body.sip)
+    ours = physical_fit(posterior, body).sip.phi
     plain = np.concatenate([W, wrench[:, :, None]], axis=2).reshape(-1, W.shape[2] + 1)
     paper = paper_programme(Information(fold(plain), 6 * len(W)), body).phi
-    covered = np.abs(belief.mean - truth) <= 1.96 * np.sqrt(np.diag(belief.covariance))
+    covered = np.abs(posterior.mean - truth) <= 1.96 * np.sqrt(np.diag(posterior.covariance))
     counts = (base.base.count, base.rank, len(base.well_known), (base.relative_sd * np.sqrt(_RATE / FAST) <= 10).sum())
     out = {"base": np.array([*counts, base.condition, np.sqrt(np.mean(z**2))])}
     out["covered"] = np.array([100 * covered.mean()])
@@ -128,7 +128,7 @@ def main(folder: str, other: str, count: str = "10") -> None:
     for name, row in PAPER.items():
         tell(f"| the paper's robot, {name} | " + " | ".join(f"{value:.1f}" for value in row) + " |")
     to = person_sized(dance.body)
-    big = shrunk(dance, likeness(dance.body, to), Likeness(1 / to.length, 1 / to.mass))
+    big = shrunk(dance, similar_body(dance.body, to), SimilarityScale(1 / to.length, 1 / to.mass))
     tell("rehearsed in MuJoCo as the robot's person-sized likeness:", rehearse(big).table())
 
 

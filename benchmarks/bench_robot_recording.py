@@ -6,11 +6,11 @@
     biodance identify RECORDING --urdf hoap3.urdf --feet right_foot,left_foot --out DONE
     python benchmarks/bench_robot_recording.py judge RECORDING DONE
 
-The robot plays its dance by its joints alone, free on a floor with friction, as its person-sized likeness (Froude),
-whose times and forces are scaled back. Covers and cables are taken off: the simulated robot is lighter than the URDF.
-Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring, damper and
-the drawing's torque), `ankle=200` the pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1` N·m in
-every joint, `friction=0.3` under the feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad,
+The robot plays its dance by its joints alone, free on a floor with friction, as its person-sized similar model
+(Froude), whose times and forces are scaled back. Covers and cables are taken off: the simulated robot is lighter than
+the URDF. Troubles (paper IV.C): `pid=3` every joint by PID alone, of so many times the usual stiffness (else spring,
+damper and the drawing's torque), `ankle=200` the pitch of the ankles gives behind the encoder (N·m/rad), `stiction=0.1`
+N·m in every joint, `friction=0.3` under the feet; hidden in the files: `zero.JOINT=0.04` rad, `play.JOINT=0.02` rad,
 `gain.Fz=0.95`.
 """
 
@@ -25,7 +25,7 @@ from robot_lab import RobotLab, write_robot_trial
 
 from biodance.body.body import Body
 from biodance.body.inertia import smallest_eigenvalues
-from biodance.body.robot.likeness import Likeness, likeness, standing_frames
+from biodance.body.robot.similarity import SimilarityScale, similar_body, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.rehearsal import _STEP, SETTLE, _Driver, _floor_wrench, bearing, floor_model, planned_torques
@@ -63,7 +63,7 @@ def bare(body: Body) -> Body:
 
 
 class Joints(_Driver):
-    """Motors of a robot in its person-sized likeness, with troubles; ``units`` N·m of the likeness per N·m."""
+    """Motors of a robot in its person-sized similar model, with troubles; ``units`` N·m of the likeness per N·m."""
 
     def __init__(self, body: Body, model: Any, troubles: dict[str, float], units: float) -> None:
         super().__init__(body, model)
@@ -98,10 +98,10 @@ def simulate(dance: Dance, truth: Body, hold: float, troubles: dict[str, float])
 
     to = person_sized(dance.body)
     plan = replace(dance, hold=np.minimum(dance.hold, hold))
-    big = shrunk(plan, likeness(dance.body, to), Likeness(1 / to.length, 1 / to.mass))
+    big = shrunk(plan, similar_body(dance.body, to), SimilarityScale(1 / to.length, 1 / to.mass))
     motion = big.motion(100.0)
     torque = planned_torques(big.body, motion, predict_wrench(big.body, motion), bearing(big, motion.time))
-    model = floor_model(likeness(truth, to), friction=troubles.get("friction", 0.5))
+    model = floor_model(similar_body(truth, to), friction=troubles.get("friction", 0.5))
     data, driver = mujoco.MjData(model), Joints(big.body, model, troubles, to.mass * to.length)
     driver.place(data, motion.q[0], motion.v[0])
     for _ in range(round(SETTLE / _STEP)):

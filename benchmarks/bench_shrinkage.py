@@ -29,7 +29,7 @@ from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import mismatch
 from biodance.identification.placement import more_probable_table
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import layout_for, statistics_together, usable
 from biodance.identification.unloaded_body import inflate_prior
 from biodance.lab.session.read import read_session
@@ -106,13 +106,13 @@ def line(name: str, people: list[Kept], answer: Answer) -> str:
     """Return one row: errors over the table's, masses held, log evidence."""
     ours, tables, held, evidence = [], [], [], 0.0
     for one in people:
-        belief = posterior(*answer(one))
-        sip, table = belief.sip, one.body.sip
+        posterior = find_posterior(*answer(one))
+        sip, table = posterior.sip, one.body.sip
         off, was = sip.mass - one.mass, table.mass - one.mass
         ours.append((np.abs(off).mean(), np.linalg.norm(sip.com - one.com, axis=1).mean()))
         tables.append((np.abs(was).mean(), np.linalg.norm(table.com - one.com, axis=1).mean()))
         held.append(np.abs(off) < bench_people.SIGMAS * bench_people.deviations(sip)[:, 0])
-        evidence += belief.log_evidence
+        evidence += posterior.log_evidence
     mass, com = np.mean(ours, axis=0) / np.mean(tables, axis=0)
     return f"| {name} | {mass:.3f} | {com:.3f} | {100 * np.mean(held):.1f} | {evidence:.0f} |"
 

@@ -21,7 +21,7 @@ from biodance.body.human.scaling import Scaling, measure_static
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
-from biodance.pipeline.body import placed_by_movement
+from biodance.pipeline.body import calibrate_joints
 from biodance.pipeline.trial import Prepared, examine_trial, prepare_trial
 from biodance.records import Array, Session
 from biodance.uncertainty.caution import widened
@@ -46,7 +46,7 @@ def placed(session: Session) -> tuple[Scaling, tuple[Prepared, ...]]:
     """Return the person as scaled on the static trial, joints placed by movement, and the trials as prepared."""
     read = tuple(prepare_trial(one) for one in sorted(session.trials, key=lambda trial: trial.role != "static"))
     static = next(one.trial for one in read if one.trial.role == "static" and one.usable)
-    return placed_by_movement(measure_static(session.subject, static), read), read
+    return calibrate_joints(measure_static(session.subject, static), read), read
 
 
 def tracked(body: Body, read: Sequence[Prepared], mass: float) -> dict[str, Fit]:
@@ -62,8 +62,8 @@ def tracked(body: Body, read: Sequence[Prepared], mass: float) -> dict[str, Fit]
 def log_evidence(body: Body, fits: Sequence[Fit], about: Array) -> float:
     """Return the logarithm of the evidence of the trials, each band under the noise learned with this body."""
     total = statistics_together(body, fits, layout_for(about))
-    noise, belief = learn_noise(total, with_unknown_load(body, widened(body.sip, body.joint_errors)))
-    return belief.log_evidence - 0.5 * float(total.count @ np.linalg.slogdet(noise.covariance)[1])
+    noise, posterior = learn_noise(total, with_unknown_load(body, widened(body.sip, body.joint_errors)))
+    return posterior.log_evidence - 0.5 * float(total.count @ np.linalg.slogdet(noise.covariance)[1])
 
 
 def preferred(session: Session, lower: Sequence[float]) -> tuple[float, list[float]]:

@@ -28,7 +28,7 @@ from scipy.stats import t as student
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.witness_evidence import WitnessEvidence, collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
-from biodance.effects import gates
+from biodance.effects import check_quality
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.plates.parameters import count_plates
@@ -178,8 +178,10 @@ def _shifted(evidence: WitnessEvidence, norms: Norms) -> WitnessEvidence:
 
 def named(session: Session, evidence: WitnessEvidence) -> tuple[Finding, ...]:
     """Return what checks and witnesses name in a session."""
-    checks = [gate for gate in gates(session) if not gate.ok and gate.effect in ("clipping", "axis_error")]
-    failed = tuple(Finding(gate.effect, gate.target, (), (), 1.0) for gate in checks)
+    checks = [
+        quality for quality in check_quality(session) if not quality.ok and quality.effect in ("clipping", "axis_error")
+    ]
+    failed = tuple(Finding(quality.effect, quality.target, (), (), 1.0) for quality in checks)
     said = infer_causes(evidence).findings
     return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
 

@@ -25,7 +25,7 @@ from biodance.body.body import Body
 from biodance.body.human.scaling import Scaling
 from biodance.lab.session.read import read_session
 from biodance.motion.track import track
-from biodance.pipeline.body import placed_by_movement
+from biodance.pipeline.body import calibrate_joints
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import Prepared
@@ -113,7 +113,7 @@ def _examined(scenario: Scenario) -> SessionResult:
     session = replace(session, trials=tuple(trial for trial in session.trials if trial.role != "validate"))
     with (
         patch("biodance.pipeline.session.can_identify", return_value=False),
-        patch("biodance.pipeline.body.placed_by_movement", _placed),
+        patch("biodance.pipeline.body.calibrate_joints", _placed),
         patch("biodance.pipeline.trial.track", _tracked),
     ):
         return examine(session)
@@ -141,7 +141,7 @@ BODIES, MOTIONS, PERFORMANCES = Memory(), Memory(), Memory()
 def _placed(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
     seen = tuple(one.trial.markers.xyz.tobytes() for one in read if one.trial.markers is not None)
     said = (scaling.body()[0].sip.phi.tobytes(), seen)
-    return BODIES.recall(said, lambda: placed_by_movement(scaling, read))  # type: ignore[return-value]
+    return BODIES.recall(said, lambda: calibrate_joints(scaling, read))  # type: ignore[return-value]
 
 
 def _tracked(body: Body, trial: Trial) -> Motion:

@@ -22,7 +22,7 @@ from biodance.diagnosis.learning import Null, learn_tolerances, null_of
 from biodance.diagnosis.problem import problem
 from biodance.library import folder
 from biodance.pipeline.identification import FITTED_ROLES
-from biodance.pipeline.judged_trials import looks
+from biodance.pipeline.judged_trials import windows
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
 
 TABLES = folder("anthropometry") / "uncertainty"
@@ -36,7 +36,7 @@ def nulls() -> Iterator[Null]:
     for scenario in SCENARIOS:
         result = examined(scenario)
         assert result.body is not None
-        put = problem(result.body, looks(result.trials, FITTED_ROLES))
+        put = problem(result.body, windows(result.trials, FITTED_ROLES))
         known = shipped()
         yield null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
         print(scenario.key, flush=True)

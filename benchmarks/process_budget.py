@@ -27,7 +27,7 @@ _STAGES = {
     "mismatch of kinematics": ("mismatch",),
     "what the identified body predicts": ("_predicted", "added_mass"),
     "witnesses": ("hear", "weigh"),
-    "gates": ("gates",),
+    "quality checks": ("check_quality",),
     "diagnosis: rows, sizes shown": ("problem",),
     "diagnosis: candidate causes": ("candidates", "built", "name_causes"),
     "diagnosis: limits, adequacy, other": ("diagnose_session",),

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 
 from biodance.body.human.human import human
 from biodance.diagnosis.evidence import LinearPosterior
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.effects import wrench_about_origin
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
@@ -71,7 +71,7 @@ def nothing(wrench, session, moving):
     return wrench
 
 
-def looks(seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7) -> tuple[Look, ...]:
+def windows(seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7) -> tuple[TrialWindow, ...]:
     """Return trials of a person whose parameters differ from the table by ``unlike`` of its own standard deviations;
     ``hidden`` changes the wrench.
     """
@@ -91,7 +91,7 @@ def looks(seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7) ->
         value = value + wrench_about_origin(noise(rng, moving.time.size), CORNERS.mean(axis=0))
         plate = Plate("plate1", 2, CORNERS, Wrench(moving.time, value))
         trial = Trial(f"t{k}", "fit", None, (plate,), Source(Path(f"t{k}.c3d"), "", "test"))
-        found.append(Look(trial, moving, np.ones(moving.time.size, dtype=bool), *share))
+        found.append(TrialWindow(trial, moving, np.ones(moving.time.size, dtype=bool), *share))
     return tuple(found)
 
 

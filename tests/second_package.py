@@ -22,7 +22,7 @@ LIMIT_POINT = "[biodance.limits]\nlow_hands = tiny_lab.low_hands:LowHands\n"
 CABLE = '''
 """A cable pulls sideways.
 
-Signature: a sine in Fy. Look-alikes: none. Separated by looking at the ceiling.
+Signature: a sine in Fy. TrialWindow-alikes: none. Separated by looking at the ceiling.
 """
 import numpy as np
 from biodance.effects import Case, Effect, Parameter

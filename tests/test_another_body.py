@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, known, windows
 
 from biodance.body.body import Body
 from biodance.diagnosis.diagnosis import Verdict
@@ -19,7 +19,7 @@ def gained(local, session):
 
 @pytest.fixture(scope="module")
 def examined() -> Examined:
-    some = looks(1, trials=2, hidden=about_plate(gained))
+    some = windows(1, trials=2, hidden=about_plate(gained))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_gain", "time_delay"))
     assert [finding.effect for finding in one.diagnosis.findings] == ["plate_gain"]
     return one

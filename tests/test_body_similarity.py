@@ -13,7 +13,7 @@ from robots import biped
 from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.likeness import Likeness, likeness, reframed, sole_normal, standing_frames
+from biodance.body.robot.similarity import SimilarityScale, reframed, similar_body, sole_normal, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.dynamics import joint_torques
@@ -76,8 +76,8 @@ def test_a_sole_that_faces_elsewhere_is_refused() -> None:
 
 
 def test_a_likeness_moves_alike_under_the_same_gravity() -> None:
-    to = Likeness(3.6, 8.2)
-    big, motion = likeness(HOAP, to), random_motion(HOAP, np.random.default_rng(3), frames=5)
+    to = SimilarityScale(3.6, 8.2)
+    big, motion = similar_body(HOAP, to), random_motion(HOAP, np.random.default_rng(3), frames=5)
     units = np.concatenate([np.full(3, to.length), np.ones(HOAP.nv - 3)])
     q = motion.q.copy()
     q[:, :3] *= to.length
@@ -89,6 +89,6 @@ def test_a_likeness_moves_alike_under_the_same_gravity() -> None:
     np.testing.assert_allclose(torques[1], to.mass * to.length * torques[0], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(big.limits.torque_upper / HOAP.limits.torque_upper, to.mass * to.length)
     np.testing.assert_allclose(big.limits.velocity * to.time, HOAP.limits.velocity)
-    back = likeness(big, Likeness(1 / to.length, 1 / to.mass))
+    back = similar_body(big, SimilarityScale(1 / to.length, 1 / to.mass))
     np.testing.assert_allclose(back.sip.phi, HOAP.sip.phi, rtol=1e-12)
     np.testing.assert_allclose(back.sip.covariance, HOAP.sip.covariance, rtol=1e-9, atol=1e-18)

@@ -13,11 +13,13 @@ from identified_sessions import body, session_result
 from biodance.body.export.csv import STANDARD
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
-from biodance.effects import Gate
+from biodance.effects import QualityCheck
 from biodance.lab.opensim.mot import read_mot
 from biodance.pipeline.export import MOTION_FORMATS, legal_formats
 
-SWAPPED = Gate("labels of the markers", False, "A and B carry each other's names in fit_0.", "labels_swapped", "A/B")
+SWAPPED = QualityCheck(
+    "labels of the markers", False, "A and B carry each other's names in fit_0.", "labels_swapped", "A/B"
+)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import mismatch, temper
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Subject
@@ -52,12 +52,12 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     noise = typical_noise(wrench)
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
-    belief = posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))
+    posterior = find_posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))
     found = expected_spread(BODY, motion, np.array([6.0]))
     for i in range(12):
         cut = slice(10 * i, 10 * i + 10)
-        _, slope = segment_quantities(belief.prior.phi[cut])
-        variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
+        _, slope = segment_quantities(posterior.prior.phi[cut])
+        variance = np.diag(slope @ posterior.covariance[cut, cut] @ slope.T)
         assert found.mass[1, i] == pytest.approx(np.sqrt(variance[0]), rel=1e-6)
         assert found.com[1, i] == pytest.approx(np.sqrt(variance[1:4].mean()), rel=1e-6)
-    np.testing.assert_allclose(belief.mean, widened(BODY.sip).phi, atol=1e-6)
+    np.testing.assert_allclose(posterior.mean, widened(BODY.sip).phi, atol=1e-6)

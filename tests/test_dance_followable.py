@@ -18,7 +18,7 @@ from biodance.dance.followable.walk import NoWay, Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, PlannedDance
 from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import Rehearsed, Room, perform_with, rehearse_imprecisely
+from biodance.dance.performers import PerformersMargin, Rehearsed, perform_with, rehearse_imprecisely
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
@@ -62,7 +62,7 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(walked,
 
     def performed(_workers, dance, _limits, *, who=range(200), only=()):
         bad = bool((dance.postures == steps[2].x).all(axis=1).any()) and (not only or 2 in only)
-        room = Room("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
+        room = PerformersMargin("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
         return Rehearsed(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
 
     monkeypatch.setattr(mending, "perform_with", performed)
@@ -153,7 +153,7 @@ def test_performers_looked_at_together_are_those_looked_at_alone() -> None:
     together = rehearse_imprecisely(dance, PLAN.limits, who=range(3), only=(1, 2))
     assert set(together.bad) == {bad for one in alone for bad in one.bad}
     assert together.failed == tuple(k for one in alone for k in one.failed)
-    for room in together.rooms:
+    for room in together.least_margins:
         assert room.worst == pytest.approx(min(one[room.limit].worst for one in alone), abs=1e-12)
         assert room.failing == pytest.approx(np.mean([one[room.limit].failing for one in alone]))
 

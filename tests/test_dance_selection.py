@@ -108,8 +108,8 @@ def test_emphasis_is_on_the_segment_that_counts(segment: str) -> None:
 
 def test_learned_is_the_textbook_update() -> None:
     rng = np.random.default_rng(0)
-    belief, rows = np.diag(rng.uniform(0.5, 1.0, 5)), rng.normal(size=(3, 5))
-    change = learned(belief, rows)
+    posterior, rows = np.diag(rng.uniform(0.5, 1.0, 5)), rng.normal(size=(3, 5))
+    change = learned(posterior, rows)
     np.testing.assert_allclose(
-        belief - change.T @ change, np.linalg.inv(np.linalg.inv(belief) + rows.T @ rows), atol=1e-12
+        posterior - change.T @ change, np.linalg.inv(np.linalg.inv(posterior) + rows.T @ rows), atol=1e-12
     )

@@ -4,34 +4,34 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, body, known, looks, redrawn
+from diagnosed_sessions import RATE, body, known, redrawn, windows
 
 from biodance.diagnosis.adequacy import (
+    CONFLICT_LIMIT,
     LIMIT,
-    STRAINED,
     adequacy,
+    conflict_at_loudness,
+    conflict_at_own_noise,
     energies,
     loudness,
-    strain,
-    strain_at_loudness,
-    strain_at_own_noise,
+    prior_data_conflict,
     unlikely,
     verdict,
 )
 from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
-from biodance.effects import Gate
+from biodance.effects import QualityCheck
 
 
 def test_chance_spreads_more_in_a_short_session() -> None:
     """Three seconds hold one coefficient below 0.3 Hz: its square is more than seven times the mean in one of 150."""
     worst = []
     for seed in range(12):
-        look = looks(seed, trials=1)[0]
-        use = np.zeros(look.use.size, dtype=bool)
+        window = windows(seed, trials=1)[0]
+        use = np.zeros(window.use.size, dtype=bool)
         use[int(2 * RATE) : int(5 * RATE)] = True
-        found, _ = build_model(problem(body(), (replace(look, use=use),)), known(), ("plate_offset",))
+        found, _ = build_model(problem(body(), (replace(window, use=use),)), known(), ("plate_offset",))
         worst.append(adequacy(found)[0].z)
     assert max(worst) < LIMIT
     assert max(worst) > 1.0, "the rows still spread"
@@ -41,7 +41,7 @@ def test_a_session_louder_in_all_bands_alike_is_no_alarm() -> None:
     """Numbers that spread by a tenth: a seventh more everywhere is nothing, a half more three standard deviations
     beyond that, and a seventh more in Fy alone two.
     """
-    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    found, _ = build_model(problem(body(), windows(3)), known(), ("plate_offset",))
     left, nothing, rows = found.posterior.residual, 0 * found.posterior.mean, 6 * found.problem.spectrum.band.size
     usual = replace(found.tolerances, energy=energies(found), energy_sd=0.1 * energies(found))
 
@@ -62,43 +62,43 @@ def test_a_body_as_people_are_is_no_strain_and_a_strange_one_is() -> None:
     """Bodies drawn from the prior strain it as a standard normal number does; one with twice the deviations does not
     pass.
     """
-    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    found, _ = build_model(problem(body(), windows(3)), known(), ("plate_offset",))
     rng, columns = np.random.default_rng(7), found.posterior.X
     largest = np.take_along_axis(columns, np.abs(columns).argmax(axis=0)[None], axis=0)[0]
 
-    def strained(size: float) -> float:
+    def in_conflict(size: float) -> float:
         signs = np.sign(largest)  # columns have the kernel's sign, bodies have not
-        return strain(redrawn(found, rng, unlike=size, signs=signs))
+        return prior_data_conflict(redrawn(found, rng, unlike=size, signs=signs))
 
-    usual = np.array([strained(1.0) for _ in range(200)])
+    usual = np.array([in_conflict(1.0) for _ in range(200)])
     assert abs(usual.mean()) < 0.25
     assert 0.8 < usual.std() < 1.2
-    assert usual.max() < STRAINED
-    assert np.median([strained(2.0) for _ in range(20)]) > STRAINED
+    assert usual.max() < CONFLICT_LIMIT
+    assert np.median([in_conflict(2.0) for _ in range(20)]) > CONFLICT_LIMIT
 
 
 def test_a_strange_body_is_excused_by_a_loud_session_and_not_by_one_loud_channel() -> None:
     """Noise everywhere moves the body; noise of Fy alone is what a fault leaves there."""
-    found, _ = build_model(problem(body(), looks(3)), known(), ("plate_offset",))
+    found, _ = build_model(problem(body(), windows(3)), known(), ("plate_offset",))
     rows, rng = 6 * found.problem.spectrum.band.size, np.random.default_rng(7)
     drawn = [redrawn(found, rng, unlike=3.0, loud=1.1) for _ in range(20)]
-    louder = [one for one in drawn if loudness(one) > 1.05 and strain(one) > STRAINED]
+    louder = [one for one in drawn if loudness(one) > 1.05 and prior_data_conflict(one) > CONFLICT_LIMIT]
     assert len(louder) > 5
-    assert all(strain_at_loudness(one) < strain(one) for one in louder)
-    assert any(strain_at_loudness(one) > STRAINED for one in louder)
+    assert all(conflict_at_loudness(one) < prior_data_conflict(one) for one in louder)
+    assert any(conflict_at_loudness(one) > CONFLICT_LIMIT for one in louder)
     quiet = redrawn(found, rng, unlike=3.0, loud=0.8)
     y = np.array(quiet.posterior.y)
     y[1:rows:6] += 3.0 * rng.normal(size=rows // 6)
     one_channel = replace(quiet, posterior=LinearPosterior.for_target(quiet.posterior.X, quiet.posterior.factor, y))
-    assert strain(one_channel) > STRAINED
-    assert strain_at_loudness(one_channel) == pytest.approx(strain(one_channel), rel=1e-9)
-    assert strain_at_own_noise(one_channel) < strain(one_channel)
+    assert prior_data_conflict(one_channel) > CONFLICT_LIMIT
+    assert conflict_at_loudness(one_channel) == pytest.approx(prior_data_conflict(one_channel), rel=1e-9)
+    assert conflict_at_own_noise(one_channel) < prior_data_conflict(one_channel)
 
 
 def test_a_strained_body_is_never_complete() -> None:
     assert verdict(1, 1.0, ()) == "named, complete"
-    assert verdict(1, 1.0, (), strained=True) == "unexplained"
-    assert verdict(0, 1.0, (), strained=True) == "unexplained"
+    assert verdict(1, 1.0, (), in_conflict=True) == "unexplained"
+    assert verdict(0, 1.0, (), in_conflict=True) == "unexplained"
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_the_verdict_turns_at_four_and_a_half_and_at_nine_deviations(named: int,
 
 
 def test_a_failed_check_is_a_name_too() -> None:
-    failed, passed = (Gate("labels", ok, "Seen.") for ok in (False, True))
+    failed, passed = (QualityCheck("labels", ok, "Seen.") for ok in (False, True))
     assert verdict(0, 1.0, (failed,)) == "named, complete"
     assert verdict(0, 1.0, (passed,)) == "nothing wrong"
     assert verdict(0, 4.6, (failed, passed)) == "named, incomplete"

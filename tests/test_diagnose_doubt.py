@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, known, windows
 from scipy.interpolate import make_interp_spline
 
 from biodance.diagnosis import engine
@@ -30,7 +30,7 @@ def late(seconds: float):
 
 def delayed(seconds: float, *, error: float):
     """Diagnose forces that come late, where the size of a delay errs by a share of itself."""
-    some = looks(1, trials=2, hidden=late(seconds))
+    some = windows(1, trials=2, hidden=late(seconds))
     tolerances = replace(known(), accuracy={"time_delay": error})
     return diagnose_trials(body(), some, tolerances=tolerances, effects=("time_delay",)).diagnosis
 
@@ -83,7 +83,7 @@ def test_a_tolerance_is_torn_beyond_what_a_louder_laboratory_has(leak: float, fa
         local[:, 0] += leak * local[:, 2]
         return local
 
-    some = looks(1, hidden=about_plate(leaking))
+    some = windows(1, hidden=about_plate(leaking))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert [like.effect for like in one.resembles] == ["plate_offset"]

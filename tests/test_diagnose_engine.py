@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, body, delay, gain, known, looks, motion, nothing, offset, pull
+from diagnosed_sessions import RATE, body, delay, gain, known, motion, nothing, offset, pull, windows
 from scipy.signal import butter, filtfilt
 
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
@@ -37,7 +37,7 @@ FAST = (
 
 
 def found(hidden, *, seed: int = 1, chosen=FAST):
-    return diagnose_trials(body(), looks(seed, hidden=hidden), tolerances=known(), effects=chosen)
+    return diagnose_trials(body(), windows(seed, hidden=hidden), tolerances=known(), effects=chosen)
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, si
 def test_the_size_told_holds_what_the_cause_s_own_tolerance_took() -> None:
     """Clocks that differ by 3 ms in every laboratory take 0.7 of 20 ms from the name: told is what is there."""
     mine = replace(known(), sizes={**known().sizes, "time_delay": 0.003})
-    found = diagnose_trials(body(), looks(2, hidden=delay), tolerances=mine, effects=FAST)
+    found = diagnose_trials(body(), windows(2, hidden=delay), tolerances=mine, effects=FAST)
     (cause,), (finding,) = found.naming.found.named, found.diagnosis.findings
     assert cause.theta[0] < 0.0196
     assert finding.parameters[0].value == pytest.approx(0.02, rel=0.01)
@@ -145,7 +145,7 @@ def test_a_load_is_named_with_mass_and_place() -> None:
 
 @pytest.mark.parametrize(("sloshing", "sd", "itself"), [(0.04, 0.01, False), (0.5, 0.4, False), (0.5, 0.1, True)])
 def test_a_load_in_which_nothing_sloshes_is_no_sloshing_load(sloshing: float, sd: float, itself: bool) -> None:
-    some, _ = build_model(problem(body(), looks(1, trials=1)), known(), ("sloshing_load",))
+    some, _ = build_model(problem(body(), windows(1, trials=1)), known(), ("sloshing_load",))
     carried = replace(effect("sloshing_load"), target="trunk_head")
     one = NamedCause(carried, np.array([5.0, sloshing, -0.2, -0.05]), np.diag([0.1, sd, 0.01, 0.01]) ** 2)
     assert can_be_named(some, one) is itself
@@ -174,10 +174,10 @@ def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
     )  # of a force that rises and falls in proportion to time, half of the squares lie above this share of its peak
     np.testing.assert_allclose(size, middle * np.array([0.0, 4.5, 15.0]), atol=1.5)
     np.testing.assert_allclose(examined.named[0].effect.place, [0.0, 0.08, 0.0], atol=0.03)
-    look = looks(1, hidden=touched)[0]
-    case = Case(one, look.trial, look.motion, one.sip.phi, np.linspace(0, 0.25, look.motion.time.size))
-    added = accept(case, examined.named).trial.wrench.value - look.trial.wrench.value
-    assert added[look.motion.time == 5.0, 2] == pytest.approx(15.0, abs=3.0)
+    window = windows(1, hidden=touched)[0]
+    case = Case(one, window.trial, window.motion, one.sip.phi, np.linspace(0, 0.25, window.motion.time.size))
+    added = accept(case, examined.named).trial.wrench.value - window.trial.wrench.value
+    assert added[window.motion.time == 5.0, 2] == pytest.approx(15.0, abs=3.0)
 
 
 def test_a_foot_that_touches_is_named_though_the_mean_of_a_trial_is_hidden() -> None:
@@ -209,7 +209,9 @@ def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkey
         return filtfilt(*butter(1, 2.5 / (1.5 * RATE)), wrench, axis=0, padlen=100)
 
     monkeypatch.setattr("diagnosed_sessions.motion", quick)
-    put, causes = build_model(problem(body(), looks(1, hidden=filtered)), known(), ("filter_mismatch", "wobbling_mass"))
+    put, causes = build_model(
+        problem(body(), windows(1, hidden=filtered)), known(), ("filter_mismatch", "wobbling_mass")
+    )
     suspects = {one.effect.name: one for one in reversed(screen(put, causes))}
     one = suspects["filter_mismatch"]
     assert one.score > suspects["wobbling_mass"].score
@@ -220,15 +222,21 @@ def test_a_filter_far_below_is_found_though_its_slope_at_none_says_little(monkey
 
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
-    looked_at = looks(1, trials=6, hidden=gain(0.05))
+    looked_at = windows(1, trials=6, hidden=gain(0.05))
     examined = diagnose_trials(body(), looked_at[:4], tolerances=known(), effects=FAST)
     kept = looked_at[4:]
     cases = [
-        Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(look.start, look.end, look.motion.time.size))
-        for look in kept
+        Case(
+            body(),
+            window.trial,
+            window.motion,
+            body().sip.phi,
+            np.linspace(window.start, window.end, window.motion.time.size),
+        )
+        for window in kept
     ]
-    as_is = tuple(case_fit(case, look.use) for case, look in zip(cases, kept, strict=True))
-    mended = tuple(case_fit(accept(case, examined.named), look.use) for case, look in zip(cases, kept, strict=True))
+    as_is = tuple(case_fit(case, window.use) for case, window in zip(cases, kept, strict=True))
+    mended = tuple(case_fit(accept(case, examined.named), window.use) for case, window in zip(cases, kept, strict=True))
     about = standing_point(as_is)
     before = residuals_of(identified(examined.naming.first.phi), as_is, about)
     after = residuals_of(identified(examined.naming.found.phi), mended, about)
@@ -247,24 +255,26 @@ def identified(phi):
 
 
 def test_a_gain_needs_three_blocks() -> None:
-    look = looks(1, trials=1)[0]
-    use = look.use & (look.motion.time < 1.5)
-    fit = case_fit(Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size)), use)
+    window = windows(1, trials=1)[0]
+    use = window.use & (window.motion.time < 1.5)
+    fit = case_fit(
+        Case(body(), window.trial, window.motion, body().sip.phi, np.linspace(0, 1, window.motion.time.size)), use
+    )
     one = residuals_of(body(), (fit,), np.zeros(3))
     with pytest.raises(BiodanceError, match="needs 3"):
         gain_by_naming(one, one, fitted=(one, one))
 
 
 def test_too_short_trials_are_refused() -> None:
-    (look,) = looks(1, trials=1)
-    short = replace(look, use=look.motion.time < 0.5)
+    (window,) = windows(1, trials=1)
+    short = replace(window, use=window.motion.time < 0.5)
     with pytest.raises(TrialRefused, match="1 s of fully measured"):
         diagnose_trials(body(), (short,), tolerances=known())
 
 
 def test_a_cause_that_is_not_in_the_family_is_refused() -> None:
     with pytest.raises(UnknownName, match="plate_gain"):
-        diagnose_trials(body(), looks(1, trials=1), tolerances=known(), effects=("plate_gian",))
+        diagnose_trials(body(), windows(1, trials=1), tolerances=known(), effects=("plate_gian",))
 
 
 def test_limits_come_without_the_forces() -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, body, known, looks, motion, offset
+from diagnosed_sessions import RATE, body, known, motion, offset, windows
 
 from biodance.diagnosis.adequacy import adequacy, largest_z, verdict
 from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT, Adequacy, least, matters
@@ -12,7 +12,7 @@ from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import build_model, drop_weak_causes, is_significant, required_evidence, settle
 from biodance.diagnosis.problem import problem
-from biodance.effects import Case, Gate, effects
+from biodance.effects import Case, QualityCheck, effects
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Wrench
 from biodance.uncertainty.tolerances import shipped, table_sizes, without_habits
@@ -22,18 +22,18 @@ FAST = ("plate_gain", "plate_offset", "plate_drift", "time_delay", "body_mass", 
 
 def standing_looks(shift: float):
     """Return quiet standing with ``shift`` N too much of Fx."""
-    look = looks(1, trials=1)[0]
+    window = windows(1, trials=1)[0]
     moving, frames = motion(3), int(4 * RATE)
     zero = np.zeros((frames, moving.v.shape[1]))
     still = Motion(np.arange(frames) / RATE, np.repeat(moving.q[:1], frames, axis=0), zero, zero)
     value = predict_wrench(body(), still).value + shift * np.eye(6)[0]
-    plate = replace(look.trial.plates[0], wrench=Wrench(still.time, value))
-    quiet = replace(look.trial, role="fit", plates=(plate,))
-    return (replace(look, trial=quiet, motion=still, use=np.ones(frames, dtype=bool)),)
+    plate = replace(window.trial.plates[0], wrench=Wrench(still.time, value))
+    quiet = replace(window.trial, role="fit", plates=(plate,))
+    return (replace(window, trial=quiet, motion=still, use=np.ones(frames, dtype=bool)),)
 
 
 def test_standing_alone_names_nothing_however_large() -> None:
-    moving = diagnose_trials(body(), looks(1, hidden=offset(40.0)), tolerances=known(), effects=FAST)
+    moving = diagnose_trials(body(), windows(1, hidden=offset(40.0)), tolerances=known(), effects=FAST)
     assert [one.effect for one in moving.diagnosis.findings] == ["plate_offset"]
     quiet = diagnose_trials(body(), standing_looks(40.0), tolerances=known(), effects=FAST).diagnosis
     assert (quiet.findings, quiet.resembles) == ((), ())
@@ -42,7 +42,7 @@ def test_standing_alone_names_nothing_however_large() -> None:
 
 def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
     """Offset and nothing else is hidden: a delay named beside it has no size of its own and falls, the offset stays."""
-    put = problem(body(), looks(2, hidden=offset(12.0)), chosen=FAST)
+    put = problem(body(), windows(2, hidden=offset(12.0)), chosen=FAST)
     found, causes = build_model(put, known(), FAST)
     one = {cause.names: cause for cause in causes}
     start = tuple(
@@ -64,7 +64,7 @@ def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
 
 
 def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stand() -> None:
-    found, _ = build_model(problem(body(), looks(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
+    found, _ = build_model(problem(body(), windows(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
     offset_fx = effects()["plate_offset"].at("Fx", found.problem.cases[0])
     assert not is_significant(found, NamedCause(offset_fx, np.array([5.9]), np.array([[9.0]])))
     assert is_significant(found, NamedCause(offset_fx, np.array([-6.1]), np.array([[9.0]])))
@@ -76,7 +76,7 @@ def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stan
 
 
 def test_what_hides_needs_overwhelming_evidence() -> None:
-    found, _ = build_model(problem(body(), looks(1), chosen=("plate_offset",)), known(), ("plate_offset",))
+    found, _ = build_model(problem(body(), windows(1), chosen=("plate_offset",)), known(), ("plate_offset",))
     assert required_evidence(found, 0.2) == found.tolerances.threshold
     assert required_evidence(found, 0.19) == 3 * found.tolerances.threshold
 
@@ -104,7 +104,7 @@ def test_a_poor_model_resembles_and_is_no_finding() -> None:
         knock = 40.0 * np.sin(2 * np.pi * 4.0 * moving.time) * (np.abs(moving.time - 6.0) < 1.0)
         return offset(12.0)(wrench + knock[:, None] * (np.arange(6) == 1), session, moving)
 
-    one = diagnose_trials(body(), looks(1, hidden=knocked), tolerances=known(), effects=FAST).diagnosis
+    one = diagnose_trials(body(), windows(1, hidden=knocked), tolerances=known(), effects=FAST).diagnosis
     assert one.verdict == "unexplained"
     assert one.findings == ()
     assert "plate_offset" in {finding.effect for finding in one.resembles}
@@ -122,15 +122,15 @@ def test_a_poor_model_resembles_and_is_no_finding() -> None:
     ],
 )
 def test_a_cause_matters_from_its_least_size_on(name, target, small, large) -> None:
-    look = looks(1, trials=1)[0]
-    case = Case(body(), look.trial, look.motion, body().sip.phi, np.linspace(0, 1, look.motion.time.size))
+    window = windows(1, trials=1)[0]
+    case = Case(body(), window.trial, window.motion, body().sip.phi, np.linspace(0, 1, window.motion.time.size))
     one = effects()[name].at(target, case)
     assert not matters(one, np.array(small))
     assert matters(one, np.array(large))
 
 
 def test_a_cause_within_any_tolerance_is_told_but_no_finding() -> None:
-    one = diagnose_trials(body(), looks(1, hidden=offset(1.9)), tolerances=replace(known(), sizes={}), effects=FAST)
+    one = diagnose_trials(body(), windows(1, hidden=offset(1.9)), tolerances=replace(known(), sizes={}), effects=FAST)
     assert one.diagnosis.verdict == "nothing wrong"
     assert one.diagnosis.findings == ()
     assert [finding.effect for finding in one.diagnosis.tolerated] == ["plate_offset"]
@@ -145,7 +145,7 @@ def test_an_alarm_must_matter_physically() -> None:
     assert largest_z((small, force)) == 5.0
     assert largest_z((small, large)) == 12.0
     assert verdict(0, largest_z((small,)), ()) == "nothing wrong"
-    assert verdict(1, largest_z((large,)), (Gate("x", True, ""),)) == "unexplained"
+    assert verdict(1, largest_z((large,)), (QualityCheck("x", True, ""),)) == "unexplained"
 
 
 def test_the_size_of_what_is_left_is_in_newton() -> None:
@@ -155,7 +155,7 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
         return wrench + 6.0 * np.sin(2 * np.pi * 1.5 * moving.time)[:, None] * (np.arange(6) == 0)
 
     found, _ = build_model(
-        problem(body(), looks(1, hidden=beaten), chosen=("plate_offset",)), known(), ("plate_offset",)
+        problem(body(), windows(1, hidden=beaten), chosen=("plate_offset",)), known(), ("plate_offset",)
     )
     row = next(one for one in adequacy(found) if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
     assert row.size == pytest.approx(6.0 / np.sqrt(2), rel=0.15)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, known, windows
 
 from biodance.diagnosis import engine
 from biodance.diagnosis.accept import case_fit
@@ -26,16 +26,18 @@ def faulty(local, session):
 
 def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Examined, gains.Accepted]:
     """Return the diagnosis of a session with two faults, and what accepting them and a third one changes."""
-    every = looks(1, trials=4, hidden=about_plate(faulty))
+    every = windows(1, trials=4, hidden=about_plate(faulty))
     by_role = {"fit": every[:2], "validate": every[2:]}
-    monkeypatch.setattr(gains, "looks", lambda _, roles: by_role[roles[0]])
+    monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
     monkeypatch.setattr(
         engine, "significant_dependences", lambda _: {}
     )  # which would refuse the bogus drift before its gain is asked
     found = diagnose_trials(
         body(), by_role["fit"], tolerances=known(), effects=("plate_gain", "plate_offset", "plate_drift")
     )
-    fits = tuple(case_fit(case, look.use) for case, look in zip(cases_of(body(), every[:2]), every[:2], strict=True))
+    fits = tuple(
+        case_fit(case, window.use) for case, window in zip(cases_of(body(), every[:2]), every[:2], strict=True)
+    )
     result = SimpleNamespace(body=body(), trials=())
     return found, gains.accepted(result, with_bogus(found), identify_body(body(), fits))  # type: ignore[arg-type]
 

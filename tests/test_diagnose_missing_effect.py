@@ -1,7 +1,7 @@
 """The culprit's effect is not in the family: no innocent is named in its place, and "nothing wrong" is not said."""
 
 import numpy as np
-from diagnosed_sessions import about_plate, body, gain, known, looks
+from diagnosed_sessions import about_plate, body, gain, known, windows
 
 from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
 from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, diagnose_trials
@@ -14,7 +14,7 @@ def shifted(local, session):
 
 
 def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
-    some = looks(1, trials=2, hidden=about_plate(shifted))
+    some = windows(1, trials=2, hidden=about_plate(shifted))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_crosstalk",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
@@ -24,7 +24,7 @@ def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
 
 def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
     """A gain of 5 % is 25 times what these plates have."""
-    some = looks(1, trials=2, hidden=gain(0.05))
+    some = windows(1, trials=2, hidden=gain(0.05))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert OUTSIDE_TOLERANCES in one.notes

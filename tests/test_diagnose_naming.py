@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, known, windows
 
 from biodance.diagnosis.naming import Round, build_model, passes_threshold, refine
 from biodance.diagnosis.problem import problem
@@ -56,7 +56,7 @@ def test_only_what_the_screening_suspects_is_fitted(score: float, first: tuple[s
         local[:, 2] *= 1.05
         return local
 
-    put, causes = build_model(problem(body(), looks(1, hidden=about_plate(gained))), known(), ("plate_gain",))
+    put, causes = build_model(problem(body(), windows(1, hidden=about_plate(gained))), known(), ("plate_gain",))
     true, other = (next(one for one in screen(put, causes) if one.names[1] == channel) for channel in ("Fz", "Fx"))
     ranking = Round((replace(other, score=11.0, log_bayes_factor=11.0), replace(true, score=score)))
     refined, _ = refine(put, ranking)

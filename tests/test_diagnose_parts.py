@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks
+from diagnosed_sessions import body, known, windows
 from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
@@ -61,7 +61,7 @@ def test_the_smallest_size_meets_the_threshold_in_the_mean() -> None:
 
 @pytest.fixture(scope="module")
 def put():
-    return problem(body(), looks(3, trials=2))
+    return problem(body(), windows(3, trials=2))
 
 
 def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
@@ -71,7 +71,7 @@ def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
 
 
 def test_what_comes_and_goes_bears_a_trial_of_which_too_little_is_measured() -> None:
-    whole, other = looks(3, trials=2)
+    whole, other = windows(3, trials=2)
     short = problem(body(), (whole, replace(other, use=other.motion.time < 0.5)))
     columns = local_basis(short, replace(effect("external_contact"), target="left_forearm_hand"))
     first, last = model(short, (), known()).white_by_trial(columns).parts

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks
+from diagnosed_sessions import body, known, windows
 
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
@@ -15,7 +15,7 @@ STEADY = ("plate_offset", "external_contact")
 
 
 def shares(tolerances):
-    model, causes = build_model(problem(body(), looks(1, trials=2)), tolerances, STEADY)
+    model, causes = build_model(problem(body(), windows(1, trials=2)), tolerances, STEADY)
     return model, {one.names: one.visible for one in screen(model, causes)}
 
 
@@ -33,7 +33,7 @@ def test_what_looks_like_a_zero_is_seen_less_the_more_zeros_differ() -> None:
 def test_the_length_of_columns_is_that_beside_plates_without_zeros() -> None:
     """Of all columns at once, of one trial's, and of a course that comes and goes."""
     spread = of_zeros([12.0, 12.0])
-    put = problem(body(), looks(1, trials=2))
+    put = problem(body(), windows(1, trials=2))
     (alone, _), (model, _) = (build_model(put, one, STEADY) for one in (known(), with_zeros(known(), spread, 70.0)))
     rows = np.random.default_rng(3).normal(size=(len(put.target), 4))
     assert model.length(model.white(rows)) == pytest.approx(np.sum(alone.white(rows) ** 2))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks
+from diagnosed_sessions import about_plate, body, known, windows
 
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.uncertainty.tolerances import Tolerances, table_sizes
@@ -30,13 +30,13 @@ def leaking(seed: int, *, clear: float = 0.0):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_crosstalk_that_calibrated_plates_keep_is_no_finding(seed: int) -> None:
-    some = looks(seed, trials=2, hidden=leaking(seed))
+    some = windows(seed, trials=2, hidden=leaking(seed))
     one = diagnose_trials(body(), some, tolerances=installed(), effects=("plate_crosstalk",)).diagnosis
     assert (one.verdict, one.findings, one.resembles) == ("nothing wrong", (), ())
 
 
 def test_a_clear_crosstalk_beside_them_is_named_with_its_size() -> None:
-    some = looks(1, trials=2, hidden=leaking(1, clear=0.025))
+    some = windows(1, trials=2, hidden=leaking(1, clear=0.025))
     one = diagnose_trials(body(), some, tolerances=installed(), effects=("plate_crosstalk",)).diagnosis
     (found,) = one.findings
     assert (found.effect, found.target) == ("plate_crosstalk", "Fz->Fx")

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import about_plate, body, known, looks, redrawn
+from diagnosed_sessions import about_plate, body, known, redrawn, windows
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.diagnosis import witness_evidence
-from biodance.diagnosis.adequacy import LIMIT, STRAINED, energies, strain, strain_at_own_noise
+from biodance.diagnosis.adequacy import CONFLICT_LIMIT, LIMIT, conflict_at_own_noise, energies, prior_data_conflict
 from biodance.diagnosis.combine_witnesses import combine_findings
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
@@ -37,7 +37,7 @@ def leaking(local, session):
 
 @pytest.mark.parametrize(("change", "guilty", "innocent"), [(zero, ZERO, LEAK), (leaking, LEAK, ZERO)])
 def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guilty, innocent) -> None:
-    some = looks(1, trials=2, hidden=about_plate(change))
+    some = windows(1, trials=2, hidden=about_plate(change))
     right, wrong = (
         diagnose_trials(body(), some, tolerances=known(), effects=(name,)) for name, _ in (guilty, innocent)
     )
@@ -55,13 +55,13 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
 
 def test_a_zero_that_the_reader_took_off_in_one_trial_is_that_of_the_others() -> None:
     """Two of four trials saw the plate empty: the reader took the 25 N off there, and nowhere else."""
-    some = looks(
+    some = windows(
         1, trials=4, hidden=about_plate(lambda local, session: zero(local, session) if session[0] < 0.4 else local)
     )
-    plates = [look.trial.plates[0] for look in some]
+    plates = [window.trial.plates[0] for window in some]
     tared = tuple(
-        replace(look, trial=replace(look.trial, plates=(replace(plate, zero=np.array([25.0, 0, 0]) * (k > 1)),)))
-        for k, (look, plate) in enumerate(zip(some, plates, strict=True))
+        replace(window, trial=replace(window.trial, plates=(replace(plate, zero=np.array([25.0, 0, 0]) * (k > 1)),)))
+        for k, (window, plate) in enumerate(zip(some, plates, strict=True))
     )
     untold, told = (
         diagnose_trials(body(), those, tolerances=known(), effects=("plate_offset",)) for those in (some, tared)
@@ -78,11 +78,11 @@ def test_a_gain_is_not_doubted_where_the_movement_itself_errs(seed: int) -> None
     there the error of what the movement needs is a good part of it, and its share in the residual has the other sign.
     """
     rng, some = np.random.default_rng(seed), []
-    for look in looks(1, trials=3, hidden=about_plate(lambda local, session: local * [1, 1, 1, 1.07, 1, 1])):
-        band = butter(4, (2.5, 6.0), "bandpass", fs=look.motion.rate, output="sos")
-        shaken = sosfiltfilt(band, rng.normal(size=len(look.motion.a)))
-        wrong = look.motion.a + 0.025 * (shaken / shaken.std())[:, None] * np.eye(look.motion.a.shape[1])[3]
-        some.append(replace(look, motion=replace(look.motion, a=wrong)))
+    for window in windows(1, trials=3, hidden=about_plate(lambda local, session: local * [1, 1, 1, 1.07, 1, 1])):
+        band = butter(4, (2.5, 6.0), "bandpass", fs=window.motion.rate, output="sos")
+        shaken = sosfiltfilt(band, rng.normal(size=len(window.motion.a)))
+        wrong = window.motion.a + 0.025 * (shaken / shaken.std())[:, None] * np.eye(window.motion.a.shape[1])[3]
+        some.append(replace(window, motion=replace(window.motion, a=wrong)))
     noise = known().noise.copy()
     noise[4, 3, 3] = 1.0
     found = diagnose_trials(body(), tuple(some), tolerances=replace(known(), noise=noise), effects=("plate_gain",))
@@ -93,7 +93,7 @@ def test_a_gain_is_not_doubted_where_the_movement_itself_errs(seed: int) -> None
 
 def test_what_is_told_must_move_something_that_matters() -> None:
     """A leak of 1 % of a shear of some newtons is large for a plate, and a tenth of a newton."""
-    some = looks(1, trials=1, hidden=about_plate(zero))
+    some = windows(1, trials=1, hidden=about_plate(zero))
     found = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).naming.found
     (named,) = found.named
     leak = NamedCause(effects()["plate_crosstalk"].at("Fy->Fz", found.problem.cases[0]), np.array([0.01]), np.eye(1))
@@ -167,10 +167,10 @@ def test_a_loud_person_makes_no_body_strange_and_a_strange_body_stays_strange() 
     """Everything 2.4 times as loud as known pulls the body about; its deviations are then no news. A body three times
     as unlike the table as people are stays strange beside the usual noise.
     """
-    found, _ = build_model(problem(body(), looks(3, trials=2)), known(), ("plate_offset",))
+    found, _ = build_model(problem(body(), windows(3, trials=2)), known(), ("plate_offset",))
     rng = np.random.default_rng(7)
     loud, strange = redrawn(found, rng, unlike=2.0, loud=2.4), redrawn(found, rng, unlike=3.0)
     assert np.median(energies(loud)) > 2.0
-    assert strain(loud) > STRAINED
-    assert strain_at_own_noise(loud) < strain(loud)
-    assert strain_at_own_noise(strange) > STRAINED
+    assert prior_data_conflict(loud) > CONFLICT_LIMIT
+    assert conflict_at_own_noise(loud) < prior_data_conflict(loud)
+    assert conflict_at_own_noise(strange) > CONFLICT_LIMIT

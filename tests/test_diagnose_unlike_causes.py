@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks
+from diagnosed_sessions import body, known, windows
 
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause, with_unlike_causes
@@ -36,7 +36,7 @@ def shaken(time: Array, late: float) -> Array:
 
 def told(newton: float, late: float):
     """Return what is said of a cable of ``newton`` N that swings ``late`` rad behind its model."""
-    some = looks(1, hidden=lambda wrench, session, moving: wrench + newton * shaken(moving.time, late))
+    some = windows(1, hidden=lambda wrench, session, moving: wrench + newton * shaken(moving.time, late))
     every = effects(("time_delay", "plate_offset", "plate_gain", "body_mass")) | {"cable": Cable()}
     return diagnose_trials(body(), some, tolerances=known(), effects=every)
 
@@ -54,7 +54,7 @@ def test_a_model_that_is_plainly_wrong_is_no_finding() -> None:
 
 def named(newton: float):
     """Return a model in which a cable of ``newton`` N is named, and that without any cause."""
-    some = looks(1, hidden=lambda wrench, session, moving: wrench + newton * shaken(moving.time, 0.0))
+    some = windows(1, hidden=lambda wrench, session, moving: wrench + newton * shaken(moving.time, 0.0))
     every = effects(("plate_offset", "plate_gain")) | {"cable": Cable()}
     bare, _ = build_model(problem(body(), some), known(), every)
     return settle(bare, (NamedCause(Cable(), np.array([newton]), np.empty((0, 0))),)), bare, every

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, delay, known, looks, nothing
+from diagnosed_sessions import body, delay, known, nothing, windows
 
-from biodance.diagnosis.adequacy import STRAINED, strain
+from biodance.diagnosis.adequacy import CONFLICT_LIMIT, prior_data_conflict
 from biodance.diagnosis.engine import UNUSUAL_BODY, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Round
@@ -20,13 +20,13 @@ CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
 
 
 def diagnosed(hidden, *, unlike: float, trials: int = 4, tolerances=None):
-    some = looks(1, hidden=hidden, unlike=unlike, trials=trials)
+    some = windows(1, hidden=hidden, unlike=unlike, trials=trials)
     return diagnose_trials(body(), some, tolerances=tolerances or known(), effects=CAUSES)
 
 
 def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_is_not() -> None:
     strange = diagnosed(delay, unlike=4.0)
-    assert strain(strange.naming.found) > STRAINED
+    assert prior_data_conflict(strange.naming.found) > CONFLICT_LIMIT
     assert strange.diagnosis.verdict == "named, incomplete"
     assert UNUSUAL_BODY in strange.diagnosis.notes
     (finding,) = strange.diagnosis.findings
@@ -34,7 +34,7 @@ def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_i
     assert finding.effect == "time_delay"
     assert abs(size.value - 0.02) < 3 * size.sd  # the draw hangs on signs of eigenvectors: on the processor
     alone = diagnosed(delay, unlike=6.0, trials=1)
-    assert strain(alone.naming.found) > STRAINED
+    assert prior_data_conflict(alone.naming.found) > CONFLICT_LIMIT
     assert not alone.diagnosis.findings, "one trial does not show that the delay is the same in another one"
     clean = diagnosed(nothing, unlike=4.0).diagnosis
     assert clean.verdict == "unexplained"
@@ -52,7 +52,7 @@ def test_a_size_that_is_hardly_known_is_no_name_beside_a_strange_body() -> None:
 
 def test_the_prior_is_widened_as_far_as_the_body_is_strange_and_never_narrowed() -> None:
     wide, usual = (diagnosed(nothing, unlike=size).naming.bare for size in (4.0, 0.7))
-    assert strain(wide) > STRAINED > abs(strain(with_inflated_prior(wide)))
+    assert prior_data_conflict(wide) > CONFLICT_LIMIT > abs(prior_data_conflict(with_inflated_prior(wide)))
     np.testing.assert_array_equal(with_inflated_prior(usual).posterior.X, usual.posterior.X)
     assert with_inflated_prior(usual).log_likelihood == pytest.approx(usual.log_likelihood)
 

@@ -1,4 +1,6 @@
-"""Gates: what is wrong or right, found on recordings whose fault is known, and nothing found on those without."""
+"""Data-quality checks: what is wrong or right, found on recordings whose fault is known, and nothing found on those
+without.
+"""
 
 import importlib
 import sys
@@ -14,12 +16,12 @@ import biodance.effects as family
 from biodance.effects import (
     Case,
     DiscreteEffect,
-    Gate,
+    QualityCheck,
     Recorded,
+    check_quality,
     discrete_effects,
     effect,
     effects,
-    gates,
     wrench_about_origin,
     wrench_about_point,
 )
@@ -56,8 +58,8 @@ def recorded(
     return Recorded(Session(Subject(MASS, 1.75, "M"), (trial,), Path()))
 
 
-def failed(found: tuple[Gate, ...]) -> list[tuple[str, str]]:
-    return [(gate.effect, gate.target) for gate in found if not gate.ok]
+def failed(found: tuple[QualityCheck, ...]) -> list[tuple[str, str]]:
+    return [(quality.effect, quality.target) for quality in found if not quality.ok]
 
 
 def on_plate(case: Case, change: Array) -> Case:
@@ -86,13 +88,13 @@ def test_every_discrete_effect_says_what_it_is(name: str) -> None:
 
 def test_nothing_is_found_where_nothing_is_wrong() -> None:
     value = standing(np.random.default_rng(0))
-    found = gates(recorded(value).session)
+    found = check_quality(recorded(value).session)
     assert failed(found) == []
-    assert {gate.check for gate in found} == {"range of the channels", "mains hum", "weight on the plates"}
+    assert {quality.check for quality in found} == {"range of the channels", "mains hum", "weight on the plates"}
     moving = human_case(600)
-    found = gates(session_of(moving).session, (moving, moving))
+    found = check_quality(session_of(moving).session, (moving, moving))
     assert failed(found) == []
-    assert {gate.check for gate in found} >= {
+    assert {quality.check for quality in found} >= {
         "signs of the channels",
         "rate of the cameras",
         "lost frames",
@@ -116,14 +118,14 @@ def test_frames_that_are_lost_are_not_found_again() -> None:
 
 @pytest.mark.parametrize("factor", FACTORS)
 def test_a_known_factor_is_named(factor: float) -> None:
-    found = discrete_effects()["unit_error"].look(recorded(factor * standing(np.random.default_rng(1))))
+    found = discrete_effects()["unit_error"].check(recorded(factor * standing(np.random.default_rng(1))))
     assert failed(found) == [("unit_error", "")]
     assert found[0].size == pytest.approx(factor)
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 1.04, 1.2])
 def test_a_foot_beside_the_plate_is_no_unit(share: float) -> None:
-    assert failed(discrete_effects()["unit_error"].look(recorded(share * standing(np.random.default_rng(2))))) == []
+    assert failed(discrete_effects()["unit_error"].check(recorded(share * standing(np.random.default_rng(2))))) == []
 
 
 def test_what_the_reader_overruled_is_told() -> None:
@@ -135,15 +137,15 @@ def test_what_the_reader_overruled_is_told() -> None:
         "the plate axes were turned by 90 degrees.",
     )
     unit = "POINT:UNITS is 'furlong'; a cloud of markers of 1723 can only be in mm, so lengths are in mm."
-    found = gates(recorded(standing(np.random.default_rng(3)), decisions=said, warnings=(unit,)).session)
+    found = check_quality(recorded(standing(np.random.default_rng(3)), decisions=said, warnings=(unit,)).session)
     assert failed(found) == [("axis_error", "plate1:axes"), ("unit_error", "markers"), ("unit_error", "plate1:moments")]
-    assert sorted(gate.size for gate in found if gate.size > 0) == [90, 1000]
+    assert sorted(quality.size for quality in found if quality.size > 0) == [90, 1000]
 
 
 @pytest.mark.parametrize(("channel", "target"), [(1, "Fy"), (3, "Mx"), (5, "Mz")])
 def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
     sign = np.ones(6) - 2 * np.eye(6)[channel]
-    found = discrete_effects()["axis_error"].look(session_of(on_plate(human_case(), sign)))
+    found = discrete_effects()["axis_error"].check(session_of(on_plate(human_case(), sign)))
     assert failed(found) == [("axis_error", target)]
 
 
@@ -151,7 +153,7 @@ def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
 def test_a_flat_top_is_named_with_its_level(channel: int, target: str, limit: float) -> None:
     local = wrench_about_point(standing(np.random.default_rng(4)), CORNERS.mean(axis=0))
     local[:, channel] = np.clip(local[:, channel], -limit, limit)
-    found = discrete_effects()["clipping"].look(recorded(wrench_about_origin(local, CORNERS.mean(axis=0))))
+    found = discrete_effects()["clipping"].check(recorded(wrench_about_origin(local, CORNERS.mean(axis=0))))
     assert failed(found) == [("clipping", target)]
     assert found[0].size == pytest.approx(limit, rel=1e-3)
     assert (found[0].quantity, found[0].unit) == ("limit", "N" if channel < 3 else "N·m")
@@ -162,7 +164,7 @@ def test_coarse_converters_and_empty_plates_do_not_clip() -> None:
     coarse = np.round(value / 4) * 4
     stepped_off = np.where((np.arange(len(value)) > 6000)[:, None], 0.0, value)
     for fine in (coarse, stepped_off):
-        assert failed(discrete_effects()["clipping"].look(recorded(fine))) == []
+        assert failed(discrete_effects()["clipping"].check(recorded(fine))) == []
 
 
 @pytest.mark.parametrize("frequency", [50.0, 60.0])
@@ -170,7 +172,7 @@ def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
     local = wrench_about_point(standing(np.random.default_rng(6)), CORNERS.mean(axis=0))
     local[:, 0] += 5 * np.sin(2 * np.pi * frequency * np.arange(len(local)) / 1000)
     value = wrench_about_origin(local, CORNERS.mean(axis=0))
-    found = discrete_effects()["mains_hum"].look(recorded(value))
+    found = discrete_effects()["mains_hum"].check(recorded(value))
     assert failed(found) == [("mains_hum", "Fx")]
     assert found[0].size == pytest.approx(5, rel=0.05)
     once = recorded(value)
@@ -178,8 +180,8 @@ def test_hum_is_named_with_its_amplitude(frequency: float) -> None:
         once.session.trials[0], plates=recorded(standing(np.random.default_rng(8))).session.trials[0].plates
     )
     single = Recorded(replace(once.session, trials=(once.session.trials[0], quiet, quiet)))
-    assert failed(discrete_effects()["mains_hum"].look(single)) == [], "a glitch in one trial is no hum"
-    slow = discrete_effects()["mains_hum"].look(recorded(value[::10], rate=100.0))
+    assert failed(discrete_effects()["mains_hum"].check(single)) == [], "a glitch in one trial is no hum"
+    slow = discrete_effects()["mains_hum"].check(recorded(value[::10], rate=100.0))
     assert slow == (), "100 Hz cannot show it"
 
 
@@ -191,7 +193,7 @@ def test_a_wrong_rate_is_named(ratio: float) -> None:
     plate = case.trial.plates[0]
     plate = replace(plate, wrench=Wrench(motion.time, plate.wrench.value))
     wrong = replace(case, motion=motion, trial=replace(case.trial, plates=(plate,)))
-    found = discrete_effects()["frame_rate"].look(session_of(wrong, wrong))
+    found = discrete_effects()["frame_rate"].check(session_of(wrong, wrong))
     assert ("frame_rate", "") in failed(found)
     assert found[0].size == pytest.approx(ratio, rel=0.05)
 
@@ -210,7 +212,7 @@ def test_a_load_is_no_clock(segment: str, kilograms: float) -> None:
     ratio, explained = clock_beside_body([loaded])
     assert ratio == pytest.approx(1.0, abs=0.03)
     assert explained > 0.9
-    assert failed(discrete_effects()["frame_rate"].look(session_of(loaded, loaded))) == []
+    assert failed(discrete_effects()["frame_rate"].check(session_of(loaded, loaded))) == []
 
 
 def test_lost_frames_are_named() -> None:
@@ -219,7 +221,7 @@ def test_lost_frames_are_named() -> None:
     value = np.array(plate.wrench.value)
     value[300:] = value[300 - lost : -lost]
     late = replace(case, trial=replace(case.trial, plates=(replace(plate, wrench=Wrench(plate.wrench.time, value)),)))
-    found = discrete_effects()["frame_rate"].look(session_of(late, late))
+    found = discrete_effects()["frame_rate"].check(session_of(late, late))
     assert failed(found) == [("frame_rate", "")]
     assert found[-1].size == pytest.approx(0.01 * lost, rel=0.3)
 
@@ -232,11 +234,11 @@ def test_swapped_labels_are_named(pair: tuple[str, str]) -> None:
     other = {pair[0]: pair[1], pair[1]: pair[0]}
     swapped = Markers(tuple(other.get(name, name) for name in markers.names), markers.time, markers.xyz)
     static = replace(case.trial, name="static", role="static", markers=swapped)
-    found = discrete_effects()["labels_swapped"].look(Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path())))
+    found = discrete_effects()["labels_swapped"].check(Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path())))
     assert failed(found) == [("labels_swapped", "/".join(pair))]
     trial = replace(case.trial, markers=swapped)
     wrong = replace(case, trial=trial, motion=track(case.body, trial))
-    found = discrete_effects()["labels_swapped"].look(session_of(wrong))
+    found = discrete_effects()["labels_swapped"].check(session_of(wrong))
     assert failed(found) == [("labels_swapped", "/".join(pair))]
 
 
@@ -253,7 +255,7 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
     ):
         markers = Markers(labels, np.arange(20) / 100, xyz)
         static = Trial("static", "static", markers, (), Source(Path("static.c3d"), "", "C3D"))
-        found = discrete_effects()["labels_swapped"].look(
+        found = discrete_effects()["labels_swapped"].check(
             Recorded(Session(Subject(MASS, 1.75, "M"), (static,), Path()))
         )
         assert failed(found) == expected
@@ -262,7 +264,7 @@ def test_a_turned_wrist_is_named_in_the_static_trial(side: str) -> None:
 @pytest.mark.parametrize(
     ("module", "base", "missing"),
     [
-        ("gate", "DiscreteEffect", "look"),
+        ("quality_check", "DiscreteEffect", "check"),
         ("missing_joint", "MissingJoint", "extended_body"),
         ("effect", "Effect", "columns or transform"),
     ],
@@ -288,7 +290,8 @@ def test_the_library_can_lack_an_effect() -> None:
     assert list(effects(names)) == names
     assert list(discrete_effects(("clipping",))) == ["clipping"]
     assert {
-        gate.effect for gate in gates(recorded(standing(np.random.default_rng(7))).session, chosen=("mains_hum",))
+        quality.effect
+        for quality in check_quality(recorded(standing(np.random.default_rng(7))).session, chosen=("mains_hum",))
     } <= {"", "mains_hum"}
     with pytest.raises(UnknownName, match="plate_gain"):
         effects(("plate_gian",))

@@ -10,7 +10,7 @@ from PIL import Image
 from small_dances import small_dance
 
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import Telling, expect, telling_of
+from biodance.dance.expectation import MovementInformation, expect, movement_information
 from biodance.records import Array, Motion
 from biodance.report.feedback import write
 from biodance.report.feedback.write import follow_scene
@@ -25,7 +25,7 @@ def dance() -> Dance:
     return small_dance()
 
 
-def planned_shares(dance: Dance, told: Telling) -> Array:
+def planned_shares(dance: Dance, told: MovementInformation) -> Array:
     """Return the share (N,) of the table's variance that the whole dance removes as planned."""
     plan, total = dance.motion(told.rate), np.zeros_like(told.root)
     for phase in dance.phases:
@@ -35,13 +35,13 @@ def planned_shares(dance: Dance, told: Telling) -> Array:
 
 
 def test_what_the_parts_tell_adds_up_to_what_is_expected_of_the_dance(dance: Dance) -> None:
-    planned, expected = planned_shares(dance, telling_of(dance)), expect(dance, steps=1).share[-1]
+    planned, expected = planned_shares(dance, movement_information(dance)), expect(dance, steps=1).share[-1]
     assert np.corrcoef(planned, expected)[0, 1] > 0.9
     assert planned.mean() == pytest.approx(expected.mean(), abs=0.08)
 
 
 def test_more_movement_tells_more_and_no_movement_nothing_new(dance: Dance) -> None:
-    told, plan = telling_of(dance), dance.motion(12.5)
+    told, plan = movement_information(dance), dance.motion(12.5)
     move = next(phase for phase in dance.phases if phase.kind == "move")
     inside = (plan.time >= move.start) & (plan.time <= move.end)
     motion = Motion(*(each[inside] for each in (plan.time, plan.q, plan.v, plan.a)))
@@ -99,7 +99,9 @@ def test_a_browser_follows_counts_and_says_whom_it_does_not_see(dance: Dance, tm
     with Page(page.as_uri(), film=film, size="500,420") as browser:
         browser.run("document.getElementById('film').click()")
         goal = browser.until("document.body.dataset.goal")
-        assert np.array(goal.split(), dtype=float) == pytest.approx(planned_shares(dance, telling_of(dance)), abs=0.02)
+        assert np.array(goal.split(), dtype=float) == pytest.approx(
+            planned_shares(dance, movement_information(dance)), abs=0.02
+        )
         assert "I see nobody" in browser.until(
             "/nobody/.test(document.body.dataset.followed) && document.body.dataset.followed"
         )

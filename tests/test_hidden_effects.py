@@ -22,7 +22,7 @@ def test_a_session_without_fault_is_left_alone(tmp_path: Path, monkeypatch: pyte
     diagnosis = found(hidden(tmp_path / "s"), monkeypatch)
     assert diagnosis.verdict == "nothing wrong"
     assert not diagnosis.findings
-    assert all(gate.ok for gate in diagnosis.gates)
+    assert all(quality.ok for quality in diagnosis.checks)
 
 
 def test_late_forces_are_named_by_the_command_also_where_no_body_can_be_identified(
@@ -82,7 +82,7 @@ def test_a_clipped_channel_is_named_before_any_statistics(tmp_path: Path, monkey
     result = examined(folder, monkeypatch)
     diagnosis = diagnose_session(result, effects=("clipping", "plate_offset")).diagnosis
     assert diagnosis.findings[0].effect == "clipping"
-    assert [gate.effect for gate in diagnosis.gates if not gate.ok] == ["clipping"]
+    assert [quality.effect for quality in diagnosis.checks if not quality.ok] == ["clipping"]
 
 
 def standing(data: Path, folder: Path, name: str, text: str = "") -> Path:

@@ -61,7 +61,7 @@ def test_surprise_has_unit_variance_when_nothing_was_added() -> None:
     values = []
     for seed in range(6):
         _, after = visits(30 + seed, frames=600)
-        values.append(whiten_innovation(after.data, after.belief.prior)[1][:20])
+        values.append(whiten_innovation(after.data, after.posterior.prior)[1][:20])
     assert np.sqrt(np.mean(np.square(values))) < 1.3
 
 
@@ -115,6 +115,6 @@ def test_a_load_is_announced_below_one_per_cent_where_the_session_can_see_it(
     p_no_load: float, smallest: float, doubts: tuple[str, ...], status: str
 ) -> None:
     nowhere, weight = np.full(3, np.nan), np.where(np.arange(MASSES.size) == np.argmin(np.abs(MASSES - 2.0)), 1.0, 0.0)
-    belief = LoadPosterior(p_no_load, (1 - p_no_load) * weight)
-    suspect = LoadCandidate("s1", belief, nowhere, nowhere, 5.0, 1 - p_no_load, smallest)
+    posterior = LoadPosterior(p_no_load, (1 - p_no_load) * weight)
+    suspect = LoadCandidate("s1", posterior, nowhere, nowhere, 5.0, 1 - p_no_load, smallest)
     assert LoadSearch((suspect,), p_no_load, "the table", doubts).status == status

@@ -12,7 +12,7 @@ from biodance.identification.base_parameters import structural_base
 from biodance.identification.calibration import gains_move_masses, undiluted
 from biodance.identification.identification import identify_body
 from biodance.identification.loads import compact_load
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
@@ -97,8 +97,8 @@ def test_no_gain_shows_to_which_side_of_a_joint_matter_belongs(shaken: Statistic
 def test_the_trunk_gets_its_inertia_back(shaken: Statistics) -> None:
     table, trunk = widened(BODY.sip), 10 * BODY.segment_index("trunk_head")
     noise = Noise(np.tile(np.diag([9.0] * 3 + [4.0] * 3), (len(BANDS), 1, 1)), ABOUT, BANDS)
-    before = posterior(shaken.information(noise), table).mean
-    after = posterior(undiluted(shaken, before, table, SHOWN).information(noise), table).mean
+    before = find_posterior(shaken.information(noise), table).mean
+    after = find_posterior(undiluted(shaken, before, table, SHOWN).information(noise), table).mean
     moment, true = slice(trunk + 4, trunk + 10), BODY.sip.phi
     off = [np.linalg.norm(phi[moment] - true[moment]) / np.linalg.norm(true[moment]) for phi in (before, after)]
     assert off[0] > 0.1
@@ -108,7 +108,7 @@ def test_the_trunk_gets_its_inertia_back(shaken: Statistics) -> None:
 @pytest.mark.parametrize(("sds", "carried"), [(0.8, False), (-1.2, True)])
 def test_masses_may_move_by_what_is_uncertain(shaken: Statistics, sds: float, carried: bool) -> None:
     noise = Noise(np.tile(np.diag([9.0] * 3 + [4.0] * 3), (len(BANDS), 1, 1)), ABOUT, BANDS)
-    before = posterior(shaken.information(noise), widened(BODY.sip))
+    before = find_posterior(shaken.information(noise), widened(BODY.sip))
     thigh = 10 * BODY.segment_index("right_thigh")
     moved = before.mean.copy()
     moved[thigh] += sds * np.sqrt(before.covariance[thigh, thigh])
@@ -154,7 +154,7 @@ def test_gains_are_measured_under_the_load_that_the_data_show(monkeypatch: pytes
         return undiluted(total, phi, table, shown)
 
     monkeypatch.setattr("biodance.identification.calibration.undiluted", watched)
-    belief = identify_body(BODY, (fit,)).belief
-    kept = belief.mean[arm] - BODY.sip.phi[arm]
+    posterior = identify_body(BODY, (fit,)).posterior
+    kept = posterior.mean[arm] - BODY.sip.phi[arm]
     assert kept < 1.0, "the table keeps most of it from the arm"
     assert kept + 0.3 < seen[0] < 2.4

@@ -22,7 +22,7 @@ from biodance.identification.mismatch import (
     share_errors,
     temper,
 )
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import layout_for, statistics
 from biodance.motion.kinematics import chains, jacobian, poses
 from biodance.records import CHANNELS, Subject
@@ -89,8 +89,10 @@ def test_without_disturbance_nothing_is_discounted() -> None:
         np.testing.assert_allclose(
             mild.triangle.T @ mild.triangle, data.triangle.T @ data.triangle / noise, rtol=1e-6, atol=1e-9
         )
-        weaker = posterior(mild, body.sip)
-        np.testing.assert_array_less(posterior(data, body.sip).covariance.trace() - 1e-12, weaker.covariance.trace())
+        weaker = find_posterior(mild, body.sip)
+        np.testing.assert_array_less(
+            find_posterior(data, body.sip).covariance.trace() - 1e-12, weaker.covariance.trace()
+        )
 
 
 def test_tempered_data_give_the_textbook_posterior() -> None:
@@ -105,7 +107,7 @@ def test_tempered_data_give_the_textbook_posterior() -> None:
     mean = np.linalg.solve(
         precision, np.linalg.inv(body.sip.covariance) @ body.sip.phi + W @ data.triangle.T @ data.target
     )
-    got = posterior(temper(data, found, Sizes(1.0, 2.0)), body.sip)
+    got = find_posterior(temper(data, found, Sizes(1.0, 2.0)), body.sip)
     np.testing.assert_allclose(got.mean, mean, rtol=1e-6, atol=1e-8)
 
 
@@ -188,7 +190,7 @@ def test_a_heavy_head_that_nods_does_not_make_a_heavy_trunk() -> None:
     noise = replace(noise, covariance=noise.covariance * np.outer([2.0] * 3 + [0.5] * 3, [2.0] * 3 + [0.5] * 3))
     found = mismatch(body, (fit,), noise)
     off = [
-        posterior(temper(total.information(noise), some, Sizes(0.0, 1.7)), body.sip).mean[10 * trunk]
+        find_posterior(temper(total.information(noise), some, Sizes(0.0, 1.7)), body.sip).mean[10 * trunk]
         - body.sip.mass[trunk]
         for some in (found, replace(found, plates=found.plates[:, :PLATE_SOURCES]))
     ]

@@ -14,7 +14,7 @@ from biodance.errors import NotSolved
 from biodance.identification import physical
 from biodance.identification.information import Information, fold, information
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import Posterior, find_posterior
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise
@@ -66,7 +66,7 @@ def test_no_session_without_fault_fails_and_rounding_changes_nothing() -> None:
     for seed in SEEDS:
         body, R, rng = rows_of(seed)
         shaken = R[rng.permutation(len(R))] * (1 + MOVED * rng.normal(size=R.shape))
-        fits = [physical_fit(posterior(Information(fold(rows), 40), body.sip), body) for rows in (R, shaken)]
+        fits = [physical_fit(find_posterior(Information(fold(rows), 40), body.sip), body) for rows in (R, shaken)]
         assert_same(*fits)
         assert smallest_eigenvalues(fits[0].sip.phi).min() > -1e-12
         held += fits[0].moved.any()
@@ -76,7 +76,7 @@ def test_no_session_without_fault_fails_and_rounding_changes_nothing() -> None:
 def test_the_posterior_of_a_session_as_prior_of_the_next() -> None:
     for seed in SEEDS:
         body, R, rng = rows_of(seed)
-        before = posterior(Information(R, 40), body.sip)
+        before = find_posterior(Information(R, 40), body.sip)
         expected = Sip(
             body.segments,
             before.mean + 0.5 * before.factor @ rng.normal(size=before.factor.shape[1]),
@@ -85,7 +85,7 @@ def test_the_posterior_of_a_session_as_prior_of_the_next() -> None:
         shaken = Sip(
             body.segments, expected.phi * (1 + MOVED * rng.normal(size=expected.phi.size)), expected.covariance
         )
-        assert_same(*(physical_fit(posterior(Information(R, 40), prior), body) for prior in (expected, shaken)))
+        assert_same(*(physical_fit(find_posterior(Information(R, 40), prior), body) for prior in (expected, shaken)))
 
 
 def test_segments_that_all_lie_at_their_edge() -> None:
@@ -122,7 +122,7 @@ def test_data_a_hundred_thousand_deviations_away_are_solved(seed: int) -> None:
     motion = random_motion(body, rng, frames=40)
     impossible = truth * np.where(np.arange(truth.size) % 10 == 4, -3.0, 1.0)
     data = information(body, motion, predict_wrench(body, motion, impossible), Noise.of_sd(2e-4, 5e-5, np.zeros(3)))
-    fit = physical_fit(posterior(data, replace(body.sip, covariance=100 * body.sip.covariance)), body)
+    fit = physical_fit(find_posterior(data, replace(body.sip, covariance=100 * body.sip.covariance)), body)
     assert fit.status == "solved", fit.cause
     assert fit.distance > 5e4
     assert smallest_eigenvalues(fit.sip.phi).min() > -1e-12
@@ -130,8 +130,8 @@ def test_data_a_hundred_thousand_deviations_away_are_solved(seed: int) -> None:
 
 def test_an_inaccurate_answer_is_asked_for_again_and_never_taken(monkeypatch) -> None:
     body, R, _ = rows_of(0)
-    belief = posterior(Information(R, 40), replace(body.sip, covariance=1e4 * body.sip.covariance))
-    right, solve, asked = physical_fit(belief, body), physical.shortest_inside, []
+    posterior = find_posterior(Information(R, 40), replace(body.sip, covariance=1e4 * body.sip.covariance))
+    right, solve, asked = physical_fit(posterior, body), physical.shortest_inside, []
     assert right.moved.any()
 
     def inaccurate(*problem) -> tuple:
@@ -139,11 +139,11 @@ def test_an_inaccurate_answer_is_asked_for_again_and_never_taken(monkeypatch) ->
         return (None, "optimal_inaccurate") if len(asked) == 1 else asked[-1]
 
     monkeypatch.setattr(physical, "shortest_inside", inaccurate)
-    again = physical_fit(belief, body)
+    again = physical_fit(posterior, body)
     assert len(asked) > 1
     assert_same(right, again)
     monkeypatch.setattr(physical, "shortest_inside", lambda *_: (None, "optimal_inaccurate"))
-    failed = physical_fit(belief, body)
+    failed = physical_fit(posterior, body)
     assert isinstance(failed, FailedFit)
     assert failed.status == "failed"
     assert "optimal_inaccurate" in failed.cause
@@ -158,8 +158,8 @@ def test_boxes_that_no_body_can_meet_are_a_failure_with_the_segment() -> None:
     body, R, _ = rows_of(1)
     boxes = np.array(body.com_boxes)
     boxes[2] = [[5.0] * 3, [4.0] * 3]
-    belief = posterior(Information(R, 40), Sip(body.segments, body.sip.phi, body.sip.covariance))
-    pinned = replace(belief, factor=belief.factor * (np.arange(30) >= 30)[:, None])
+    posterior = find_posterior(Information(R, 40), Sip(body.segments, body.sip.phi, body.sip.covariance))
+    pinned = replace(posterior, factor=posterior.factor * (np.arange(30) >= 30)[:, None])
     failed = physical_fit(pinned, replace(body, com_boxes=boxes))
     assert failed.status == "failed"
     assert "s2" in failed.cause
@@ -172,8 +172,8 @@ def test_a_centre_of_mass_outside_its_box_stops_at_the_wall() -> None:
     factor = 0.1 * np.eye(10)[:, 1:4]
     believed = round_one + 2.0 * np.array([0, 0.2, -0.3, 0.01, 0, 0, 0, 0, 0, 0])
     boxes = np.array([[[-0.03, -0.05, -0.02], [0.08, 0.07, 0.09]]])
-    belief = Posterior(Sip(body.segments, round_one, factor @ factor.T), believed, factor, 0.0, 0.0, 1)
-    fit = physical_fit(belief, replace(body, com_boxes=boxes))
+    posterior = Posterior(Sip(body.segments, round_one, factor @ factor.T), believed, factor, 0.0, 0.0, 1)
+    fit = physical_fit(posterior, replace(body, com_boxes=boxes))
     np.testing.assert_allclose(fit.sip.phi[1:4] / 2.0, [0.08, -0.05, 0.01], atol=1e-5)
     assert fit.moved.tolist() == [True]
     assert fit.distance == pytest.approx(2.0 * np.hypot(0.12, 0.25) / 0.1, rel=1e-3)
@@ -188,8 +188,8 @@ def test_a_body_that_is_outside_by_more_than_rounding_is_moved_inside(beyond: fl
 
     def fit_of(com: float) -> PhysicalFit:
         prior = Sip(body.segments, round_one, factor @ factor.T)
-        belief = Posterior(prior, round_one + 2.0 * com * np.eye(10)[1], factor, 0.0, 0.0, 1)
-        return physical_fit(belief, replace(body, com_boxes=np.array([[[-0.05] * 3, [0.05] * 3]])))
+        posterior = Posterior(prior, round_one + 2.0 * com * np.eye(10)[1], factor, 0.0, 0.0, 1)
+        return physical_fit(posterior, replace(body, com_boxes=np.array([[[-0.05] * 3, [0.05] * 3]])))
 
     assert fit_of(0.05 + beyond).moved.all()
     assert fit_of(0.05 + beyond).sip.phi[1] <= 2.0 * 0.05 + 1e-9

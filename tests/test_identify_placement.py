@@ -134,8 +134,8 @@ def test_what_is_known_about_true_centres() -> None:
     first = there[10 * TRUNK + 1, 10 * TRUNK + 1]
     assert first == pytest.approx((0.03 * body.sip.mass[TRUNK]) ** 2)
     draw = np.random.default_rng(5).normal(size=(120, 120))
-    belief = np.linalg.inv(np.linalg.inv(table.covariance) + draw[:, :40] @ draw[:, :40].T)
-    known = from_true_centres(replace(table, covariance=belief), table, body.joint_errors).covariance
+    posterior = np.linalg.inv(np.linalg.inv(table.covariance) + draw[:, :40] @ draw[:, :40].T)
+    known = from_true_centres(replace(table, covariance=posterior), table, body.joint_errors).covariance
     scale = np.sqrt(np.diag(table.covariance))
     assert np.linalg.eigvalsh(known / np.outer(scale, scale)).min() > -1e-9
     assert from_true_centres(table, table, ()).covariance[11, 11] > table.covariance[11, 11]

@@ -9,7 +9,7 @@ from random_bodies import random_body, random_motion
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.identification.information import information
 from biodance.identification.physical import physical_fit
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise
@@ -34,7 +34,7 @@ def drawn(seed: int, frames: int = 300):
 
 def test_posterior_equals_the_textbook_formula() -> None:
     body, prior, motion, wrench, _ = drawn(0)
-    found = posterior(information(body, motion, wrench, NOISE), prior)
+    found = find_posterior(information(body, motion, wrench, NOISE), prior)
     W = NOISE.whiten(regressor(body, motion)).reshape(-1, 40)
     y = NOISE.whiten(wrench.value[:, :, None]).ravel()
     precision = np.linalg.inv(prior.covariance) + W.T @ W
@@ -48,7 +48,7 @@ def test_intervals_cover_the_truth() -> None:
     z = []
     for seed in range(30):
         body, prior, motion, wrench, truth = drawn(seed, frames=60)
-        found = posterior(information(body, motion, wrench, NOISE), prior)
+        found = find_posterior(information(body, motion, wrench, NOISE), prior)
         z.append((found.mean - truth) / np.sqrt(np.diag(found.covariance)))
     assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.02)
 
@@ -59,7 +59,7 @@ def test_evidence_prefers_the_right_prior_width() -> None:
         total = 0.0
         for seed in range(8):
             body, prior, motion, wrench, _ = drawn(seed)
-            total += posterior(
+            total += find_posterior(
                 information(body, motion, wrench, NOISE), replace(prior, covariance=prior.covariance * factor**2)
             ).log_evidence
         scores[factor] = total
@@ -70,7 +70,7 @@ def test_pinned_parameter_stays_where_the_prior_put_it() -> None:
     body, prior, motion, wrench, _ = drawn(3)
     covariance = prior.covariance.copy()
     covariance[0, :] = covariance[:, 0] = 0.0
-    found = posterior(information(body, motion, wrench, NOISE), replace(prior, covariance=covariance))
+    found = find_posterior(information(body, motion, wrench, NOISE), replace(prior, covariance=covariance))
     assert found.mean[0] == pytest.approx(prior.phi[0], abs=1e-12)
     assert found.information[0] == 0.0
 
@@ -90,12 +90,12 @@ def test_pseudo_inertia_of_a_point_cloud() -> None:
 def test_physical_fit_is_consistent_and_nearest(seed: int) -> None:
     body, prior, motion, wrench, truth = drawn(seed, frames=8)
     wild = replace(prior, covariance=prior.covariance * 1e4)
-    belief = posterior(information(body, motion, wrench, NOISE), wild)
-    assert smallest_eigenvalues(belief.mean).min() < 0, "the case must need the constraint"
-    fit = physical_fit(belief, body)
+    posterior = find_posterior(information(body, motion, wrench, NOISE), wild)
+    assert smallest_eigenvalues(posterior.mean).min() < 0, "the case must need the constraint"
+    fit = physical_fit(posterior, body)
     assert fit.status == "solved"
     assert smallest_eigenvalues(fit.sip.phi).min() >= 0
     # no consistent point is nearer in the posterior's metric: compare with the truth, which is consistent
-    U, s, Vt = np.linalg.svd(belief.factor, full_matrices=False)
-    truth_distance = np.linalg.norm(Vt.T @ ((U.T @ (truth - belief.mean)) / s))
+    U, s, Vt = np.linalg.svd(posterior.factor, full_matrices=False)
+    truth_distance = np.linalg.norm(Vt.T @ ((U.T @ (truth - posterior.mean)) / s))
     assert fit.distance <= truth_distance * (1 + 1e-6)

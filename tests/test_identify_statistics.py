@@ -70,8 +70,8 @@ def test_learned_noise_gives_intervals_that_cover() -> None:
         rng = np.random.default_rng(100 + seed)
         sd = 0.15 * np.abs(truth) + 1e-2
         prior = Sip(body.segments, truth + sd * rng.normal(size=sd.size), np.diag(sd**2))
-        _, belief = learn_noise(statistics(body, fit, LAYOUT), prior)
-        z.append((belief.mean - truth) / np.sqrt(np.diag(belief.covariance)))
+        _, posterior = learn_noise(statistics(body, fit, LAYOUT), prior)
+        z.append((posterior.mean - truth) / np.sqrt(np.diag(posterior.covariance)))
     assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.025)
 
 

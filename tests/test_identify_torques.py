@@ -52,7 +52,7 @@ def test_the_band_is_the_spread_of_the_belief() -> None:
     found = identify_body(body, (noisy_fit(body, smooth_motion(body, rng, frames=600), truth, rng),))
     motion = smooth_motion(body, rng, frames=20)
     bands = torque_bands(found, motion, {}, trial="t", use=np.ones(20, dtype=bool))
-    drawn = found.belief.factor @ rng.normal(size=(found.belief.factor.shape[1], 4000))
+    drawn = found.posterior.factor @ rng.normal(size=(found.posterior.factor.shape[1], 4000))
     spread = (torque_regressor(body, motion) @ drawn).std(axis=2)
     np.testing.assert_allclose(bands.sd, spread, rtol=0.1)
 
@@ -66,8 +66,8 @@ def test_an_impact_is_what_one_standard_deviation_does_to_the_moment() -> None:
     motion, use = smooth_motion(body, rng, frames=60), np.arange(60) > 9
     rows = impacts(found, motion, use)
     assert rows == tuple(sorted(rows, key=lambda row: -max(row.knee, row.hip)))
-    # parameters drawn from the belief: the moment's regression on the quantity, times the quantity's spread
-    drawn = rng.multivariate_normal(np.zeros(len(truth)), found.belief.covariance, 40000)
+    # parameters drawn from the posterior: the moment's regression on the quantity, times the quantity's spread
+    drawn = rng.multivariate_normal(np.zeros(len(truth)), found.posterior.covariance, 40000)
     for row in (rows[0], rows[7]):
         cut = slice(*(10 * body.segment_index(row.segment) + np.array([0, 10])))
         slope = segment_quantities(found.sip.phi[cut])[1][QUANTITIES.index(row.quantity)]

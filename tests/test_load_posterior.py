@@ -17,7 +17,7 @@ WELL_SEEN = -0.5 * ((MASSES - 2.4) / 0.2) ** 2 + 72.0
 """Log likelihood ratio of a load of 2.4 ± 0.2 kg against none."""
 
 
-def posterior(ratio: np.ndarray, *, odds: float = 1.0) -> LoadPosterior:
+def find_posterior(ratio: np.ndarray, *, odds: float = 1.0) -> LoadPosterior:
     """Return the posterior of a log likelihood ratio (n,) over `MASSES`, at prior odds of a load."""
     load = odds * np.exp(ratio + log_mass_prior(MASSES))
     return LoadPosterior(float(1 / (1 + load.sum())), load / (1 + load.sum()))
@@ -69,7 +69,7 @@ def test_no_load_and_the_interval_never_contradict_each_other() -> None:
     for _ in range(400):
         true, strength = rng.choice([0.0, 0.2, 1.0, 3.0]), 10 ** rng.uniform(-1, 2)
         shown = true * strength + np.sqrt(strength) * rng.normal() + rng.normal() * rng.choice([0.0, 3.0])
-        one = posterior(MASSES * shown - 0.5 * MASSES**2 * strength, odds=10 ** rng.uniform(-2, 2))
+        one = find_posterior(MASSES * shown - 0.5 * MASSES**2 * strength, odds=10 ** rng.uniform(-2, 2))
         low, high = one.interval
         assert 0 <= low <= high
         assert (low > 0) == (one.none < 0.025)
@@ -86,28 +86,28 @@ def test_no_load_and_the_interval_never_contradict_each_other() -> None:
 
 
 def test_a_well_seen_load_has_the_interval_of_a_normal_quantity() -> None:
-    one = posterior(WELL_SEEN)
+    one = find_posterior(WELL_SEEN)
     assert one.mass == pytest.approx(2.4, abs=0.02)
     assert one.sd == pytest.approx(0.2, rel=0.03)
     assert one.interval == pytest.approx((2.4 - 1.96 * 0.2, 2.4 + 1.96 * 0.2), abs=0.02)
 
 
 def test_without_information_the_prior_odds_stay() -> None:
-    one = posterior(np.zeros(MASSES.size))
+    one = find_posterior(np.zeros(MASSES.size))
     assert one.none == pytest.approx(0.5)
     assert search(one).status == "none"
 
 
 @pytest.mark.parametrize(("smallest", "status"), [(1.0, "found"), (3.0, "cannot tell")])
 def test_a_load_is_announced_only_where_the_session_can_see_its_size(smallest: float, status: str) -> None:
-    told = search(posterior(WELL_SEEN), smallest=smallest)
+    told = search(find_posterior(WELL_SEEN), smallest=smallest)
     assert told.status == status
     size = "2.40 kg on the left shank (95 % interval 2.00 to 2.79 kg; probability of no load below 0.001)"
     assert size in say_load(told)
 
 
 def test_doubts_silence_every_load() -> None:
-    told = search(posterior(WELL_SEEN), doubts=("Markers, dance_1: 31 mm.",))
+    told = search(find_posterior(WELL_SEEN), doubts=("Markers, dance_1: 31 mm.",))
     assert told.status == "cannot tell"
     assert not told.found
     assert say_load(told).endswith("cannot be told: Markers, dance_1: 31 mm.")

@@ -14,7 +14,7 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
-from biodance.body.robot.likeness import Likeness, likeness, standing_frames
+from biodance.body.robot.similarity import SimilarityScale, similar_body, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
 from biodance.motion.ik.general_legs import GeneralLeg
@@ -107,7 +107,7 @@ def test_a_foot_out_of_reach_is_drawn_towards_the_hip() -> None:
 
 
 def test_a_likeness_has_the_same_angles() -> None:
-    leg, big = GeneralLeg.of(HOAP, "right"), GeneralLeg.of(likeness(HOAP, Likeness(3.6, 8.0)), "right")
+    leg, big = GeneralLeg.of(HOAP, "right"), GeneralLeg.of(similar_body(HOAP, SimilarityScale(3.6, 8.0)), "right")
     turn, pelvis, flat, ankle = stands(leg)
     np.testing.assert_allclose(
         big.solve(turn, 3.6 * pelvis, flat, 3.6 * ankle), leg.solve(turn, pelvis, flat, ankle), rtol=0, atol=1e-9

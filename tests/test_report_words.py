@@ -147,7 +147,7 @@ def test_joints_that_stay_are_not_said_to_be_placed(monkeypatch):
     for notes in ((f"{PLACED} (150 postures)",), ("Joints that the movement does not show, kept: trunk.",)):
         scaling = SimpleNamespace(notes=notes, body=lambda: (None,))
         monkeypatch.setattr(module, "measure_static", lambda *_, made=scaling: made)
-        monkeypatch.setattr(module, "placed_by_movement", lambda *_, made=scaling: made)
+        monkeypatch.setattr(module, "calibrate_joints", lambda *_, made=scaling: made)
         said.append(module.body_of(subject, read, settings, [])[1])
     assert "joints placed by movement" in said[0]
     assert "joints where it shows them" in said[1]

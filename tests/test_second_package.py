@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks, pull
+from diagnosed_sessions import body, known, pull, windows
 from perfect_recordings import SUBJECT, arm_swing, recorded
 from second_package import ENTRY_POINTS, LIMIT_POINT, RENAMED, install
 
@@ -88,7 +88,7 @@ def test_effect_is_fitted_like_any_other(installed: Path) -> None:
     assert list(effects())[-1] == "cable"
     found = diagnose_trials(
         body(),
-        looks(1, hidden=pull),
+        windows(1, hidden=pull),
         tolerances=known(),
         effects=("cable", "plate_gain", "plate_offset", "time_delay"),
     )

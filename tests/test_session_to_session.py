@@ -84,7 +84,7 @@ def test_a_body_carried_on_is_known_better_than_the_table(tmp_path: Path) -> Non
     assert "earlier session" in words
     fits = tuple(fit for t in second.trials if t.trial.role == "fit" and (fit := trial_fit(t)))
     fresh, carried = identify_body(body(), fits), identify_body(started, fits, prior=prior)
-    mass_sd = [np.sqrt(np.diag(found.belief.covariance)[::10]) for found in (fresh, carried)]
+    mass_sd = [np.sqrt(np.diag(found.posterior.covariance)[::10]) for found in (fresh, carried)]
     assert (mass_sd[1] < 1.001 * mass_sd[0]).all()
     assert np.median(mass_sd[1] / mass_sd[0]) < 0.98
     with pytest.raises(SessionRefused, match="another person"):

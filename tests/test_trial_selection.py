@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import RATE, body, known, looks, motion
+from diagnosed_sessions import RATE, body, known, motion, windows
 
 from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.own_tolerances import UNREST, own_tolerances, soft_tissue, unrest
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.judged_trials import chosen_looks, left_out
+from biodance.pipeline.judged_trials import chosen_windows, left_out
 from biodance.pipeline.trial_result import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench
 from biodance.uncertainty.bands import BANDS
@@ -30,12 +30,12 @@ def still(seconds: float) -> Motion:
     )
 
 
-def standing(shaken: Array) -> Look:
+def standing(shaken: Array) -> TrialWindow:
     """Return a static trial whose plates measure what the body needs and ``shaken`` (T, 6)."""
     still_one = still(len(shaken) / RATE)
-    trial = looks(1, trials=1)[0].trial
+    trial = windows(1, trials=1)[0].trial
     plate = replace(trial.plates[0], wrench=Wrench(still_one.time, predict_wrench(body(), still_one).value + shaken))
-    return Look(
+    return TrialWindow(
         replace(trial, name="static", role="static", plates=(plate,)),
         still_one,
         np.ones(len(shaken), dtype=bool),
@@ -44,27 +44,27 @@ def standing(shaken: Array) -> Look:
     )
 
 
-def result(look: Look, role: Role, use: Array | None = None) -> TrialResult:
-    used = look.use if use is None else use
-    value = look.trial.wrench.value
-    compared = WrenchComparison(look.motion.time, value, value, used, np.zeros(6), np.ones(6))
+def result(window: TrialWindow, role: Role, use: Array | None = None) -> TrialResult:
+    used = window.use if use is None else use
+    value = window.trial.wrench.value
+    compared = WrenchComparison(window.motion.time, value, value, used, np.zeros(6), np.ones(6))
     return TrialResult(
-        replace(look.trial, role=role), (Step("compare", "done"),), motion=look.motion, comparison=compared
+        replace(window.trial, role=role), (Step("compare", "done"),), motion=window.motion, comparison=compared
     )
 
 
 def test_standing_is_looked_at_where_movement_is_short() -> None:
-    moving, quiet = looks(1, trials=1)[0], standing(np.zeros((150, 6)))
+    moving, quiet = windows(1, trials=1)[0], standing(np.zeros((150, 6)))
     short = np.zeros(moving.use.size, dtype=bool)
     short[100:140] = True
-    assert [look.trial.name for look in chosen_looks((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
+    assert [window.trial.name for window in chosen_windows((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
     some = (result(quiet, "static"), result(moving, "fit", short))
-    assert [look.trial.name for look in chosen_looks(some)] == ["static", "t0"]
+    assert [window.trial.name for window in chosen_windows(some)] == ["static", "t0"]
     assert left_out(some) == (
         "t0 was left out: no 1 s in which the plates measure all ground contact without a break.",
     )
-    assert chosen_looks(some)[0].start == 0.0
-    assert chosen_looks(some)[1].end == 1.0
+    assert chosen_windows(some)[0].start == 0.0
+    assert chosen_windows(some)[1].end == 1.0
 
 
 def test_the_unrest_of_standing_is_measured_and_bounded() -> None:
@@ -89,7 +89,7 @@ def test_a_zero_that_wanders_between_trials_is_no_alarm() -> None:
     """One plate, four trials: its zero moves by what a spot check accepts (1 N), and by ten times as much."""
 
     def wanders(size: float) -> tuple[float, str]:
-        some = looks(5, hidden=lambda wrench, session, _: wrench + size * (session[0] == 0.25) * np.eye(6)[0])
+        some = windows(5, hidden=lambda wrench, session, _: wrench + size * (session[0] == 0.25) * np.eye(6)[0])
         own = own_tolerances(body(), some, known=known())
         found = diagnose_trials(body(), some, tolerances=own.tolerances, effects=("plate_offset",)).diagnosis
         return max(row.z for row in found.adequacy if row.channel == "Fx" and row.band_hz[0] == 0), found.verdict
@@ -102,11 +102,11 @@ def test_a_zero_that_wanders_between_trials_is_no_alarm() -> None:
 
 @pytest.mark.parametrize(("factor", "grows"), [(1.2, False), (3.0, True)])
 def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool) -> None:
-    look = looks(1, trials=1)[0]
-    residual = np.full((look.motion.time.size, 5), factor * MARKERS)
+    window = windows(1, trials=1)[0]
+    residual = np.full((window.motion.time.size, 5), factor * MARKERS)
     residual[:, 4] = 0.2
-    moving = look.motion
-    far = replace(look, motion=Motion(moving.time, moving.q, moving.v, moving.a, residual, tuple("abcde")))
+    moving = window.motion
+    far = replace(window, motion=Motion(moving.time, moving.q, moving.v, moving.a, residual, tuple("abcde")))
     assert soft_tissue((far,)) == pytest.approx(factor * MARKERS), "one marker that is wrong does not count"
     own = own_tolerances(body(), (far,))
     assert own.tolerances.size("slide thigh") == pytest.approx(
@@ -115,7 +115,7 @@ def test_soft_tissue_grows_with_the_markers_distance(factor: float, grows: bool)
     assert own.tolerances.size("plate_gain Fz") == shipped().size("plate_gain Fz")
     more = factor if grows else 1.0
     np.testing.assert_allclose(own.tolerances.noise[1:], more**2 * shipped().noise[1:])
-    near = own_tolerances(body(), looks(1, trials=1))
+    near = own_tolerances(body(), windows(1, trials=1))
     np.testing.assert_allclose(own.tolerances.noise[0, :3, :3], near.tolerances.noise[0, :3, :3])
     assert own.believed, "widened, not refused"
     assert bool(own.notes) == grows

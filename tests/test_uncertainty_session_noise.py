@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, looks, motion
+from diagnosed_sessions import body, known, motion, windows
 
 from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.engine import diagnose_trials
@@ -83,7 +83,7 @@ def test_camera_noise_reaches_the_forces_as_it_does_in_truth() -> None:
 
 def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
     rng, time = np.random.default_rng(6), np.arange(0, 5, 0.01)
-    trial = looks(1, trials=1)[0].trial
+    trial = windows(1, trials=1)[0].trial
 
     def recorded(noise):
         xyz = rng.normal(0, noise, (time.size, 4, 3))
@@ -97,6 +97,7 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
     wider = with_own_noise(known(), more, 70.0)
     np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
     seen = [
-        diagnose_trials(body(), looks(1), tolerances=one, effects=("added_mass",)).diagnosis for one in (known(), wider)
+        diagnose_trials(body(), windows(1), tolerances=one, effects=("added_mass",)).diagnosis
+        for one in (known(), wider)
     ]
     assert min(row.limit for row in seen[1].limits) > min(row.limit for row in seen[0].limits)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from diagnosed_sessions import body, known, looks
+from diagnosed_sessions import body, known, windows
 
 import biodance
 from biodance.body.parts import JointError
@@ -152,8 +152,8 @@ def test_joints_never_calibrated_have_the_sizes_before_calibration() -> None:
 
 
 def test_diagnosis_asks_the_body_whether_its_joints_were_calibrated() -> None:
-    put = problem(body(), looks(3, trials=1))
-    there = problem(CALIBRATED, looks(3, trials=1))
+    put = problem(body(), windows(3, trials=1))
+    there = problem(CALIBRATED, windows(3, trials=1))
     assert "tilt knee" not in put.groups
     assert put.groups.count("tilt knee" + BEFORE) == 4
     assert there.groups.count("tilt knee") == 4

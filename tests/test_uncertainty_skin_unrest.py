@@ -5,14 +5,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from diagnosed_sessions import CORNERS, body, known, looks, motion, noise
+from diagnosed_sessions import CORNERS, body, known, motion, noise, windows
 from scipy.interpolate import make_interp_spline
 
 from biodance.body.parts import GRAVITY
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.own_tolerances import own_tolerances
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
@@ -41,14 +41,14 @@ def waves(time: Array, seed: int, size: float, hertz: tuple[float, float] = (0.3
     return size * np.sin(speed * time[:, None, None] + phase)
 
 
-def dressed(look: Look, local: Array) -> Look:
+def dressed(window: TrialWindow, local: Array) -> TrialWindow:
     """Return a look at the true motion, with markers displaced by ``local`` (T, K, 3) m."""
-    return replace(look, trial=replace(look.trial, markers=worn(look.motion, local)))
+    return replace(window, trial=replace(window.trial, markers=worn(window.motion, local)))
 
 
-def filmed(look: Look, local: Array) -> Look:
+def filmed(window: TrialWindow, local: Array) -> TrialWindow:
     """Return a look whose motion is tracked from markers displaced by ``local`` (T, K, 3) m."""
-    one = dressed(look, local)
+    one = dressed(window, local)
     return replace(one, motion=track(body(), one.trial))
 
 
@@ -64,33 +64,33 @@ def lagging(moving: Motion, lag: Array) -> Array:
 
 
 @cache
-def restless(size: float = 0.0016) -> tuple[Look, ...]:
+def restless(size: float = 0.0016) -> tuple[TrialWindow, ...]:
     """Return a session of a person who moves gently and whose skin waves by ``size`` m; nothing else is wrong."""
     found = []
-    for k, look in enumerate(looks(5)):
-        moving, rng = look.motion, np.random.default_rng(k)
+    for k, window in enumerate(windows(5)):
+        moving, rng = window.motion, np.random.default_rng(k)
         q = body().neutral + GENTLE * (moving.q - body().neutral)
         gentle = replace(moving, q=q, v=GENTLE * moving.v, a=GENTLE * moving.a)
         value = predict_wrench(body(), gentle).value
         value = value + wrench_about_origin(noise(rng, len(value)), CORNERS.mean(axis=0))
-        plate = replace(look.trial.plates[0], wrench=Wrench(moving.time, value))
-        one = replace(look, motion=gentle, trial=replace(look.trial, plates=(plate,)))
+        plate = replace(window.trial.plates[0], wrench=Wrench(moving.time, value))
+        one = replace(window, motion=gentle, trial=replace(window.trial, plates=(plate,)))
         found.append(filmed(one, waves(moving.time, k, size)))
     return tuple(found)
 
 
-def unrest(some: tuple[Look, ...]) -> SkinUnrest:
+def unrest(some: tuple[TrialWindow, ...]) -> SkinUnrest:
     return skin_unrest(body(), ((one.trial, one.motion, one.use) for one in some))
 
 
-def seen(some: tuple[Look, ...]) -> Array:
+def seen(some: tuple[TrialWindow, ...]) -> Array:
     """Return (B, 3): the waves of the middle marker."""
     return np.median(unrest(some).waves, axis=2)
 
 
 def test_what_goes_with_the_movement_is_no_unrest() -> None:
     """A marker that has moved, skin that a joint pulls along and skin that sags tell nothing; a wave is told whole."""
-    session = looks(3, trials=6)
+    session = windows(3, trials=6)
     pulled = [0.02 * one.motion.q[:, 7:8, None] * np.ones((len(body().markers.names), 3)) + 0.03 for one in session]
     assert np.sqrt(seen(tuple(map(dressed, session, pulled)))[:, 0]).max() < 1e-9
     waving = [
@@ -123,10 +123,10 @@ def test_the_unrest_of_the_skin_reaches_the_forces_as_it_does_in_truth(loud: tup
     """A body that stands still under waving markers, all alike or some three times as loud: what tracking makes of it,
     in forces and moments.
     """
-    one, look = body(), looks(3, trials=1)[0]
+    one, window = body(), windows(3, trials=1)[0]
     quiet = replace(motion(3), q=np.tile(one.neutral, (600, 1)), v=np.zeros((600, one.nv)), a=np.zeros((600, one.nv)))
     size = np.where(np.isin(one.markers.names, loud), 0.006, 0.002 if loud else 0.004)[:, None]
-    found = [filmed(replace(look, motion=quiet), size * waves(quiet.time, k, 1.0)) for k in range(4)]
+    found = [filmed(replace(window, motion=quiet), size * waves(quiet.time, k, 1.0)) for k in range(4)]
     about = np.array([0.0, 0.0, 0.0])
     square, count = np.zeros(6), 0
     for some in found:
@@ -142,7 +142,7 @@ def test_the_unrest_of_the_skin_reaches_the_forces_as_it_does_in_truth(loud: tup
 
 
 def test_only_more_unrest_than_usual_makes_the_forces_louder() -> None:
-    calm = own_tolerances(body(), looks(5), known=known()).tolerances
+    calm = own_tolerances(body(), windows(5), known=known()).tolerances
     here = own_tolerances(body(), restless(), known=known()).tolerances
     more = np.array([np.diag(b) for b in here.noise - calm.noise])
     assert (more[2] > 0.005).all()
@@ -160,9 +160,9 @@ def test_only_more_unrest_than_usual_makes_the_forces_louder() -> None:
 
 def test_flesh_that_lags_behind_is_swing_and_no_wave() -> None:
     """Markers displaced by 1, 2 or 3 times 1e-3 s² times the specific force, beside what the joint angles explain."""
-    session = looks(3, trials=6)
+    session = windows(3, trials=6)
     lag = 1e-3 * (1 + np.arange(len(body().markers.names)) % 3)
-    found = unrest(tuple(dressed(look, lagging(look.motion, lag)) for look in session))
+    found = unrest(tuple(dressed(window, lagging(window.motion, lag)) for window in session))
     assert found.sizes()[0][3] < 0.3 * found.sizes()[1][3]
     assert unrest(session).sizes()[1].max() < 1e-6
     size = np.sqrt(found.swing[3, 0])

@@ -8,7 +8,7 @@ from diagnosed_sessions import body
 from example_results import FOUND, VERDICTS, full_session
 
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
-from biodance.effects import Gate, effects
+from biodance.effects import QualityCheck, effects
 from biodance.pipeline.attention import (
     headline,
     identified_attention,
@@ -128,9 +128,11 @@ def test_a_delay_says_in_words_which_way_it_goes(late: float, told: str) -> None
 
 
 def test_identify_says_first_what_the_checks_of_the_recordings_found() -> None:
-    gate = Gate("labels of the markers", False, "A and B carry each other's names in walk.", "labels_swapped", "A/B")
+    quality = QualityCheck(
+        "labels of the markers", False, "A and B carry each other's names in walk.", "labels_swapped", "A/B"
+    )
     full = full_session()
-    first, *others = identified_attention(full, [gate])
+    first, *others = identified_attention(full, [quality])
     assert (first.level, first.about) == ("fail", ABOUT)
     assert first.text == "Found: labels swapped A/B. A and B carry each other's names in walk."
     assert ABOUT not in [one.about for one in others]

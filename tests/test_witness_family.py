@@ -19,8 +19,8 @@ def test_every_file_of_the_folder_is_a_witness(name: str) -> None:
     assert member.name == name
     assert set(member.sees) <= set(causes())
     assert member.needs.endswith(".")
-    assert member.look(recording(replace(walk(), markers=None, plates=()))) == ()
-    for one in member.look(recording(walk(), mass=MASS)):
+    assert member.observe(recording(replace(walk(), markers=None, plates=()))) == ()
+    for one in member.observe(recording(walk(), mass=MASS)):
         assert one.witness == name
         assert one.sd > 0
         assert one.expected_sd >= one.sd
@@ -32,7 +32,7 @@ def test_objects_join_and_strangers_are_refused() -> None:
 
         name, sees, needs, source = "loud", ("time_delay",), "Silence.", "nobody"
 
-        def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
             return (Observation("loud", "noise", seen.trial.name, 1.0, 1.0, 0.0, "1"),)
 
     assert [one.witness for one in observe(recording(walk()), ["foot_outline", Loud()])][-1] == "loud"

@@ -5,10 +5,10 @@ The same machinery as identification, on the planned motion: information of the 
 twins of the person (soft tissue, joint centres, hinge axes) and plates within their tolerances would disturb, on top of
 the table. Only the noise is not the session's own but that of virtual dances.
 
-`Telling` judges posture by posture and move by move, so that a page can add up while somebody dances. A posture that is
-held tells by weight alone: the vertical force, and its moments about the horizontal axes. A move tells by its
-accelerations, too. What disturbs a session beyond the noise (soft tissue, joint centres, plates) is left out; instead
-only a share of the information counts.
+`MovementInformation` judges posture by posture and move by move, so that a page can add up while somebody dances. A
+posture that is held tells by weight alone: the vertical force, and its moments about the horizontal axes. A move tells
+by its accelerations, too. What disturbs a session beyond the noise (soft tissue, joint centres, plates) is left out;
+instead only a share of the information counts.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from biodance.dance.dance import Dance
 from biodance.identification.information import Information
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import Posterior, find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench, regressor
@@ -73,17 +73,17 @@ def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
     noise = typical_noise(wrench)
     size = 10 * len(body.segments)
     H, kinematics, plates = np.zeros((size, size)), *np.zeros((2, size, 1))
-    beliefs, start = [belief_after(body, H, Mismatch(kinematics, plates))], motion.time[0]
+    posteriors, start = [posterior_after(body, H, Mismatch(kinematics, plates))], motion.time[0]
     for end in ends:
         use = (motion.time >= start - 1e-9) & (motion.time < end - 1e-9)
         fit = Fit(f"until {end:.0f} s", motion, wrench, use)
         H = H + gram_of(statistics(body, fit, noise).information(noise))
         found = mismatch(body, (fit,), noise)
         kinematics, plates = kinematics + found.kinematics, plates + found.plates
-        beliefs.append(belief_after(body, H, Mismatch(kinematics, plates)))
+        posteriors.append(posterior_after(body, H, Mismatch(kinematics, plates)))
         start = end
-    sd = np.array([parameter_deviations(belief) for belief in beliefs])
-    share = np.array([shares(belief) for belief in beliefs])
+    sd = np.array([parameter_deviations(posterior) for posterior in posteriors])
+    share = np.array([shares(posterior) for posterior in posteriors])
     mass, com, inertia = np.moveaxis(sd, 2, 0)
     return Expectation(body.segments, np.concatenate([[0.0], ends]), mass, com, inertia, share)
 
@@ -107,10 +107,10 @@ def _danced() -> dict[str, Any]:
     return read_toml(locate("anthropometry/uncertainty", "dances"))
 
 
-def shares(belief: Posterior) -> Array:
+def shares(posterior: Posterior) -> Array:
     """Return the share (N,) of the table's variance that the data removed, mean over the parameters of a segment."""
-    known = np.diag(belief.prior.covariance).reshape(-1, 10) > 0
-    removed = np.where(known, belief.information.reshape(-1, 10), 0.0)
+    known = np.diag(posterior.prior.covariance).reshape(-1, 10) > 0
+    removed = np.where(known, posterior.information.reshape(-1, 10), 0.0)
     return np.asarray(removed.sum(axis=1) / np.maximum(known.sum(axis=1), 1))
 
 
@@ -119,8 +119,8 @@ def gram_of(information: Information) -> Array:
     return information.triangle.T @ information.triangle
 
 
-def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
-    """Return the belief after data of the information ``H`` (p, p) that agree with the table."""
+def posterior_after(body: Body, H: Array, found: Mismatch) -> Posterior:
+    """Return the posterior after data of the information ``H`` (p, p) that agree with the table."""
     prior = widened(body.sip)
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     value, vector = np.linalg.eigh(H / np.outer(scale, scale))
@@ -129,16 +129,16 @@ def belief_after(body: Body, H: Array, found: Mismatch) -> Posterior:
     R = np.zeros((len(H) + 1, len(H) + 1))
     R[: len(triangle)] = triangle
     data = Information(R, 1)
-    return posterior(temper(data, found, typical_sizes()) if H.any() else data, prior)
+    return find_posterior(temper(data, found, typical_sizes()) if H.any() else data, prior)
 
 
-def parameter_deviations(belief: Posterior) -> Array:
+def parameter_deviations(posterior: Posterior) -> Array:
     """Return the standard deviations (N, 3) of mass kg, CoM m per axis and moments of inertia kg·m² of each segment."""
     out = []
-    for first in range(0, belief.prior.phi.size, 10):
+    for first in range(0, posterior.prior.phi.size, 10):
         cut = slice(first, first + 10)
-        _, slope = segment_quantities(belief.prior.phi[cut])
-        variance = np.diag(slope @ belief.covariance[cut, cut] @ slope.T)
+        _, slope = segment_quantities(posterior.prior.phi[cut])
+        variance = np.diag(slope @ posterior.covariance[cut, cut] @ slope.T)
         out.append(np.sqrt([variance[0], np.mean(variance[1:4]), np.mean(variance[[4, 6, 9]])]))
     return np.array(out)
 
@@ -154,7 +154,7 @@ _AT_REST = slice(2, 5)
 
 
 @dataclass(frozen=True, eq=False)
-class Telling:
+class MovementInformation:
     """By what a movement is judged that shall tell of the p = 10 N inertial parameters of a body.
 
     ``rate`` Hz of the motions that are judged; ``root`` (p, p): the table's covariance is ``root root'``; ``weights``
@@ -190,11 +190,13 @@ class Telling:
         return np.asarray(removed.reshape(-1, 10).mean(axis=1))
 
 
-def telling_of(dance: Dance) -> Telling:
+def movement_information(dance: Dance) -> MovementInformation:
     """Return by what the parts of ``dance`` are judged."""
     plan = dance.motion(_RATE)
     noise = typical_noise(predict_wrench(dance.body, plan))
     weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened(dance.body.sip).covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))
-    return Telling(_RATE, root, weights, noise.bands.edges, _FELT * _RATE * weights[0, _AT_REST], noise.about)
+    return MovementInformation(
+        _RATE, root, weights, noise.bands.edges, _FELT * _RATE * weights[0, _AT_REST], noise.about
+    )

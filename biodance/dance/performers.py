@@ -32,7 +32,7 @@ _STILL = 1e-4
 
 
 @dataclass(frozen=True)
-class Room:
+class PerformersMargin:
     """The least that performers left of the ``limit``, of which at least ``least`` is demanded: ``worst``, both in its
     ``unit``; the ``posture`` (index) to or in which, the pair or support ``what``, and ``failing``, the share of
     performers without enough.
@@ -49,30 +49,30 @@ class Room:
 
 @dataclass(frozen=True)
 class Rehearsed:
-    """What ``count`` imprecise performers leave of every limit that they must keep: ``rooms``; ``bad`` postures
+    """What ``count`` imprecise performers leave of every limit that they must keep: ``least_margins``; ``bad`` postures
     (indices) at which somebody had too little, with the limit; ``failed`` the numbers of those people.
     """
 
     count: int
-    rooms: tuple[Room, ...]
+    least_margins: tuple[PerformersMargin, ...]
     bad: tuple[tuple[int, str], ...]
     failed: tuple[int, ...] = ()
 
-    def __getitem__(self, limit: str) -> Room:
-        return next(room for room in self.rooms if room.limit == limit)
+    def __getitem__(self, limit: str) -> PerformersMargin:
+        return next(room for room in self.least_margins if room.limit == limit)
 
     def margins(self, dance: Dance) -> tuple[Margin, ...]:
         """Return what the performers leave beyond the least as margins of a dance."""
         starts = {phase.posture: phase.start for phase in reversed(dance.phases)}
         return tuple(
             Margin(f"{r.limit}_{OF_PERFORMERS}", r.worst - r.least, starts[r.posture], r.unit, r.what)
-            for r in self.rooms
+            for r in self.least_margins
         )
 
     @property
     def safe(self) -> bool:
         """True where everybody keeps every limit."""
-        return all(room.worst >= room.least for room in self.rooms)
+        return all(room.worst >= room.least for room in self.least_margins)
 
 
 def for_imprecise(limits: Iterable[Limit]) -> dict[Limit, ForImprecise]:
@@ -107,7 +107,7 @@ def rehearse_imprecisely(
             for own in inside:
                 what = left.of[int(value[own].min(axis=0).argmin())]
                 found[limit].append(_Least.of(value[own].min(axis=1), posture[own], postures, what))
-    rooms = tuple(_joined(limit, asked[limit].least, least) for limit, least in found.items())
+    least_margins = tuple(_joined(limit, asked[limit].least, least) for limit, least in found.items())
     bad = {
         (int(p), limit.name)
         for limit, parts in found.items()
@@ -117,7 +117,7 @@ def rehearse_imprecisely(
     failed = {
         k for limit, parts in found.items() for k, one in zip(who, parts, strict=True) if one.room < asked[limit].least
     }
-    return Rehearsed(len(who), rooms, tuple(sorted(bad)), tuple(sorted(failed)))
+    return Rehearsed(len(who), least_margins, tuple(sorted(bad)), tuple(sorted(failed)))
 
 
 _Person = tuple[np.random.Generator, Array, Array, slice]
@@ -181,20 +181,20 @@ def perform_with(
     parts = [task.result() for task in tasks]
     count = sum(part.count for part in parts)
 
-    def together(rooms: tuple[Room, ...]) -> Room:
-        failing = sum(part.count * room.failing for part, room in zip(parts, rooms, strict=True)) / count
-        return replace(min(rooms, key=lambda room: room.worst), failing=failing)
+    def together(least_margins: tuple[PerformersMargin, ...]) -> PerformersMargin:
+        failing = sum(part.count * room.failing for part, room in zip(parts, least_margins, strict=True)) / count
+        return replace(min(least_margins, key=lambda room: room.worst), failing=failing)
 
-    rooms = tuple(together(some) for some in zip(*(part.rooms for part in parts), strict=True))
+    least_margins = tuple(together(some) for some in zip(*(part.least_margins for part in parts), strict=True))
     bad = tuple(sorted({bad for part in parts for bad in part.bad}))
-    return Rehearsed(count, rooms, bad, tuple(k for part in parts for k in part.failed))
+    return Rehearsed(count, least_margins, bad, tuple(k for part in parts for k in part.failed))
 
 
-def _joined(limit: Limit, least: float, found: list["_Least"]) -> Room:
+def _joined(limit: Limit, least: float, found: list["_Least"]) -> PerformersMargin:
     """Return the worst of all performers."""
     worst = min(found, key=lambda one: one.room)
     failing = float(np.mean([one.room < least for one in found]))
-    return Room(limit.name, limit.unit, least, worst.room, worst.posture, worst.what, failing)
+    return PerformersMargin(limit.name, limit.unit, least, worst.room, worst.posture, worst.what, failing)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Dances of robots: designed for the robot's person-sized likeness, danced by the robot itself.
+"""Dances of robots: designed for the robot's person-sized similar model, danced by the robot itself.
 
 All that the design knows of noticeable sizes (scales of the limits, reserves, starts) is that of persons. So a robot is
 made as large and as heavy as a person, with all times, speeds and strengths as gravity demands (`body.similar`), its
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.robot.likeness import Likeness, likeness
+from biodance.body.robot.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, parameter_deviations
@@ -30,7 +30,7 @@ from biodance.dance.transitions.schedule import find_way
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion
 
@@ -121,9 +121,9 @@ def leg_length(body: Body) -> float:
     return float(Chain(body).legs[0].length(0.0)) - float(body.feet["right"].outline[:, 1].min())
 
 
-def person_sized(body: Body) -> Likeness:
+def person_sized(body: Body) -> SimilarityScale:
     """Return the factors that make a robot as large and as heavy as a person."""
-    return Likeness(_LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
+    return SimilarityScale(_LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
 
 
 def design_robot(
@@ -153,15 +153,15 @@ def design_robot(
         forward=float(np.clip(length * plan.forward, 0.05, 0.4)),
         limits=tuple(limit.resized(length) for limit in plan.limits),
     )
-    large, _ = design(likeness(body, to), long, seed=seed, tell=tell, resume=resume)
+    large, _ = design(similar_body(body, to), long, seed=seed, tell=tell, resume=resume)
     if tell is not None:
         tell("the way from rest", 0, 0)
     dance = shrunk(reposition(large, long), body, to)
     return dance, verify(body, dance, plan.limits)
 
 
-def shrunk(dance: Dance, body: Body, to: Likeness) -> Dance:
-    """Return the dance of ``body`` that is like ``dance`` of its likeness."""
+def shrunk(dance: Dance, body: Body, to: SimilarityScale) -> Dance:
+    """Return the dance of ``body`` that is like ``dance`` of its similar model."""
     units = np.ones(dance.postures.shape[1])
     units[:3] = to.length
 
@@ -206,12 +206,12 @@ def expect_robot(dance: Dance) -> Expectation:
     ends = [phase.end for phase in dance.phases if phase.kind == "hold"]
     chosen = [ends[k] for k in sorted({int(k) for k in np.linspace(0, len(ends) - 1, _STEPS + 1).round()[1:]})]
     triangle, start = np.zeros((rows.shape[1], rows.shape[1])), 0
-    beliefs = [posterior(Information(triangle, 1), body.sip)]
+    posteriors = [find_posterior(Information(triangle, 1), body.sip)]
     for end in chosen:
         stop = int(np.searchsorted(motion.time, end)) * 6
         triangle, start = fold(rows[start:stop], triangle), stop
-        beliefs.append(posterior(Information(triangle, stop), body.sip))
-    sd = np.array([parameter_deviations(belief) for belief in beliefs])
-    share = np.array([belief.information.reshape(-1, 10).mean(axis=1) for belief in beliefs])
+        posteriors.append(find_posterior(Information(triangle, stop), body.sip))
+    sd = np.array([parameter_deviations(posterior) for posterior in posteriors])
+    share = np.array([posterior.information.reshape(-1, 10).mean(axis=1) for posterior in posteriors])
     mass, com, inertia = np.moveaxis(sd, 2, 0)
     return Expectation(body.segments, np.array([0.0, *chosen]), mass, com, inertia, share)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import belief_after, gram_of, shares, typical_noise
+from biodance.dance.expectation import gram_of, posterior_after, shares, typical_noise
 from biodance.errors import BiodanceError
 from biodance.identification.mismatch import Mismatch, mismatch
 from biodance.identification.statistics import Fit, statistics
@@ -159,7 +159,7 @@ def _same_joints(dance: Dance, body: Body) -> None:
 
 
 def _shares(body: Body, known: Worth) -> Array:
-    return shares(belief_after(body, known.H, known.disturbed))
+    return shares(posterior_after(body, known.H, known.disturbed))
 
 
 def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise) -> tuple[Repetition, ...]:

@@ -16,13 +16,13 @@ from biodance.records import CHANNELS, Array, Motion
 from biodance.uncertainty.bands import BANDS
 
 if TYPE_CHECKING:
-    from biodance.effects import Gate
+    from biodance.effects import QualityCheck
 
 LIMIT = 4.5
 """Standard deviations of null sessions beyond which one band of one channel is not adequate."""
 _BEYOND = 9.0
 """Standard deviations beyond which a name does not tell the main part."""
-STRAINED = 3.5
+CONFLICT_LIMIT = 3.5
 """Standard deviations by which the body may be more unlike the table than people are (sessions without fault: 1.4 at
 most of 14 of the own laboratory; beyond it in 1 of 36 of an independent one, whose people are drawn around other
 tables: 4.1).
@@ -152,7 +152,7 @@ def _when(found: Model, row: Adequacy) -> float:
     return second
 
 
-def strain(found: Model) -> float:
+def prior_data_conflict(found: Model) -> float:
     """Return how much further the body is from its prior than people are, as a standard normal deviate.
 
     Its unit-normal coefficients u have the posterior mean distribution N(0, 1 - C) with C their posterior covariance,
@@ -168,22 +168,27 @@ def strain(found: Model) -> float:
     return float((np.cbrt(u @ u / weight.sum()) - 1 + spread) / np.sqrt(spread))
 
 
-def strain_at_loudness(found: Model) -> float:
-    """Return `strain`; where it exceeds `STRAINED`, recompute it with the noise of a session as loud as this one is in
-    all bands and channels alike (`loudness`): no fault of one band or channel excuses a strange body.
+def conflict_at_loudness(found: Model) -> float:
+    """Return `prior_data_conflict`; where it exceeds `CONFLICT_LIMIT`, recompute it with the noise of a session as loud
+    as this one is in all bands and channels alike (`loudness`): no fault of one band or channel excuses a strange body.
     """
-    plain = strain(found)
-    return plain if plain <= STRAINED else strain(_weighed(found, np.full((len(BANDS), 6), 1 / loudness(found))))
+    plain = prior_data_conflict(found)
+    return (
+        plain
+        if plain <= CONFLICT_LIMIT
+        else prior_data_conflict(_weighed(found, np.full((len(BANDS), 6), 1 / loudness(found))))
+    )
 
 
-def strain_at_own_noise(found: Model) -> float:
-    """Return `strain`; where it exceeds `STRAINED`, recompute it with the noise raised to the residual of each band and
-    channel that is noisier than in fault-free sessions: a restless person is not an unusual body.
+def conflict_at_own_noise(found: Model) -> float:
+    """Return `prior_data_conflict`; where it exceeds `CONFLICT_LIMIT`, recompute it with the noise raised to the
+    residual of each band and channel that is noisier than in fault-free sessions: a restless person is not an unusual
+    body.
     """
-    plain = strain(found)
-    if plain <= STRAINED:
+    plain = prior_data_conflict(found)
+    if plain <= CONFLICT_LIMIT:
         return plain
-    return strain(_weighed(found, np.minimum(1.0, np.sqrt(found.tolerances.energy / energies(found)))))
+    return prior_data_conflict(_weighed(found, np.minimum(1.0, np.sqrt(found.tolerances.energy / energies(found)))))
 
 
 def with_strides_once(found: Model) -> Model:
@@ -226,14 +231,14 @@ def stretch(found: Model) -> float:
     return float(np.abs(found.posterior.mean[start : found.posterior.mean.size - named]).max(initial=0.0))
 
 
-def verdict(named: int, worst: float, gates: "tuple[Gate, ...]", *, strained: bool = False) -> Verdict:
+def verdict(named: int, worst: float, checks: "tuple[QualityCheck, ...]", *, in_conflict: bool = False) -> Verdict:
     """Return the verdict from how many causes were named, the ``worst`` z that is left where it matters (`largest_z`),
-    the gates, and whether body or tolerances are ``strained``: a name beside which they must be strange is only
-    resembled.
+    the data-quality checks, and whether body or tolerances are ``in_conflict``: a name beside which they must be
+    strange is only resembled.
     """
-    failed = any(not gate.ok for gate in gates)
-    if worst <= LIMIT and not strained:
+    failed = any(not quality.ok for quality in checks)
+    if worst <= LIMIT and not in_conflict:
         return "named, complete" if named or failed else "nothing wrong"
-    if (failed or (named and not strained)) and worst <= _BEYOND:
+    if (failed or (named and not in_conflict)) and worst <= _BEYOND:
         return "named, incomplete"
     return "unexplained"

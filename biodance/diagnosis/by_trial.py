@@ -68,7 +68,7 @@ class ByTrial:
         return out
 
     def information(self, posterior: LinearPosterior) -> Array:
-        """Return G (width, width), as `Belief.score` gives it."""
+        """Return G (width, width), as `LinearPosterior.score` gives it."""
         cross, out = np.zeros((posterior.X.shape[1], self.width)), np.zeros((self.width, self.width))
         for part in self.parts:
             cross[:, part.columns] += posterior.X[part.rows].T @ part.values

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from biodance.diagnosis.witness_evidence import WitnessEvidence
-    from biodance.effects import Gate
+    from biodance.effects import QualityCheck
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
@@ -170,7 +170,7 @@ class Diagnosis:
         "nothing wrong", "named, complete", "named, incomplete" or "unexplained".
     findings : tuple of Finding
         In the order found.
-    gates : tuple
+    checks : tuple
         Checks before any statistics.
     adequacy : tuple
         Of what is left, worst first.
@@ -203,7 +203,7 @@ class Diagnosis:
 
     verdict: Verdict
     findings: tuple[Finding, ...]
-    gates: "tuple[Gate, ...]" = ()
+    checks: "tuple[QualityCheck, ...]" = ()
     adequacy: tuple[Adequacy, ...] = ()
     unobservable: tuple[Unobservable, ...] = ()
     limits: tuple[Unobservable, ...] = ()

@@ -7,16 +7,16 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.adequacy import (
+    CONFLICT_LIMIT,
     LIMIT,
     LOUDER,
-    STRAINED,
     STRETCHED,
     TORN,
     adequacy,
+    conflict_at_loudness,
+    conflict_at_own_noise,
     largest_z,
     residual_scale,
-    strain_at_loudness,
-    strain_at_own_noise,
     stretch,
     verdict,
     with_strides_once,
@@ -28,12 +28,12 @@ from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, cause_key, causes_of, name_causes, passes_threshold, without_cause
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.plate_axes import in_plate_axes
-from biodance.diagnosis.problem import Look, Problem, problem
+from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.size_dependence import changes_wrench, significant_dependences
 from biodance.diagnosis.transient_contact import with_transient_contact
 from biodance.diagnosis.unusual_body import robust_causes
 from biodance.discovery import Chosen
-from biodance.effects import Case, DiscreteEffect, Effect, Gate
+from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck
 from biodance.effects import effects as family
 from biodance.records import Sip
 from biodance.threads import one_thread
@@ -82,18 +82,18 @@ class Examined:
 @one_thread()
 def diagnose_trials(
     body: Body,
-    looks: tuple[Look, ...],
+    windows: tuple[TrialWindow, ...],
     *,
-    gates: tuple[Gate, ...] = (),
+    checks: tuple[QualityCheck, ...] = (),
     tolerances: Tolerances | None = None,
     prior: Sip | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
     search: bool = True,
 ) -> Examined:
     """Return what the simulation of ``body`` (with the SIP known before, by default the table's) gets wrong in the
-    trials ``looks``.
+    trials ``windows``.
 
-    ``gates`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by
+    ``checks`` the checks made before; ``tolerances`` of everything that is no fault (those of virtual subjects by
     default); ``prior`` of the parameters (an earlier session's; by default the table's); ``effects`` names limit the
     causes to these, objects (``[MyEffect()]``) are looked for beside the family; without ``search`` nothing is named:
     only what is left is judged.
@@ -105,14 +105,14 @@ def diagnose_trials(
     """
     known = tolerances or shipped()
     asked = family(effects)
-    posed = problem(body, looks, prior=prior, chosen=asked)
+    posed = problem(body, windows, prior=prior, chosen=asked)
     standing = not any(is_moving(case) for case, picks in zip(posed.cases, posed.spectrum.picks, strict=True) if picks)
     naming, noise_note = _named_at_own_noise(posed, known, asked, search=search and not standing, standing=standing)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
     bare = Diagnosis(
         verdict="nothing wrong",
         findings=(),
-        gates=gates,
+        checks=checks,
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
         notes=posed.notes,
@@ -159,7 +159,7 @@ def assess(examined: Examined) -> Examined:
     ]
     reportable = [pair for pair in every if _is_reportable(naming.found, pair[0])]
     conflicts = _conflict_notes(naming.found, named=bool(reportable))
-    outcome = verdict(len(reportable), largest_z(remaining), one.gates, strained=bool(conflicts))
+    outcome = verdict(len(reportable), largest_z(remaining), one.checks, in_conflict=bool(conflicts))
     doubted = only_resembled(reportable, named, known)
     if (
         outcome == "unexplained"
@@ -210,14 +210,14 @@ def is_moving(case: Case) -> bool:
     return case.trial.role != "static" and bool(away.max() > case.trial.settings.standing.still)
 
 
-def without_names(examined: Examined, gates: tuple[Gate, ...] = ()) -> Examined:
+def without_names(examined: Examined, checks: tuple[QualityCheck, ...] = ()) -> Examined:
     """Return the same session with no cause named: what was named is only what it resembles, and what is left is
     judged without it.
     """
-    naming, one = examined.naming, replace(examined.diagnosis, gates=gates)
+    naming, one = examined.naming, replace(examined.diagnosis, checks=checks)
     found = assess(Examined(one, replace(naming, found=naming.bare, accepted=())))
     unnamed = replace(
-        found.diagnosis, gates=examined.diagnosis.gates, resembles=(*one.findings, *one.resembles), tolerated=()
+        found.diagnosis, checks=examined.diagnosis.checks, resembles=(*one.findings, *one.resembles), tolerated=()
     )
     return replace(found, diagnosis=unnamed)
 
@@ -238,7 +238,7 @@ def _conflict_notes(found: Model, *, named: bool) -> tuple[str, ...]:
     without any excuse but how loud the session is.
     """
     once = with_strides_once(found)
-    body = (strain_at_loudness(once) if named else strain_at_own_noise(once)) > STRAINED
+    body = (conflict_at_loudness(once) if named else conflict_at_own_noise(once)) > CONFLICT_LIMIT
     far = stretch(found)
     said = (UNUSUAL_BODY, body), (OUTSIDE_TOLERANCES, far > STRETCHED), (OUTSIDE_EVERY_LABORATORY, far > TORN)
     return tuple(note for note, holds in said if holds)

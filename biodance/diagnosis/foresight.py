@@ -14,7 +14,7 @@ from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.observability import Visibility, detection_limits, hidden, visibility
-from biodance.diagnosis.problem import Look, problem
+from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.discovery import Chosen
 from biodance.effects import Effect
 from biodance.motion.kinematics import poses
@@ -93,13 +93,13 @@ def foresee(
     known = tolerances or shipped()
     ends = np.cumsum([float(one.time[-1] - one.time[0]) for one in motions])
     starts = np.concatenate([[0.0], ends[:-1]])
-    looks = tuple(
-        Look(
+    windows = tuple(
+        TrialWindow(
             planned(body, one, f"planned_{i + 1}"), one, np.ones(one.time.size, dtype=bool), a / ends[-1], b / ends[-1]
         )
         for i, (one, a, b) in enumerate(zip(motions, starts, ends, strict=True))
     )
-    put = problem(body, looks, chosen=effects)
+    put = problem(body, windows, chosen=effects)
     found, causes = build_model(put, known, effects)
     seen = visibility(found, causes)
     rows = tuple(sorted(detection_limits(seen, body, known.threshold), key=lambda row: row.limit / row.typical))

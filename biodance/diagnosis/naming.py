@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri, ndtr
 
-from biodance.diagnosis.adequacy import STRAINED, strain
+from biodance.diagnosis.adequacy import CONFLICT_LIMIT, prior_data_conflict
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Alias
@@ -100,7 +100,7 @@ def name_causes(
             break
         accepted.append(ranking)
         settled = with_unlike_causes(settled, tolerances)
-        again = needs_rebuilding(settled) and strain(settled) <= STRAINED
+        again = needs_rebuilding(settled) and prior_data_conflict(settled) <= CONFLICT_LIMIT
         found, causes = rebuild_model(settled, settled.tolerances, chosen) if again else (settled, causes)
         ranking = Round(
             tuple(one for one in screen(found, causes) if one.names not in {cause_key(n) for n in found.named})

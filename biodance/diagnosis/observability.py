@@ -184,7 +184,7 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
     rows = []
     after = after_calibration(seen, body)
     for i, one in enumerate(seen.causes):
-        here = after if one.effect.placed else seen
+        here = after if one.effect.taken_up_by_calibration else seen
         limit = here.seen(i, threshold + float(np.log(targets[one.names[0]])))
         first = one.effect.parameters[one.silent.index(False)]
         limit = max(limit, least(one.effect).get(first.name, 0.0), here.felt(i))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import spectrum, thinned
 from biodance.identification.statistics import standing_point
 from biodance.records import Array, Trial
@@ -38,7 +38,7 @@ UNREST = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Own:
+class SessionTolerances:
     """``tolerances`` that hold for some recordings, ``notes`` on what changed, and whether a name found under them
     is ``believed``.
     """
@@ -49,16 +49,18 @@ class Own:
 
 
 def own_tolerances(
-    body: Body, chosen: tuple[Look, ...], recorded: tuple[Trial, ...] = (), *, known: Tolerances | None = None
-) -> Own:
+    body: Body, chosen: tuple[TrialWindow, ...], recorded: tuple[Trial, ...] = (), *, known: Tolerances | None = None
+) -> SessionTolerances:
     """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
     recordings: with markers that move more on the body than where they were learned, with the noise of their own
     cameras and plates as ``recorded`` shows it, with the unrest of a person who stands still where standing is looked
     at, and with trial means no surer than a plate's zero.
     """
     found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
-    postures = np.array([look.motion.q[len(look.motion.q) // 2] for look in chosen if look.motion.q.size])[:_POSTURES]
-    about = standing_point(tuple(look.fit for look in chosen))
+    postures = np.array([window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size])[
+        :_POSTURES
+    ]
+    about = standing_point(tuple(window.fit for window in chosen))
     if recorded and postures.size:
         found = with_own_noise(found, added_noise(body, recorded, postures, about, known=found.instruments), mass)
     factor = soft_tissue(chosen) / found.instruments.distance
@@ -73,7 +75,7 @@ def own_tolerances(
     restless = skin_of(body, chosen).excess(found.instruments.skin, found.instruments.swing)
     if restless.any():
         found = with_own_noise(found, of_marker_errors(body, postures, about, restless), mass)
-    standing = tuple(look for look in chosen if look.trial.role == "static" and look.seconds > 0)
+    standing = tuple(window for window in chosen if window.trial.role == "static" and window.seconds > 0)
     if standing:
         shaken = unrest(body, standing, about)
         found = with_own_noise(found, shaken, mass)
@@ -83,8 +85,8 @@ def own_tolerances(
             f"{size[3:].max():.1f} N·m above {SWAYING:g} Hz (heart, breath, muscles; root mean square), which no "
             f"marker shows: a fault must be larger to be seen."
         )
-    zeros = of_zeros([run for look in chosen for run in look.runs])
-    return Own(with_zeros(found, zeros, mass), tuple(notes), believed=factor <= _TOO_FAR)
+    zeros = of_zeros([run for window in chosen for run in window.runs])
+    return SessionTolerances(with_zeros(found, zeros, mass), tuple(notes), believed=factor <= _TOO_FAR)
 
 
 def widened_by(known: Tolerances, factor: float) -> Tolerances:
@@ -97,26 +99,26 @@ def widened_by(known: Tolerances, factor: float) -> Tolerances:
     return replace(known, sizes=sizes, noise=known.noise * more[:, :, None] * more[:, None, :])
 
 
-def soft_tissue(chosen: tuple[Look, ...]) -> float:
+def soft_tissue(chosen: tuple[TrialWindow, ...]) -> float:
     """Return the first quartile over markers and moving trials of the RMS distance to the body, m: markers that are
     wrong do not count.
     """
-    moving = [look.motion.residual for look in chosen if look.trial.role != "static" and look.seconds > 0]
+    moving = [window.motion.residual for window in chosen if window.trial.role != "static" and window.seconds > 0]
     with np.errstate(invalid="ignore"):
         each = [np.sqrt(np.nanmean(residual**2, axis=0)) for residual in moving if residual.size]
     return float(np.nanquantile(np.concatenate(each), 0.25)) if each else 0.0
 
 
-def skin_of(body: Body, chosen: tuple[Look, ...]) -> SkinUnrest:
+def skin_of(body: Body, chosen: tuple[TrialWindow, ...]) -> SkinUnrest:
     """Return the `skin_unrest` of the trials of people who move."""
     return skin_unrest(body, ((one.trial, one.motion, one.use) for one in chosen if one.trial.role != "static"))
 
 
-def unrest(body: Body, standing: tuple[Look, ...], about: Array) -> Array:
+def unrest(body: Body, standing: tuple[TrialWindow, ...], about: Array) -> Array:
     """Return (B, 6, 6) covariance of a coefficient of what standing still leaves above `SWAYING`, per band, moments
     about ``about`` (3,) m; zero below.
     """
-    cases, uses = zip(*(thinned(look.case(body, body.sip.phi), look.use) for look in standing), strict=True)
+    cases, uses = zip(*(thinned(window.case(body, body.sip.phi), window.use) for window in standing), strict=True)
     where = spectrum(cases, uses, about)
     left = where.rows(tuple(case.residual[:, :, None] for case in cases))[:, :, 0]
     out = np.zeros((len(BANDS), 6, 6))

@@ -32,7 +32,7 @@ _LIGHTEST = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class TrialWindow:
     """One trial to look at: ``trial`` prepared, its ``motion``, ``use`` (T,) frames whose wrench may be compared,
     ``start`` and ``end`` of it as shares of the session's time.
     """
@@ -164,13 +164,13 @@ class Problem:
 
 def problem(
     body: Body,
-    looks: tuple[Look, ...],
+    windows: tuple[TrialWindow, ...],
     *,
     prior: Sip | None = None,
     chosen: Chosen[Effect] = None,
     shortest: float = SHORTEST_RUN,
 ) -> Problem:
-    """Return the problem of ``looks`` at a session of ``body``; ``prior`` of its parameters, by default the table's
+    """Return the problem of ``windows`` at a session of ``body``; ``prior`` of its parameters, by default the table's
     with widened sd; runs of frames shorter than ``shortest`` s are left out.
 
     What the markers show by themselves is read for the whole family and for the ``chosen`` effects (`effects`).
@@ -181,10 +181,10 @@ def problem(
         No trial has ``shortest`` s of believable, fully measured frames.
     """
     before = prior or widened(body.sip)
-    used, about, notes = usable(body, tuple(look.fit for look in looks))
+    used, about, notes = usable(body, tuple(window.fit for window in windows))
     kept = {fit.name: fit.use for fit in used}
-    named = ((look, kept[look.trial.name]) for look in looks if look.trial.name in kept)
-    pairs = [thinned(look.case(body, before.phi), use) for look, use in named]
+    named = ((window, kept[window.trial.name]) for window in windows if window.trial.name in kept)
+    pairs = [thinned(window.case(body, before.phi), use) for window, use in named]
     cases = tuple(case for case, _ in pairs)
     where = spectrum(cases, tuple(use for _, use in pairs), about, shortest=shortest)
     factor = prior_factor(before)

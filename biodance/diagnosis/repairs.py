@@ -12,7 +12,7 @@ from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.discovery import Chosen
-from biodance.effects import Case, DiscreteEffect, Effect, Gate, effects
+from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck, effects
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
@@ -101,11 +101,13 @@ def _named(effect: Effect, sizes: list[tuple[str, float]], sd: float) -> Finding
     return Finding(effect.name, effect.target, parameters, (cause,), 1.0, advice=effect.advice)
 
 
-def by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None, *, suspicious: bool = False) -> Diagnosis:
+def by_checks(
+    checks: tuple[QualityCheck, ...], left: Diagnosis | None = None, *, suspicious: bool = False
+) -> Diagnosis:
     """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
     recordings: of what the statistics ``left``, with something ``suspicious`` or not, no findings are taken.
     """
-    findings = tuple(failed_check(gate) for gate in checks if not gate.ok)
+    findings = tuple(failed_check(quality) for quality in checks if not quality.ok)
     note = (
         "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
         "recordings that are wrong."
@@ -114,7 +116,7 @@ def by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None, *, suspic
     return Diagnosis(
         verdict="named, complete" if clean else "named, incomplete",
         findings=findings,
-        gates=checks,
+        checks=checks,
         adequacy=left.adequacy if left else (),
         unobservable=left.unobservable if left else (),
         limits=left.limits if left else (),
@@ -122,8 +124,10 @@ def by_checks(checks: tuple[Gate, ...], left: Diagnosis | None = None, *, suspic
     )
 
 
-def failed_check(gate: Gate) -> Finding:
+def failed_check(quality: QualityCheck) -> Finding:
     """Return a failed check as a finding."""
-    size = () if np.isnan(gate.size) else (Estimate(gate.quantity, gate.size, float("nan"), gate.unit),)
-    cause = Alias(gate.effect, gate.target, float("inf"))
-    return Finding(gate.effect, gate.target, size, (cause,), 1.0, advice=f"{gate.text} {gate.advice}".strip())
+    size = () if np.isnan(quality.size) else (Estimate(quality.quantity, quality.size, float("nan"), quality.unit),)
+    cause = Alias(quality.effect, quality.target, float("inf"))
+    return Finding(
+        quality.effect, quality.target, size, (cause,), 1.0, advice=f"{quality.text} {quality.advice}".strip()
+    )

@@ -80,8 +80,8 @@ def _at_sizes(found: Model, effect: Effect) -> list[tuple[float, Array]]:
 
 
 def absorbed(found: Model, Z: Array, half: Array) -> Array:
-    """Return H (n, k): H' H is what of the information of whitened columns ``Z`` (r, k), whose `Belief.half` is
-    ``half``, the sizes of the n parameters of the named causes may still absorb.
+    """Return H (n, k): H' H is what of the information of whitened columns ``Z`` (r, k), whose `LinearPosterior.half`
+    is ``half``, the sizes of the n parameters of the named causes may still absorb.
     """
     own = found.posterior.half(found.posterior.X.T @ found.named_columns)
     _, G = found.named_score

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, unit_of
 from biodance.errors import UnknownName
 from biodance.records import Session
 from biodance.spatial import wrench_about_origin, wrench_about_point
@@ -24,14 +24,14 @@ __all__ = [
     "Case",
     "DiscreteEffect",
     "Effect",
-    "Gate",
     "Parameter",
+    "QualityCheck",
     "Recorded",
     "causes",
+    "check_quality",
     "discrete_effects",
     "effect",
     "effects",
-    "gates",
     "unit_of",
     "wrench_about_origin",
     "wrench_about_point",
@@ -85,14 +85,16 @@ def effect(name: str) -> Effect:
     return family[name]
 
 
-def gates(
+def check_quality(
     session: Session, cases: tuple[Case, ...] = (), *, chosen: Chosen[Cause | type[Cause]] = None
-) -> tuple[Gate, ...]:
+) -> tuple[QualityCheck, ...]:
     """Return all checks of a session, those that are not well first; ``chosen`` limits or extends the effects
     (`causes`).
     """
     recorded = Recorded(session, cases)
     found = [
-        replace(gate, advice=kind.advice) for kind in discrete_effects(chosen).values() for gate in kind.look(recorded)
+        replace(quality, advice=kind.advice)
+        for kind in discrete_effects(chosen).values()
+        for quality in kind.check(recorded)
     ]
-    return tuple(sorted(found, key=lambda gate: gate.ok))
+    return tuple(sorted(found, key=lambda quality: quality.ok))

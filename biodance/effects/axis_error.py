@@ -9,7 +9,7 @@ the plate forwards and to the left.
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled_files
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_point
 
@@ -41,24 +41,26 @@ class AxisError(DiscreteEffect):
     )
 
     @classmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return what the reader overruled, and the channels that mirror what the motion needs."""
         names = list(dict.fromkeys(plate.name for case in recorded.cases for plate in case.trial.plates))
-        signs = (gate for name in names for gate in cls._signs(recorded.cases, name))
+        signs = (quality for name in names for quality in cls._signs(recorded.cases, name))
         return (*overruled_files(recorded.session, _WORDS, check="axes of the plates", effect=cls.name), *signs)
 
     @classmethod
-    def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[Gate, ...]:
+    def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[QualityCheck, ...]:
         pairs = [pair for case in cases if (pair := on_one_plate(case, plate)) is not None]
         if not pairs:
             return ()
         measured, needed = (np.concatenate([pair[k] for pair in pairs]) for k in range(2))
         wrong = sign_turned(measured, needed)
         if not wrong:
-            return (Gate("signs of the channels", True, f"No channel of {plate} mirrors what the motion needs."),)
+            return (
+                QualityCheck("signs of the channels", True, f"No channel of {plate} mirrors what the motion needs."),
+            )
         prefix = "" if len(cases[0].trial.plates) == 1 else f"{plate}:"
         return tuple(
-            Gate(
+            QualityCheck(
                 "signs of the channels",
                 False,
                 f"{plate} {name} has the opposite sign of what the motion needs.",

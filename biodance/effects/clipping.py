@@ -6,7 +6,7 @@ whose noise was set to zero (flat at zero, not at the top). Separated by the his
 
 import numpy as np
 
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 from biodance.spatial import wrench_about_point
 
@@ -32,7 +32,7 @@ class Clipping(DiscreteEffect):
     )
 
     @classmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return one check per channel that clips, or one that says none does."""
         found: dict[str, tuple[float, str]] = {}
         trials = [trial for trial in recorded.session.trials if trial.plates]
@@ -42,7 +42,7 @@ class Clipping(DiscreteEffect):
         if found:
             said = "{} is flat at {:.4g} (first in {}): the amplifier or converter is at its end."
             return tuple(
-                Gate(
+                QualityCheck(
                     "range of the channels",
                     False,
                     said.format(target, limit, trial),
@@ -55,7 +55,7 @@ class Clipping(DiscreteEffect):
                 for target, (limit, trial) in found.items()
             )
         return (
-            (Gate("range of the channels", True, "No channel of the plates is flat at its extremes."),)
+            (QualityCheck("range of the channels", True, "No channel of the plates is flat at its extremes."),)
             if trials
             else ()
         )

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import dct
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
 from biodance.effects.clipping import clipped
 from biodance.identification.posterior import prior_factor
 from biodance.lab.filters import LowPass, low_pass
@@ -53,7 +53,7 @@ class FrameRate(DiscreteEffect):
     )
 
     @classmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return whether accelerations have the size that forces need, and whether the delay is the same from start
         to end.
         """
@@ -63,7 +63,7 @@ class FrameRate(DiscreteEffect):
         return (*cls._rate([case for case, _ in parts]), *cls._lost([part for _, part in parts]))
 
     @classmethod
-    def _rate(cls, cases: list[Case]) -> tuple[Gate, ...]:
+    def _rate(cls, cases: list[Case]) -> tuple[QualityCheck, ...]:
         if not cases:
             return ()
         ratio, explained = clock_beside_body(cases)
@@ -75,13 +75,15 @@ class FrameRate(DiscreteEffect):
                 f"declared rate is "
                 f"{ratio:.3g} times the true one."
             )
-            return (Gate("rate of the cameras", False, said, cls.name, "", ratio, "ratio", "1"),)
+            return (QualityCheck("rate of the cameras", False, said, cls.name, "", ratio, "ratio", "1"),)
         return (
-            Gate("rate of the cameras", True, f"Accelerations fit the forces: declared over true rate {ratio:.3f}."),
+            QualityCheck(
+                "rate of the cameras", True, f"Accelerations fit the forces: declared over true rate {ratio:.3f}."
+            ),
         )
 
     @classmethod
-    def _lost(cls, parts: list[tuple[Array, Array, float]]) -> tuple[Gate, ...]:
+    def _lost(cls, parts: list[tuple[Array, Array, float]]) -> tuple[QualityCheck, ...]:
         steps = [
             late(m[len(m) // 2 :], n[len(n) // 2 :], rate) - late(m[: len(m) // 2], n[: len(n) // 2], rate)
             for m, n, rate in parts
@@ -96,9 +98,9 @@ class FrameRate(DiscreteEffect):
                 f"From the middle of the trials on, forces are {1000 * step:.0f} ms later than at their start: "
                 f"frames were lost."
             )
-            return (Gate("lost frames", False, said, cls.name, "", step, "lost", "s"),)
+            return (QualityCheck("lost frames", False, said, cls.name, "", step, "lost", "s"),)
         return (
-            Gate(
+            QualityCheck(
                 "lost frames",
                 True,
                 f"The delay is the same at the start and at the end of the trials (within {1000 * _STEP:.0f} ms).",

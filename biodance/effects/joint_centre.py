@@ -31,7 +31,7 @@ class JointCentre(Effect):
         Parameter(f"shift_{axis}", "m", MISSED, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
         for axis in "xyz"
     )
-    placed = True
+    taken_up_by_calibration = True
     separated_by = "The joint alone through its whole range, about all its axes, the rest standing still."
     advice = (
         "Record a functional calibration of this joint (for the hip a star and an arc), or palpate and re-place "

@@ -16,7 +16,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.effects._base.case import Case
 from biodance.effects._base.exchanged_labels import Pair, arms_hang, exchanged_pairs
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
 from biodance.effects._base.wrists import partner
 from biodance.errors import BiodanceError
 from biodance.motion.ik.inverse_kinematics import solve_ik
@@ -44,7 +44,7 @@ class LabelsSwapped(DiscreteEffect):
     advice = "Exchange the two labels in the recording software, in every trial named, and export again."
 
     @classmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return the pairs that the markers of each trial show, and where they show none those whose exchange makes
         the body fit.
         """
@@ -56,11 +56,13 @@ class LabelsSwapped(DiscreteEffect):
         check = "labels of the markers"
         if where:
             return tuple(
-                Gate(check, False, f"{a} and {b} carry each other's names in {', '.join(names)}.", cls.name, f"{a}/{b}")
+                QualityCheck(
+                    check, False, f"{a} and {b} carry each other's names in {', '.join(names)}.", cls.name, f"{a}/{b}"
+                )
                 for (a, b), names in where.items()
             )
         looked = any(trial.markers is not None for trial in recorded.session.trials)
-        return (Gate(check, True, "No two markers seem to carry each other's names."),) if looked else ()
+        return (QualityCheck(check, True, "No two markers seem to carry each other's names."),) if looked else ()
 
 
 def exchanges(recorded: Recorded) -> dict[str, frozenset[Pair]]:

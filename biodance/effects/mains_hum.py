@@ -7,7 +7,7 @@ unless it was sampled so slowly that it was folded into the movement.
 
 import numpy as np
 
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, unit_of
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, unit_of
 from biodance.records import CHANNELS, Array, Trial
 from biodance.spatial import wrench_about_point
 
@@ -30,7 +30,7 @@ class MainsHum(DiscreteEffect):
     )
 
     @classmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return one check per channel that hums in most trials, or one that says none does."""
         seen: dict[tuple[str, float], list[float]] = {}
         trials = 0
@@ -39,14 +39,16 @@ class MainsHum(DiscreteEffect):
             trials += bool(amplitudes)
             for key, amplitude in amplitudes.items():
                 seen.setdefault(key, []).append(amplitude)
-        gates = []
+        checks = []
         for (target, frequency), amplitudes_seen in seen.items():
             middle = float(np.median(amplitudes_seen))
             if middle > _LEAST[CHANNELS.index(target.rpartition(":")[2])]:
                 said = f"{target} hums at {frequency:g} Hz with an amplitude of {middle:.2g}."
-                gates.append(Gate("mains hum", False, said, cls.name, target, middle, "amplitude", unit_of(target)))
-        none = (Gate("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if trials else ()
-        return tuple(gates) or none
+                checks.append(
+                    QualityCheck("mains hum", False, said, cls.name, target, middle, "amplitude", unit_of(target))
+                )
+        none = (QualityCheck("mains hum", True, "No channel of the plates hums at 50 or 60 Hz."),) if trials else ()
+        return tuple(checks) or none
 
 
 def lines(trial: Trial) -> dict[tuple[str, float], float]:

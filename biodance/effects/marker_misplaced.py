@@ -30,7 +30,7 @@ class MarkerMisplaced(Effect):
         Parameter(f"shift_{axis}", "m", 0.010, "up to 20-30 mm between examiners (Osis 2016, PLoS ONE 0147111)")
         for axis in "xyz"
     )
-    placed = True
+    taken_up_by_calibration = True
     separated_by = "A second static trial at the end of the session shows where the marker sits now."
     advice = "Look at the marker on the video; record another static trial and scale the body on it."
 

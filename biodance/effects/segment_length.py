@@ -28,7 +28,7 @@ class SegmentLength(Effect):
             "error", "m", 0.010, "3-20 mm between typed measures and markers (public recordings: 16 mm at the hip)"
         ),
     )
-    placed = True
+    taken_up_by_calibration = True
     separated_by = "Deep squats for the legs, full flexion of the elbow for the arms."
     advice = (
         "Measure the bone with a calliper between its landmarks; record a new static trial in the shoes of the session."

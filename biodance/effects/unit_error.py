@@ -7,7 +7,7 @@ but by no fixed factor. Separated by the scale's weight and by the size of the p
 
 import numpy as np
 
-from biodance.effects._base.gate import DiscreteEffect, Gate, Recorded, overruled_files
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
 from biodance.records import Trial
 from biodance.settings import STANDARD_GRAVITY
 
@@ -43,12 +43,12 @@ class UnitError(DiscreteEffect):
     )
 
     @classmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return what the reader overruled, and whether the plates carry the person's weight up to a factor."""
         return (*overruled_files(recorded.session, _WORDS, check="units", effect=cls.name), *cls._weight(recorded))
 
     @classmethod
-    def _weight(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def _weight(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         mass = recorded.session.subject.mass
         if not mass > 0 or "mass" in recorded.session.subject.guessed:
             return ()
@@ -59,8 +59,10 @@ class UnitError(DiscreteEffect):
         for factor, meaning in FACTORS.items():
             if abs(middle / factor - 1) < _NEAR:
                 said = f"The plates carry {middle:.4g} times the declared weight: {meaning}."
-                return (Gate("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
-        return (Gate("weight on the plates", True, f"The plates carry {middle:.3g} times the declared weight."),)
+                return (QualityCheck("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
+        return (
+            QualityCheck("weight on the plates", True, f"The plates carry {middle:.3g} times the declared weight."),
+        )
 
 
 def weight_ratio(trial: Trial, mass: float) -> float | None:

@@ -167,12 +167,12 @@ class _Judged:
     @classmethod
     def of(cls, data: Information, units: tuple[tuple[Array, Array], ...], rival: UnloadedBody) -> "_Judged":
         before = rival.before
-        rows, surprise, evidence = whiten_innovation(data, before)
+        rows, innovation, evidence = whiten_innovation(data, before)
         less = float(rival.holds) * rows @ before.phi / before.mass.sum()
         columns = (rows[:, 10 * i : 10 * i + 10] for i in range(len(units)))
-        views = tuple(LoadView.of(part, surprise, unit, less) for part, unit in zip(columns, units, strict=True))
+        views = tuple(LoadView.of(part, innovation, unit, less) for part, unit in zip(columns, units, strict=True))
         ratio = np.array([view.log_ratio(MASSES) for view in views])
-        log_det = evidence + 0.5 * float(surprise @ surprise)
+        log_det = evidence + 0.5 * float(innovation @ innovation)
         return cls(rival.log_prior, rival.log_prior + evidence, log_det, views, ratio)
 
 

@@ -20,7 +20,7 @@ from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, temper
 from biodance.identification.placement import more_probable_table
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import Posterior, find_posterior
 from biodance.identification.statistics import Statistics
 from biodance.records import Array, Sip
 from biodance.uncertainty.noise import Noise
@@ -140,17 +140,17 @@ def undo_dilution(
     now = measured
     for _ in range(_ROUNDS):
         table = more_probable_table(now.data, before, body)[0] if open_table else before
-        belief = posterior(now.data, table)
-        real = undiluted(total, _with_probable_load(belief, now.data, body).mean, table, shown)
+        posterior = find_posterior(now.data, table)
+        real = undiluted(total, _with_probable_load(posterior, now.data, body).mean, table, shown)
         now = discounted(real, learn_noise(real, room, rounds=_AGAIN)[0], found, room)
-        if gains_move_masses(belief, posterior(now.data, table)):
+        if gains_move_masses(posterior, find_posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
     return now
 
 
-def _with_probable_load(belief: Posterior, data: Information, body: Body) -> Posterior:
-    """Return the belief with a load where the data make one more probable: arms that are too light for what they
+def _with_probable_load(posterior: Posterior, data: Information, body: Body) -> Posterior:
+    """Return the posterior with a load where the data make one more probable: arms that are too light for what they
     carry show more than is predicted, and no dilution.
     """
-    loaded = posterior(data, with_unknown_load(body, belief.prior))
-    return max(belief, loaded, key=lambda one: one.log_evidence)
+    loaded = find_posterior(data, with_unknown_load(body, posterior.prior))
+    return max(posterior, loaded, key=lambda one: one.log_evidence)

@@ -22,7 +22,7 @@ from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import Posterior, find_posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics_together, usable
 from biodance.records import Sip
 from biodance.threads import Sendable, one_thread
@@ -50,7 +50,7 @@ class Identification(Sendable):
     ----------
     body : Body
         As given, with the table as its inertial parameters.
-    belief : Posterior
+    posterior : Posterior
         The Gaussian posterior before the consistency constraint.
     data : Information
         What the trials alone say: whitened, disturbances discounted.
@@ -87,7 +87,7 @@ class Identification(Sendable):
     """
 
     body: Body
-    belief: Posterior
+    posterior: Posterior
     data: Information
     base: BaseEstimate
     noise: Noise
@@ -265,8 +265,8 @@ def conclude(
         got = undo_dilution(body, total, got, found, before, open_table=prior is None)
     data = got.data
     before, apart, chosen = more_probable_table(data, before, body) if prior is None else (before, False, ())
-    belief = posterior(data, before)
-    fit = physical_fit(belief, body)
+    posterior = find_posterior(data, before)
+    fit = physical_fit(posterior, body)
     base = estimate_base(data, structural_base(body))
     known: tuple[Known, ...] = ()
     words: tuple[str, ...] = (*(() if found else (NOISE_ALONE,)), *chosen)
@@ -275,10 +275,10 @@ def conclude(
         if not machine:
             fit = replace(fit, sip=from_true_centres(fit.sip, before, body.joint_errors))
             first = from_true_centres(before, before, body.joint_errors)
-        known = knowledge(fit.sip, first, belief)
+        known = knowledge(fit.sip, first, posterior)
         words += _notes(known, fit)
     return Identification(
-        body, belief, data, base, got.noise, got.sizes, fit, trials, data.frames, known, words, apart, got.diluted
+        body, posterior, data, base, got.noise, got.sizes, fit, trials, data.frames, known, words, apart, got.diluted
     )
 
 

@@ -83,14 +83,16 @@ def segment_quantities(phi: Array) -> tuple[Array, Array]:
     return value, slope
 
 
-def knowledge(after: Sip, before: Sip, belief: Posterior | None = None) -> tuple[Known, ...]:
+def knowledge(after: Sip, before: Sip, posterior: Posterior | None = None) -> tuple[Known, ...]:
     """Return all quantities of all segments, in order.
 
     ``after`` and ``before`` with covariances about the true joint centres; what the data removed of the variance is
-    judged in the model's frames (``belief`` and its prior, else ``after`` and ``before``), where a misplaced joint
+    judged in the model's frames (``posterior`` and its prior, else ``after`` and ``before``), where a misplaced joint
     centre is no ignorance.
     """
-    then, first = (belief.covariance, belief.prior.covariance) if belief else (after.covariance, before.covariance)
+    then, first = (
+        (posterior.covariance, posterior.prior.covariance) if posterior else (after.covariance, before.covariance)
+    )
     rows = []
     for i, segment in enumerate(after.segments):
         cut = slice(10 * i, 10 * i + 10)

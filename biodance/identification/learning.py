@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import Posterior, find_posterior
 from biodance.identification.statistics import Statistics
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
@@ -29,11 +29,11 @@ def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, start: Array 
     data = replace(data)  # a copy of its own: what that keeps in order to learn (12 MB) goes with it
 
     def improved(noise: Noise) -> Noise:
-        belief = posterior(data.information(noise), prior)
+        posterior = find_posterior(data.information(noise), prior)
         return replace(
-            noise, covariance=noise_of(data.moments(belief.mean, belief.covariance), start=start, worth=WORTH)
+            noise, covariance=noise_of(data.moments(posterior.mean, posterior.covariance), start=start, worth=WORTH)
         )
 
     first = Noise(np.tile(start, (len(data.count), 1, 1)), data.layout.about, data.layout.bands)
     noise = maximise(first, improved, lambda one: one.covariance, rounds=rounds, tolerance=_SETTLED)
-    return noise, posterior(data.information(noise), prior)
+    return noise, find_posterior(data.information(noise), prior)

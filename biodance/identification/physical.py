@@ -106,23 +106,23 @@ class FailedFit:
 
 
 @one_thread()
-def physical_fit(belief: Posterior, body: "Body") -> PhysicalFit | FailedFit:
+def physical_fit(posterior: Posterior, body: "Body") -> PhysicalFit | FailedFit:
     """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``; look at
     ``status``.
 
     Only segments that violate are constrained, until none does: what a constraint that is not listed would not change
     is already nearest. When the mean is consistent it is returned as it is.
     """
-    prior, limits = belief.prior, _limits(belief.prior, body)
+    prior, limits = posterior.prior, _limits(posterior.prior, body)
     bound = np.zeros(len(prior.segments), dtype=bool)
-    phi, distance = belief.mean, 0.0
+    phi, distance = posterior.mean, 0.0
     while (outside := limits.room(phi) < -TOLERANCE).any():
         bound = bound | outside
-        x, word = _nearest(belief, limits, np.flatnonzero(bound))
+        x, word = _nearest(posterior, limits, np.flatnonzero(bound))
         if x is None:
             return FailedFit(_cause(word, [name for name, acts in zip(prior.segments, bound, strict=True) if acts]))
-        phi, distance = belief.mean + belief.factor @ x, float(np.linalg.norm(x))
-    return PhysicalFit(Sip(prior.segments, phi, belief.covariance), bound & (limits.room(phi) < 10 * GAP), distance)
+        phi, distance = posterior.mean + posterior.factor @ x, float(np.linalg.norm(x))
+    return PhysicalFit(Sip(prior.segments, phi, posterior.covariance), bound & (limits.room(phi) < 10 * GAP), distance)
 
 
 def _cause(word: str, segments: list[str]) -> str:
@@ -165,7 +165,7 @@ def _limits(prior: Sip, body: "Body") -> _Limits:
     return _Limits(weight.reshape(-1, 16, 1) * PSEUDO_INERTIA, least[:, None, None] * np.eye(4) * weight, sides)
 
 
-def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
+def _nearest(posterior: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
     """Solve min |x|² s.t. the segments ``bound`` of mean + factor x are inside their limits; return x (k,) and the
     solver's word.
 
@@ -173,15 +173,15 @@ def _nearest(belief: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tup
     solver stops, it is asked again in units of the distance to the prior.
     """
     rows = (10 * bound[:, None] + np.arange(10)).ravel()
-    span = np.linalg.qr(belief.factor[rows].T)[0]
-    local, mean = belief.factor[rows] @ span, belief.mean[rows]
-    far = float(np.linalg.norm(np.linalg.lstsq(local, belief.prior.phi[rows] - mean)[0]))
+    span = np.linalg.qr(posterior.factor[rows].T)[0]
+    local, mean = posterior.factor[rows] @ span, posterior.mean[rows]
+    far = float(np.linalg.norm(np.linalg.lstsq(local, posterior.prior.phi[rows] - mean)[0]))
     words = []
     for unit in (1.0, 0.1 * far, far):
         z, word = _solve(local * unit, mean, limits, bound)
         if z is not None:
             x = span @ z * unit
-            if limits.room(belief.mean + belief.factor @ x)[bound].min() >= -TOLERANCE:
+            if limits.room(posterior.mean + posterior.factor @ x)[bound].min() >= -TOLERANCE:
                 return x, word
             word = "outside the limits"
         words.append(word)

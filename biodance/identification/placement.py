@@ -12,7 +12,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
-from biodance.identification.posterior import posterior
+from biodance.identification.posterior import find_posterior
 from biodance.records import Sip
 from biodance.uncertainty.caution import shift_slope, widened
 
@@ -90,7 +90,7 @@ def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip,
     places = (False, True) if body.at_joint is not None else (False,)
     placed = [_at(body, float(table.mass.sum()), along=x) if len(places) > 1 else table for x in places]
     choices = {(x, s): with_sides(placed[x], apart=True) if s else placed[x] for x, s in product(places, (False, True))}
-    evidence = {choice: posterior(data, one).log_evidence for choice, one in choices.items()}
+    evidence = {choice: find_posterior(data, one).log_evidence for choice, one in choices.items()}
     along, apart = best = max(evidence, key=lambda choice: evidence[choice] - ODDS * choice[1])
     words = []
     if len(places) > 1:

@@ -19,7 +19,7 @@ from biodance.records import Array, Sip
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Gaussian belief about the 10N SIP after the data.
+    """Gaussian posterior about the 10N SIP after the data.
 
     ``mean`` (p,), ``factor`` (p, k) with ``covariance = factor @ factor.T``; ``prior`` as given; ``log_evidence`` of
     the data under prior and noise (up to a constant of the data alone); ``chi2`` whitened misfit at the mean;
@@ -72,7 +72,7 @@ def _factor_of(covariance: bytes) -> Array:
     return np.asarray(factor)
 
 
-def posterior(data: Information, prior: Sip) -> Posterior:
+def find_posterior(data: Information, prior: Sip) -> Posterior:
     """Return the maximum a posteriori estimate and its covariance for whitened ``data`` and a table ``prior``."""
     S = prior_factor(prior)
     A = data.triangle @ S

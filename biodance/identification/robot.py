@@ -52,7 +52,7 @@ def robot_fit(name: str, found: Grounded, angle: Array, measured: Array) -> Robo
     return RobotMotion(Fit(name, found.motion, wrench, use), angle, found)
 
 
-def surprise(body: Body, one: RobotMotion) -> float:
+def innovation(body: Body, one: RobotMotion) -> float:
     """Return the RMS of what the drawing leaves of a trial's wrench, over what its own standard deviations allow.
 
     Channels count in units of their allowance, to which the start of the noise is added; 1 is usual.

@@ -13,7 +13,7 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.physical import physical_fit
-from biodance.identification.posterior import Posterior, posterior
+from biodance.identification.posterior import Posterior, find_posterior
 from biodance.identification.unloaded_body import scaled_to_mass, table_like
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
@@ -72,12 +72,12 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
         raise BiodanceError(
             "The two sessions have different segments and cannot be compared. Use the same kind of body in both."
         )
-    mass = float(earlier.belief.prior.mass.sum())
+    mass = float(earlier.posterior.prior.mass.sum())
     tables = (scaled_to_mass(table_like(one, earlier), mass) for one in (earlier, later))
     first, second = (_with_room(*three) for three in zip(tables, (earlier, later), (later, earlier), strict=True))
-    mutual = _prior_influence(first) @ earlier.belief.prior.covariance @ _prior_influence(second).T
+    mutual = _prior_influence(first) @ earlier.posterior.prior.covariance @ _prior_influence(second).T
     spread = first.covariance + second.covariance - mutual - mutual.T
-    values = [_possible(belief, one) for belief, one in ((first, earlier), (second, later))]
+    values = [_possible(posterior, one) for posterior, one in ((first, earlier), (second, later))]
     rows = []
     for i, segment in enumerate(earlier.sip.segments):
         cut = slice(10 * i, 10 * i + 10)
@@ -92,29 +92,30 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     return tuple(rows)
 
 
-def _prior_influence(belief: Posterior) -> Array:
-    """Return A (p, p) = C P^-1 of a belief with covariance C: what of a step of the prior's mean is still in its mean.
+def _prior_influence(posterior: Posterior) -> Array:
+    """Return A (p, p) = C P^-1 of a posterior with covariance C: what of a step of the prior's mean is still in its
+    mean.
 
     In the units of each parameter's own standard deviation, where the inverse hangs on no rounding.
     """
-    scale = np.sqrt(np.diag(belief.prior.covariance))
+    scale = np.sqrt(np.diag(posterior.prior.covariance))
     unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
-    inverse = np.linalg.pinv(belief.prior.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
-    return belief.covariance @ (unit[:, None] * inverse * unit)
+    inverse = np.linalg.pinv(posterior.prior.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
+    return posterior.covariance @ (unit[:, None] * inverse * unit)
 
 
-def _possible(belief: Posterior, one: Identification) -> Array:
-    """Return the parameters (10N,) of the possible body nearest to ``belief`` of session ``one``."""
-    fit = physical_fit(belief, one.body)
+def _possible(posterior: Posterior, one: Identification) -> Array:
+    """Return the parameters (10N,) of the possible body nearest to ``posterior`` of session ``one``."""
+    fit = physical_fit(posterior, one.body)
     if fit.status == "failed":
         raise NotSolved(f"The sessions cannot be compared: {', '.join(one.trials)}, with room for a load: {fit.cause}")
     return fit.sip.phi
 
 
 def _with_room(table: Sip, one: Identification, other: Identification) -> Posterior:
-    """Return the belief of session ``one`` after its ``table`` with room for the loads that it carries beyond
+    """Return the posterior of session ``one`` after its ``table`` with room for the loads that it carries beyond
     ``other``.
     """
     chance = {found.segment: found.probability for found in added_mass(one, reference=other).suspects}
     share = np.array([chance[segment] for segment in one.body.segments])
-    return posterior(one.data, with_unknown_load(one.body, table, share=share))
+    return find_posterior(one.data, with_unknown_load(one.body, table, share=share))

@@ -69,7 +69,10 @@ def torque_bands(
     """
     body = found.body
     share = np.eye(10 * len(body.segments)) if body.sharing is None else body.sharing
-    covariance, phi = share @ found.belief.covariance @ share.T, share @ np.stack([found.sip.phi, body.sip.phi], axis=1)
+    covariance, phi = (
+        share @ found.posterior.covariance @ share.T,
+        share @ np.stack([found.sip.phi, body.sip.phi], axis=1),
+    )
     needed, variance = np.empty((motion.time.size, len(body.joints), 2)), np.empty((motion.time.size, len(body.joints)))
     for part, frames in in_blocks(motion):
         for j, (beyond, Y) in enumerate(_beyond_joints(body, frames)):
@@ -193,7 +196,7 @@ def _moved(found: Identification) -> tuple[Array, Array]:
 
     Columns in the order of ``found.known``: segment by segment, in each the quantities of `QUANTITIES`.
     """
-    C, size = found.belief.covariance, len(QUANTITIES)
+    C, size = found.posterior.covariance, len(QUANTITIES)
     slopes = np.zeros_like(C)
     for i in range(len(found.sip.segments)):
         cut = slice(size * i, size * i + size)

@@ -33,7 +33,7 @@ class UnloadedBody:
 def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     """Return what ``reference`` lets expect of the unloaded body in ``session``, with covariance.
 
-    The belief of the reference, moved by what the table itself changed between the sessions (another static trial,
+    The posterior of the reference, moved by what the table itself changed between the sessions (another static trial,
     other lengths), with the trunk's matter in the same of its two places, known as on another day (markers glued
     anew). The session's table counts at the mass of the
     reference: the mass that the session declares may hold the load.
@@ -41,13 +41,13 @@ def expect_unloaded(reference: Identification, session: Identification) -> Sip:
     Raises
     ------
     NotSolved
-        The reference contradicts every possible body, so its belief is none of a body.
+        The reference contradicts every possible body, so its posterior is none of a body.
     """
-    along = matter_follows_joint(reference.belief.prior, reference.body)
-    same = with_matter_placed(session.belief.prior, session.body, along=along)
-    table = scaled_to_mass(same, float(reference.belief.prior.mass.sum()))
-    shift = table.phi - reference.belief.prior.phi
-    moved = Sip(reference.sip.segments, reference.belief.mean + shift, reference.belief.covariance)
+    along = matter_follows_joint(reference.posterior.prior, reference.body)
+    same = with_matter_placed(session.posterior.prior, session.body, along=along)
+    table = scaled_to_mass(same, float(reference.posterior.prior.mass.sum()))
+    shift = table.phi - reference.posterior.prior.phi
+    moved = Sip(reference.sip.segments, reference.posterior.mean + shift, reference.posterior.covariance)
     return in_other_frames(moved, session.body.joint_errors)
 
 
@@ -60,14 +60,16 @@ def tables_by_sides(session: Identification) -> tuple[tuple[Sip, float], ...]:
 
 
 def _with_sides_as(session: Identification, *, apart: bool) -> Sip:
-    prior = session.belief.prior
+    prior = session.posterior.prior
     return prior if session.apart == apart else with_sides(prior, apart=apart)
 
 
 def table_like(one: Identification, other: Identification) -> Sip:
     """Return the table of session ``one`` with the trunk's matter and the sides as in session ``other``."""
-    table = with_matter_placed(one.belief.prior, one.body, along=matter_follows_joint(other.belief.prior, other.body))
-    apart = one.apart and table is one.belief.prior
+    table = with_matter_placed(
+        one.posterior.prior, one.body, along=matter_follows_joint(other.posterior.prior, other.body)
+    )
+    apart = one.apart and table is one.posterior.prior
     return table if apart == other.apart else with_sides(table, apart=other.apart)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.body.robot.likeness import sole_normal
+from biodance.body.robot.similarity import sole_normal
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.base_seen import BaseSeen

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.effects import Gate, Recorded, gates
+from biodance.effects import QualityCheck, Recorded, check_quality
 from biodance.effects.labels_swapped import exchanges, renamed
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.ezc3d_object import write_trial
@@ -21,7 +21,7 @@ from biodance.lab.corrections import (
     corrections_text,
     joined_corrections,
 )
-from biodance.pipeline.judged_trials import all_looks, cases_of
+from biodance.pipeline.judged_trials import all_windows, cases_of
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Session
@@ -79,13 +79,17 @@ def _session_toml(session: Session) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> tuple[SessionResult, tuple[Gate, ...]]:
+def with_right_labels(
+    result: SessionResult, *, tell: Callable[[str], None]
+) -> tuple[SessionResult, tuple[QualityCheck, ...]]:
     """Return the session examined again with its labels exchanged, until no two carry each other's names, and the
     checks that named them; the same result and no check where none do.
     """
-    checks = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=("labels_swapped",))
+    checks = check_quality(
+        result.session, cases_of(result.body, all_windows(result.trials)), chosen=("labels_swapped",)
+    )
     for _ in range(_ROUNDS):
-        found = exchanges(Recorded(result.session, cases_of(result.body, all_looks(result.trials))))
+        found = exchanges(Recorded(result.session, cases_of(result.body, all_windows(result.trials))))
         if not found:
             break
         tell("examining a copy with the labels exchanged")
@@ -93,7 +97,7 @@ def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> 
             renamed(trial, found[trial.name]) if trial.name in found else trial for trial in result.session.trials
         )
         result = examine(replace(result.session, trials=trials))
-    return result, tuple(gate for gate in checks if not gate.ok)
+    return result, tuple(quality for quality in checks if not quality.ok)
 
 
 def write_mended(session: Session, mended: Session, folder: Path) -> tuple[Path, ...]:

@@ -23,7 +23,7 @@ def beside_another_body(examined: Examined, body: Body, joints: tuple[str, ...])
     doubt = _doubt(body, joints)
     if not doubt or examined.diagnosis.verdict not in _LEFT or examined.diagnosis.doubt:
         return examined
-    found = without_names(examined, examined.diagnosis.gates) if examined.diagnosis.findings else examined
+    found = without_names(examined, examined.diagnosis.checks) if examined.diagnosis.findings else examined
     return replace(found, diagnosis=replace(found.diagnosis, doubt=doubt))
 
 

@@ -12,7 +12,7 @@ from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANC
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
-from biodance.effects import Gate
+from biodance.effects import QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.finding_words import LOAD, alternatives_in_words, cause_of, explained, in_words, listed
 from biodance.pipeline.judged_trials import TOO_SHORT
@@ -133,7 +133,7 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
 def _checks(one: Diagnosis) -> str:
     """Return where the named causes that have no size were seen, as sentences: which labels, in which trials."""
     bare = {(finding.effect, finding.target) for finding in one.findings if not finding.parameters}
-    said = [gate.text for gate in one.gates if not gate.ok and (gate.effect, gate.target) in bare]
+    said = [quality.text for quality in one.checks if not quality.ok and (quality.effect, quality.target) in bare]
     return "".join(f"{_first_sentence(text)}. " for text in dict.fromkeys(said))
 
 
@@ -166,14 +166,14 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     return strongest_first([*found, *_load(result, findings)])
 
 
-def identified_attention(result: SessionResult, checks: Sequence[Gate]) -> tuple[Attention, ...]:
+def identified_attention(result: SessionResult, checks: Sequence[QualityCheck]) -> tuple[Attention, ...]:
     """Return what a person must see of a session that was identified and not diagnosed: the ``checks`` of its
     recordings that failed (units, signs, labels, clocks) stand first, as the diagnosis says them.
     """
-    findings = tuple(failed_check(gate) for gate in checks)
+    findings = tuple(failed_check(quality) for quality in checks)
     if not findings:
         return session_attention(result)
-    one = Diagnosis("named, incomplete", findings, gates=tuple(checks))
+    one = Diagnosis("named, incomplete", findings, checks=tuple(checks))
     text = f"Found: {' and '.join(map(in_words, findings))}. {_checks(one)}".strip()
     return strongest_first([Attention("fail", text, about=ABOUT), *session_attention(result, findings)])
 

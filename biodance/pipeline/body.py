@@ -52,7 +52,7 @@ def body_of(
         scaling = attempt(steps, "scale", partial(measure_static, subject, static))
         if scaling is not None:
             functional = settings.joints == "functional"
-            placed = attempt(steps, "joints", partial(placed_by_movement, scaling, read)) if functional else None
+            placed = attempt(steps, "joints", partial(calibrate_joints, scaling, read)) if functional else None
             moved = placed is not None and any(note.startswith(PLACED) for note in placed.notes)
             how = f"{PLACED[:1].lower()}{PLACED[1:]}" if moved else "joints where it shows them"
             return (placed or scaling).body()[0], (
@@ -94,7 +94,7 @@ def _distance(body: Body, trial: Trial) -> float:
     return float(np.sqrt(np.nanmean(motion.residual**2))) if motion is not None else math.inf
 
 
-def placed_by_movement(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
+def calibrate_joints(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
     """Return the scaling with the joints that the trials with role fit show at the places where these show them.
 
     Raises

@@ -17,7 +17,7 @@ from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
 from biodance.discovery import Chosen
-from biodance.effects import DiscreteEffect, Effect, Gate, causes, gates
+from biodance.effects import DiscreteEffect, Effect, QualityCheck, causes, check_quality
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
@@ -25,7 +25,7 @@ from biodance.pipeline.another_body import beside_another_body
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
-from biodance.pipeline.judged_trials import all_looks, cases_of, chosen_looks, judged_trials, left_out
+from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
@@ -114,7 +114,7 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
-    mended: tuple[Gate, ...] = (),
+    mended: tuple[QualityCheck, ...] = (),
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
@@ -139,13 +139,13 @@ def diagnose_session(
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
-    used = chosen_looks(result.trials) if found.examined else ()
+    used = chosen_windows(result.trials) if found.examined else ()
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
 
 
-def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagnosis:
+def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...]) -> Diagnosis:
     """Return the diagnosis of a copy with the labels exchanged, these named first."""
     note = (
         "The labels named were exchanged in a copy, and everything else was found in that copy. "
@@ -154,8 +154,8 @@ def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[Gate, ...]) -> Diagn
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*(failed_check(gate) for gate in checks), *diagnosis.findings),
-        gates=(*checks, *diagnosis.gates),
+        findings=(*(failed_check(quality) for quality in checks), *diagnosis.findings),
+        checks=(*checks, *diagnosis.checks),
         notes=(note, *diagnosis.notes),
     )
 
@@ -169,11 +169,11 @@ def _diagnosed(
     tell: Callable[[str], None],
 ) -> SessionDiagnosis:
     """Return what was found; `reconcile_with_checks` says it."""
-    fitted = chosen_looks(result.trials)
+    fitted = chosen_windows(result.trials)
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
-    checks = gates(result.session, cases_of(result.body, all_looks(result.trials)), chosen=asked)
-    failed = tuple(gate for gate in checks if not gate.ok)
+    checks = check_quality(result.session, cases_of(result.body, all_windows(result.trials)), chosen=asked)
+    failed = tuple(quality for quality in checks if not quality.ok)
     if result.body is None or not fitted:
         why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
         return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
@@ -183,7 +183,7 @@ def _diagnosed(
         examined = diagnose_trials(
             result.body,
             fitted,
-            gates=checks,
+            checks=checks,
             tolerances=own.tolerances,
             prior=_prior(reference, result),
             effects=asked,
@@ -233,9 +233,9 @@ def diagnosed(
         return None
 
 
-def _cannot_tell(checks: tuple[Gate, ...], *notes: str) -> Diagnosis:
+def _cannot_tell(checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
     """Return the diagnosis of a session of which nothing could be judged: its checks, and why."""
-    return Diagnosis(verdict="unexplained", findings=(), gates=checks, notes=notes)
+    return Diagnosis(verdict="unexplained", findings=(), checks=checks, notes=notes)
 
 
 def _only_resembled(one: Diagnosis) -> Diagnosis:

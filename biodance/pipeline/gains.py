@@ -12,7 +12,7 @@ from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import standing_point
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
-from biodance.pipeline.judged_trials import cases_of, looks
+from biodance.pipeline.judged_trials import cases_of, windows
 from biodance.pipeline.results import SessionResult
 
 
@@ -121,9 +121,9 @@ def _corrected(result: SessionResult, examined: Examined, as_is: Identification 
     named, phi = (() if as_is else examined.named), examined.naming.found.phi
     both = []
     for roles in (FITTED_ROLES, KEPT_ROLES):
-        found = looks(result.trials, roles)
+        found = windows(result.trials, roles)
         cases = [replace(case, phi=phi) for case in cases_of(result.body, found)]
-        both.append([(case, accept(case, named), look.use) for case, look in zip(cases, found, strict=True)])
+        both.append([(case, accept(case, named), window.use) for case, window in zip(cases, found, strict=True)])
     fits, kept = (tuple(case_fit(case, use) for _, case, use in some) for some in both)
     body = as_is or identify_body(both[0][0][1].body, fits)
     about = standing_point(tuple(case_fit(case, use) for case, _, use in both[1] or both[0]))

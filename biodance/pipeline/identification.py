@@ -233,7 +233,7 @@ def _weights(one: SessionIdentification) -> tuple[float, float]:
     """Return the declared mass and what the plates carried over the fitted trials, kg."""
     gravity = -float(one.identification.body.gravity[2])
     body = float(one.identification.sip.mass.sum())
-    return float(one.identification.belief.prior.mass.sum()), body + unexplained_mass(one.fitted, gravity)
+    return float(one.identification.posterior.prior.mass.sum()), body + unexplained_mass(one.fitted, gravity)
 
 
 def _changes(

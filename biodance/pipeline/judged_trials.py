@@ -3,9 +3,9 @@
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
-from biodance.effects import Case, Gate, gates
+from biodance.effects import Case, QualityCheck, check_quality
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
@@ -21,7 +21,7 @@ _KEPT = "kept to measure what a finding gains"
 _NEVER = "it holds no measured ground contact"
 
 
-def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Look, ...]:
+def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[TrialWindow, ...]:
     """Return the trials of the given roles that have motion and measured contact, each at its place in the session's
     time; static trials belong to that time only where they are asked for.
     """
@@ -32,36 +32,36 @@ def looks(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Lo
     for one, long, end in zip(moving, seconds, ends, strict=True):
         if one.comparison is None or one.motion is None or one.trial.role not in roles or not one.comparison.used.any():
             continue
-        found.append(Look(one.trial, one.motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1]))
+        found.append(TrialWindow(one.trial, one.motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1]))
     return tuple(found)
 
 
-def chosen_looks(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
+def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
     """Return the trials to look at: those to fit, else those kept, and quiet standing beside them where they are
     short.
     """
-    roles = FITTED_ROLES if looks(results, FITTED_ROLES) else KEPT_ROLES
-    moving = looks(results, roles)
-    return moving if sum(look.seconds for look in moving) >= _ENOUGH else looks(results, ("static", *roles))
+    roles = FITTED_ROLES if windows(results, FITTED_ROLES) else KEPT_ROLES
+    moving = windows(results, roles)
+    return moving if sum(window.seconds for window in moving) >= _ENOUGH else windows(results, ("static", *roles))
 
 
-def all_looks(results: tuple[TrialResult, ...]) -> tuple[Look, ...]:
+def all_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
     """Return the trials that checks look at: those to look at, and those kept."""
-    return (*chosen_looks(results), *looks(results, KEPT_ROLES))
+    return (*chosen_windows(results), *windows(results, KEPT_ROLES))
 
 
-def cases_of(body: Body | None, found: tuple[Look, ...]) -> tuple[Case, ...]:
+def cases_of(body: Body | None, found: tuple[TrialWindow, ...]) -> tuple[Case, ...]:
     """Return the trials as effects see them, at the rate of the markers, with the table's parameters."""
-    return () if body is None else tuple(look.case(body, body.sip.phi) for look in found)
+    return () if body is None else tuple(window.case(body, body.sip.phi) for window in found)
 
 
-def failed_checks(result: SessionResult) -> tuple[Gate, ...]:
+def failed_checks(result: SessionResult) -> tuple[QualityCheck, ...]:
     """Return the checks of the recordings (units, signs, labels, clocks) that failed; trials without plates are looked
     at by their markers alone.
     """
-    measured = tuple(look for look in all_looks(result.trials) if look.trial.plates)
-    checks = gates(result.session, cases_of(result.body, measured))
-    return tuple(gate for gate in checks if not gate.ok)
+    measured = tuple(window for window in all_windows(result.trials) if window.trial.plates)
+    checks = check_quality(result.session, cases_of(result.body, measured))
+    return tuple(quality for quality in checks if not quality.ok)
 
 
 def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
@@ -74,18 +74,18 @@ def left_out(results: tuple[TrialResult, ...]) -> tuple[str, ...]:
 
 def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
     """Return by name why a trial is not looked at, though it should be."""
-    seen = {look.trial.name: look.seconds for look in looks(results, ("static", *FITTED_ROLES))}
+    seen = {window.trial.name: window.seconds for window in windows(results, ("static", *FITTED_ROLES))}
     wanted = [one for one in results if one.trial.role in FITTED_ROLES and not seen.get(one.name, 0.0)]
     return {one.name: TOO_SHORT if one.name in seen else " ".join(one.reasons) for one in wanted}
 
 
-def judged_trials(result: SessionResult, used: tuple[Look, ...]) -> tuple[Judged, ...]:
+def judged_trials(result: SessionResult, used: tuple[TrialWindow, ...]) -> tuple[Judged, ...]:
     """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
     is not.
     """
-    seconds = {look.trial.name: look.seconds for look in used if look.seconds > 0}
+    seconds = {window.trial.name: window.seconds for window in used if window.seconds > 0}
     why = reasons_left_out(result.trials)
-    roles = {look.trial.role for look in used if look.trial.name in seconds}
+    roles = {window.trial.role for window in used if window.trial.name in seconds}
     rows = []
     for one in result.trials:
         name, role = one.trial.name, one.trial.role

@@ -19,12 +19,12 @@ from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_by
 from biodance.diagnosis.own_tolerances import skin_of, soft_tissue
 from biodance.diagnosis.problem import problem
-from biodance.effects import gates
+from biodance.effects import check_quality
 from biodance.errors import SessionRefused
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_in
-from biodance.pipeline.judged_trials import cases_of, chosen_looks
+from biodance.pipeline.judged_trials import cases_of, chosen_windows
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.provenance import now
@@ -160,18 +160,18 @@ def learned_session(result: SessionResult) -> LearnedSession:
     TrialRefused
         It has no second of believable, fully measured frames.
     """
-    looks, session = chosen_looks(result.trials), result.session
-    if result.body is None or not looks:
+    windows, session = chosen_windows(result.trials), result.session
+    if result.body is None or not windows:
         raise SessionRefused(f"It has no trial that could be judged. {result.body_source}")
-    if failed := [gate for gate in gates(session, cases_of(result.body, looks)) if not gate.ok]:
+    if failed := [quality for quality in check_quality(session, cases_of(result.body, windows)) if not quality.ok]:
         raise SessionRefused(
             f"A check failed ({failed[0].check}), so that it is no session without fault: {failed[0].text}"
         )
-    put, known = problem(result.body, looks), shipped()
+    put, known = problem(result.body, windows), shipped()
     null = null_of(put, tuple(one for one in candidates(put) if known.knows(one.effect.name)))
     name = session.folder.resolve().name
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    own = noise_of_instruments(session.trials, soft_tissue(looks), skin_of(result.body, looks))
+    own = noise_of_instruments(session.trials, soft_tissue(windows), skin_of(result.body, windows))
     seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)

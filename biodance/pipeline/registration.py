@@ -7,7 +7,7 @@ from pathlib import Path
 
 from biodance.body.body import Body
 from biodance.diagnosis.own_tolerances import own_tolerances
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
@@ -119,9 +119,9 @@ def register(
     return registration
 
 
-def _tolerances(body: Body, recorded: Trial, look: Look) -> Tolerances:
+def _tolerances(body: Body, recorded: Trial, window: TrialWindow) -> Tolerances:
     """Return what is no fault in a look, with the noise of its own cameras and of the plates as recorded."""
-    return own_tolerances(body, (look,), (replace(look.trial, plates=recorded.plates),)).tolerances
+    return own_tolerances(body, (window,), (replace(window.trial, plates=recorded.plates),)).tolerances
 
 
 def _moving(markers: Path, forces: Path, tell: Callable[[str], None]) -> _Moving:

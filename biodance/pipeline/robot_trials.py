@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, FileRefused, TrialRefused
-from biodance.identification.robot import RobotMotion, robot_fit, surprise
+from biodance.identification.robot import RobotMotion, innovation, robot_fit
 from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.robot.encoders import for_joints
 from biodance.lab.robot.recording import BaseSensors, RobotRecording, RobotTrial
@@ -36,14 +36,14 @@ _COARSE = 20.0
 @dataclass(frozen=True, eq=False)
 class MatchedTrial:
     """One trial with plate and encoders brought together: ``motion`` to identify from, ``plate`` when and where,
-    ``measured`` wrench, filtered, on the plate's clock, ``surprise`` of the drawing at it.
+    ``measured`` wrench, filtered, on the plate's clock, ``innovation`` of the drawing at it.
     """
 
     recorded: RobotTrial
     motion: RobotMotion
     plate: PlateFit
     measured: Wrench
-    surprise: float
+    innovation: float
 
 
 def bring_together(
@@ -79,7 +79,7 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
     if base.markers:
         grounded = _base_from_markers(body, one, base, grounded, angle, fit)
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
-    odd = surprise(body, motion)
+    odd = innovation(body, motion)
     foreign = fit.correlation < _SAME or not _SCALES[0] < fit.scale < _SCALES[1]
     if odd > ODD or fit.correlation < _FAITHFUL:
         pair = _exchanged(body, time, angle, measured, limits)
@@ -184,7 +184,7 @@ def _explains(body: Body, time: Array, angle: Array, measured: Wrench, pair: tup
     found, fit = _grounded_motion(body, time, other, measured)
     motion = robot_fit("exchanged", found, other, on_motion_clock(measured, time, fit))
     most = 2 * motion.fit.use.sum() > found.use.sum()
-    return bool(most and fit.correlation > _FAITHFUL and surprise(body, motion) < ODD)
+    return bool(most and fit.correlation > _FAITHFUL and innovation(body, motion) < ODD)
 
 
 def _correlation_deficit(body: Body, time: Array, angle: Array, measured: Wrench) -> float:

@@ -36,9 +36,9 @@ def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
             f"(correlation {one.plate.correlation:.3f})."
         )
         out.append(Attention("warn" if abs(late) > _APART else "note", clocks, name, "time_delay"))
-        if one.surprise > ODD:
+        if one.innovation > ODD:
             words = (
-                f"The plate differs from the drawing by {one.surprise:.1f} times what its masses may be off by: look "
+                f"The plate differs from the drawing by {one.innovation:.1f} times what its masses may be off by: look "
                 f"for a load, an encoder with another zero or sign, or hands on the robot."
             )
             out.append(Attention("warn", words, name, "drawing"))

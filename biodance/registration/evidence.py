@@ -13,7 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.model import model
-from biodance.diagnosis.problem import Look, problem
+from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.effects import Case
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.motion.contact.contact import Contact
@@ -159,7 +159,7 @@ _UNKNOWN = np.array([0.1, 0.1, np.radians(5.0), 0.05])
 """m, m, rad, s: how far a first alignment can be off; keeps a direction that nothing shows from running away."""
 
 
-def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) -> PoseEvidence:
+def wrench_pull(body: Body, window: TrialWindow, tolerances: Tolerances, about: Array) -> PoseEvidence:
     """Return what the wrench of one trial, placed by the pose so far, says of a change of that pose about ``about``
     (3,) m.
 
@@ -169,7 +169,7 @@ def wrench_pull(body: Body, look: Look, tolerances: Tolerances, about: Array) ->
         No quarter of a second is fully measured and believable.
     """
     known = replace(tolerances, sizes={key: size for key, size in tolerances.sizes.items() if key not in _SOUGHT})
-    put = problem(body, (look,), shortest=_SHORTEST)
+    put = problem(body, (window,), shortest=_SHORTEST)
     found = model(put, candidates(put), known)
     rows = put.spectrum.rows((_columns(put.cases[0], about),)).reshape(-1, 4)
     rows = np.concatenate([rows, np.zeros((len(put.target) - len(rows), 4))])

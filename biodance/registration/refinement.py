@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
-from biodance.diagnosis.problem import Look
+from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import TrialRefused
 from biodance.motion.contact.contact import Contact, ground_contact
@@ -108,7 +108,7 @@ def refined(
     motion: Motion,
     forces: Forces,
     start: FramePose,
-    tolerances: Callable[[Look], Tolerances],
+    tolerances: Callable[[TrialWindow], Tolerances],
 ) -> Refined:
     """Return the pose that wrench and feet ask for, beginning at ``start``; ``tolerances`` of what is no fault in a
     look at the placed trial.
@@ -121,14 +121,14 @@ def refined(
     pose, why = start, ""
     weak = PoseEvidence(np.diag(_ALIGNED**-2.0), np.zeros(4), 0.0, 0)
     for turn in range(_ROUNDS):
-        look, soles, about = _look(body, trial, motion, forces, pose)
-        steps = plate_steps(look.trial, look.motion, _contact(body, look, soles), soles, forces, pose)
+        window, soles, about = _look(body, trial, motion, forces, pose)
+        steps = plate_steps(window.trial, window.motion, _contact(body, window, soles), soles, forces, pose)
         feet, wrench = feet_pull(steps, about), None
         try:
-            wrench = wrench_pull(body, look, tolerances(look), about)
+            wrench = wrench_pull(body, window, tolerances(window), about)
         except TrialRefused as error:
             why = str(error)
-        pulls = [one for one in (_honest(wrench, look) if wrench else None, feet) if one is not None]
+        pulls = [one for one in (_honest(wrench, window) if wrench else None, feet) if one is not None]
         if not pulls:
             raise TrialRefused(
                 f"Neither the body's wrench nor a step tells where the plates lie; are these files of one trial? {why}"
@@ -137,50 +137,52 @@ def refined(
         pose = pose.changed(change, about)
         if turn and (np.abs(change) < 0.1 * np.sqrt(np.diag(covariance))).all():
             break
-    seconds = float(look.use.sum() / look.motion.rate) if wrench is not None else 0.0
+    seconds = float(window.use.sum() / window.motion.rate) if wrench is not None else 0.0
     notes = () if wrench is not None else (f"The wrench of the whole body was not used: {why}",)
     covariance = covariance + np.diag(_INSTALLED**2)
     fit = (wrench.misfit, wrench.rows) if wrench else (float("nan"), 0)
     return Refined(pose, covariance, about, seconds, len(steps), feet.misfit if feet else np.nan, *fit, notes)
 
 
-def _contact(body: Body, look: Look, soles: Soles) -> Contact:
-    return ground_contact(look.trial, soles, mass=float(body.sip.mass.sum()))
+def _contact(body: Body, window: TrialWindow, soles: Soles) -> Contact:
+    return ground_contact(window.trial, soles, mass=float(body.sip.mass.sum()))
 
 
-def _look(body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FramePose) -> tuple[Look, Soles, Array]:
+def _look(
+    body: Body, trial: Trial, motion: Motion, forces: Forces, pose: FramePose
+) -> tuple[TrialWindow, Soles, Array]:
     """Return the trial under a pose, its fully measured frames in use; the soles; the mean centre of pressure."""
     there, cut = with_forces_at(trial, motion, forces, pose)
     soles = soles_from_body(body, cut)
-    look = Look(there, cut, np.zeros(cut.time.size, dtype=bool), 0.0, 1.0)
-    measured = _contact(body, look, soles).measured if forces.sized else _carried(body, look)
+    window = TrialWindow(there, cut, np.zeros(cut.time.size, dtype=bool), 0.0, 1.0)
+    measured = _contact(body, window, soles).measured if forces.sized else _carried(body, window)
     use = measured & cut.determined
     about = np.nanmean(there.wrench.cop(height=there.floor, threshold=_PRESSED), axis=0)
-    return replace(look, use=use), soles, about
+    return replace(window, use=use), soles, about
 
 
-def _carried(body: Body, look: Look) -> Mask:
+def _carried(body: Body, window: TrialWindow) -> Mask:
     """Return the frames (T,) in which plates of unknown size carry the whole body: the vertical force is the needed one
     within a tenth of the weight, for a while before and after.
     """
-    needed, force = predict_wrench(body, look.motion).force[:, 2], look.trial.wrench.force[:, 2]
+    needed, force = predict_wrench(body, window.motion).force[:, 2], window.trial.wrench.force[:, 2]
     apart = np.abs(force - needed) > _TENTH * abs(float(body.gravity[2])) * float(body.sip.mass.sum())
-    return ~dilate(apart | (force < _PRESSED), int(np.ceil(_AROUND * look.motion.rate)))
+    return ~dilate(apart | (force < _PRESSED), int(np.ceil(_AROUND * window.motion.rate)))
 
 
-def _honest(pull: PoseEvidence, look: Look) -> PoseEvidence:
+def _honest(pull: PoseEvidence, window: TrialWindow) -> PoseEvidence:
     """Return the pull of the wrench with what its body does not know: much for real people and short contacts, and more
     where it fits badly.
     """
     with np.errstate(invalid="ignore"):
-        away = np.nanquantile(np.sqrt(np.nanmean(look.motion.residual**2, axis=0)), 0.25)
+        away = np.nanquantile(np.sqrt(np.nanmean(window.motion.residual**2, axis=0)), 0.25)
     real = away > _LIKE_MODEL * error_size("marker_distance", "first quartile", state="after")
-    longest = max((stop - start for start, stop in runs(look.use)), default=0) / look.motion.rate
+    longest = max((stop - start for start, stop in runs(window.use)), default=0) / window.motion.rate
     worse = max(1.0, pull.misfit)
     scaled = replace(pull, information=pull.information / worse, vector=pull.vector / worse)
     if real or longest < SHORTEST_RUN:
         few = np.array([1.0, 1.0, max(1.0, _FEW / pull.rows), 1.0])
         return scaled.less_sure(worse * np.diag((few * _REAL) ** 2))
-    ahead = quaternion_matrix(look.motion.q[:, 3:7])[:, :2, 0].mean(axis=0)
+    ahead = quaternion_matrix(window.motion.q[:, 3:7])[:, :2, 0].mean(axis=0)
     forwards = np.array([*ahead / max(float(np.linalg.norm(ahead)), 1e-9), 0.0, 0.0])
     return scaled.less_sure(_AHEAD**2 * np.outer(forwards, forwards))

@@ -56,7 +56,8 @@ def _diagnosis(result: RobotResult) -> dict[str, Any]:
 
 
 _MATCHED = (
-    "delay_s=plate.delay place_m=plate.place yaw_rad=plate.yaw correlation=plate.correlation scale=plate.scale surprise"
+    "delay_s=plate.delay place_m=plate.place yaw_rad=plate.yaw correlation=plate.correlation scale=plate.scale "
+    "surprise=innovation"
 )
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
-from biodance.effects import Gate
+from biodance.effects import QualityCheck
 from biodance.lab.corrections import PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected
 from biodance.pipeline.attention import identified_attention, session_attention
@@ -83,7 +83,7 @@ def write_identification(
     found: SessionIdentification,
     folder: Path,
     *,
-    checks: tuple[Gate, ...] = (),
+    checks: tuple[QualityCheck, ...] = (),
     movement: SessionMovement | None = None,
 ) -> dict[str, Any]:
     """Write ``report.html``, ``results.json`` with the identification alone and ``body.json``, the identified body;

@@ -29,12 +29,12 @@ JOINT = {
 """The joint at the origin of each segment's frame."""
 
 
-def widened(prior: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
+def widened(prior: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
     """Return ``prior``, known about the true joint centres, with the same values and a covariance that holds for frames
-    that are turned and centres that are displaced: as far as the functional calibration that ``placed`` the joints
+    that are turned and centres that are displaced: as far as the functional calibration that ``calibrated`` the joints
     leaves them, or as joints usually are.
     """
-    covariance = np.array(prior.covariance) + _mass_spread(prior) + misplaced(prior, placed)
+    covariance = np.array(prior.covariance) + _mass_spread(prior) + misplaced(prior, calibrated)
     for i, segment in enumerate(prior.segments):
         cut = slice(10 * i, 10 * i + 10)
         phi, own = prior.phi[cut], covariance[cut, cut].copy()
@@ -53,11 +53,11 @@ def frame_turn(segment: str) -> Array:
     return turn
 
 
-def misplaced(sip: Sip, placed: tuple[JointError, ...]) -> Array:
+def misplaced(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
     """Return the covariance (p, p) of the parameters of ``sip`` in the model's frames that comes from joint centres
     off their true places, each on its own.
     """
-    names = {error.joint for error in placed}
+    names = {error.joint for error in calibrated}
     out = np.zeros((len(sip.phi), len(sip.phi)))
     for i, segment in enumerate(sip.segments):
         cut = slice(10 * i, 10 * i + 10)
@@ -66,41 +66,43 @@ def misplaced(sip: Sip, placed: tuple[JointError, ...]) -> Array:
     return out
 
 
-def _centre_size(segment: str, placed: set[str]) -> float:
+def _centre_size(segment: str, calibrated: set[str]) -> float:
     """Return the standard deviation per axis, m, of the centre at the origin of a segment's frame."""
     joint = _joint_of(segment)
-    if not placed:
+    if not calibrated:
         return error_size("joint_centre", "other", state="before")
-    if joint in placed:
+    if joint in calibrated:
         return error_size("joint_centre", joint.partition("_")[2] or joint, state="after")
     return joint_size("joint_centre", joint or segment)
 
 
-def from_true_centres(sip: Sip, table: Sip, placed: tuple[JointError, ...]) -> Sip:
+def from_true_centres(sip: Sip, table: Sip, calibrated: tuple[JointError, ...]) -> Sip:
     """Return ``sip``, believed in the model's frames after the prior ``table`` (`widened` for joints that were
-    ``placed``), with a covariance about the true joint centres.
+    ``calibrated``), with a covariance about the true joint centres.
 
-    With the prior covariance P in the model's frames, D of it from misplaced centres and B of the belief, the error
+    With the prior covariance P in the model's frames, D of it from misplaced centres and B of the posterior, the error
     about the true centres has the covariance B + D - K B - B K', K = D P^-1: where the data told nothing P - D, what
     the table is off; where they told all D, what the joints are off. Where the placing itself leaves a centre farther
     off than D counts (a trunk that bends along its length), that enters as far as the data told: T E T', T = 1 - B
     P^-1. Centres that no movement placed come on top.
     """
-    if not placed:
+    if not calibrated:
         return about_true_centres(sip)
-    off, scale = misplaced(table, placed), np.sqrt(np.diag(table.covariance))
+    off, scale = misplaced(table, calibrated), np.sqrt(np.diag(table.covariance))
     unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
     inverse = np.linalg.pinv(table.covariance * np.outer(unit, unit), rcond=1e-12, hermitian=True)
     kept = unit[:, None] * inverse * unit @ sip.covariance
     shared, told = off @ kept, np.eye(len(off)) - kept
-    return Sip(sip.segments, sip.phi, sip.covariance + off - shared - shared.T + told.T @ _beyond(sip, placed) @ told)
+    return Sip(
+        sip.segments, sip.phi, sip.covariance + off - shared - shared.T + told.T @ _beyond(sip, calibrated) @ told
+    )
 
 
-def _beyond(sip: Sip, placed: tuple[JointError, ...]) -> Array:
-    """Return the covariance (p, p) of the parameters from how much farther off the movement that ``placed`` the centres
-    leaves them than `misplaced` counts.
+def _beyond(sip: Sip, calibrated: tuple[JointError, ...]) -> Array:
+    """Return the covariance (p, p) of the parameters from how much farther off the movement that ``calibrated`` the
+    centres leaves them than `misplaced` counts.
     """
-    left = {error.joint: error.centre for error in placed}
+    left = {error.joint: error.centre for error in calibrated}
     out = np.zeros((len(sip.phi), len(sip.phi)))
     for i, segment in enumerate(sip.segments):
         more = left.get(_joint_of(segment), 0.0) ** 2 - _centre_size(segment, set(left)) ** 2
@@ -110,15 +112,15 @@ def _beyond(sip: Sip, placed: tuple[JointError, ...]) -> Array:
     return out
 
 
-def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
+def about_true_centres(sip: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
     """Return ``sip`` with a covariance that also holds about the true joint centres, which no wrench can find, where
     these are no part of what was believed before.
 
     The data tell where matter is relative to the model's frames; where the person's own joint centre is stays as
-    uncertain as the formula that predicted it, or as the movement that ``placed`` it left it.
+    uncertain as the formula that predicted it, or as the movement that ``calibrated`` it left it.
     """
     covariance = np.array(sip.covariance)
-    known = {error.joint: error.centre for error in placed}
+    known = {error.joint: error.centre for error in calibrated}
     for i, segment in enumerate(sip.segments):
         joint = _joint_of(segment)
         sd = known.get(joint, joint_size("joint_centre", joint or segment))
@@ -127,12 +129,12 @@ def about_true_centres(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
     return Sip(sip.segments, sip.phi, covariance)
 
 
-def in_other_frames(sip: Sip, placed: tuple[JointError, ...] = ()) -> Sip:
+def in_other_frames(sip: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
     """Return ``sip``, known about the true joint centres of a person, as it is known in the frames of another session:
-    markers glued anew turn them, and its own joint centres are displaced again, as far as the movement that ``placed``
-    them left it.
+    markers glued anew turn them, and its own joint centres are displaced again, as far as the movement that
+    ``calibrated`` them left it.
     """
-    known = about_true_centres(sip, placed)
+    known = about_true_centres(sip, calibrated)
     covariance = np.array(known.covariance)
     for i, segment in enumerate(sip.segments):
         cut = slice(10 * i, 10 * i + 10)

@@ -27,14 +27,16 @@ def deviations(body: Body, sources: tuple[ErrorSource, ...]) -> Array:
     A joint that a functional calibration placed has the standard deviation that came with it (``body.joint_errors``),
     every other one that of the table before calibration.
     """
-    placed = {error.joint: {"joint_centre": error.centre, "tilt": error.axis} for error in body.joint_errors}
+    calibrated = {error.joint: {"joint_centre": error.centre, "tilt": error.axis} for error in body.joint_errors}
     found: dict[tuple[str, str], float] = {}
     for group, joint in (
         (group, joint) for source in sources for group, joint in zip(source.groups, source.joints, strict=True)
     ):
         quantity, _, target = group.partition(" ")
         if (group, joint) not in found:
-            found[group, joint] = placed[joint][quantity] if joint in placed else _of_table(quantity, target, joint)
+            found[group, joint] = (
+                calibrated[joint][quantity] if joint in calibrated else _of_table(quantity, target, joint)
+            )
     return np.array([found[pair] for source in sources for pair in zip(source.groups, source.joints, strict=True)])
 
 

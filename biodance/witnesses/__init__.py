@@ -107,7 +107,7 @@ class Witness(ABC):
     source: ClassVar[str] = ""
 
     @abstractmethod
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return what it saw in one trial; () where the trial does not hold what it needs."""
 
 
@@ -133,7 +133,7 @@ def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Wi
 
 def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
     """Return all that the witnesses saw in one trial, finite values only."""
-    found = (one for witness in witnesses(chosen).values() for one in witness.look(seen))
+    found = (one for witness in witnesses(chosen).values() for one in witness.observe(seen))
     return tuple(one for one in found if all(map(math.isfinite, (one.value, one.expected, one.sd))))
 
 

@@ -21,10 +21,10 @@ class DoubleSupport(Witness):
     needs = "Two steps one after the other on two plates; pelvis markers."
     source = "20 pairs of steps of 9 persons of public laboratories"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each pair; it is shown only: each foot alone counts already."""
         alone = {
-            one.what.removesuffix(", alone"): one for one in StrideForce().look(seen) if one.what.endswith("alone")
+            one.what.removesuffix(", alone"): one for one in StrideForce().observe(seen) if one.what.endswith("alone")
         }
         found = []
         for first, last in zip(seen.steps, seen.steps[1:], strict=False):

@@ -27,7 +27,7 @@ class EmptyPlate(Witness):
     needs = "A trial that begins or ends with nobody on the plate."
     source = "An empty plate reads zero; 35 empty plates of 8 public laboratories were zeroed to 0-6 N (horizontal)."
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three zeros of every plate that has one, and three changes of every plate seen before and after."""
         plates = [plate for plate in seen.trial.plates if plate.wrench.time.size > 1]
         return tuple(one for plate in plates for one in (*self._zero(seen, plate), *self._change(seen, plate)))

@@ -25,7 +25,7 @@ class Flight(Witness):
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three observations of each plate that was loaded in the trial, over all its flight."""
         heights = [plate.height for plate in seen.trial.plates]
         if not seen.feet or not heights or max(heights) - min(heights) > _LEVEL:

@@ -32,7 +32,7 @@ class FootAcross(Witness):
     needs = "A step with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return three observations of each walking step, the early one only where the heel came down first, on one
         plate alone; one of each running step.
         """

@@ -25,7 +25,7 @@ class FootAlong(Witness):
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return two observations of each step in which the heel came down first, one of a foot on two plates."""
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 

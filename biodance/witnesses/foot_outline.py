@@ -20,7 +20,7 @@ class FootOutline(Witness):
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "Pressure cannot act where nothing touches; soles by Winter 2009 and ANSUR II 2012."
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each step; it is shown only: the place in the foot counts already."""
         found = [self._of_step(seen, step) for step in seen.steps]
         return tuple(one for one in found if one is not None)

@@ -26,7 +26,7 @@ class ForceEnd(Witness):
     needs = "Steps that leave an empty plate and swing off; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each step that ends within the recording."""
         return tuple(one for step in seen.steps if not step.mixed for one in self._of_step(seen, step))
 

@@ -27,7 +27,7 @@ class ForceOnset(Witness):
     needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each heel strike."""
         return tuple(
             one for step in seen.steps if step.heel_first and not step.mixed for one in self._of_step(seen, step)

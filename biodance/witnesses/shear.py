@@ -35,7 +35,7 @@ class Shear(Witness):
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
     source = "45 steps of 10 persons of 5 public laboratories; Winter 2009, chapter 5"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return four observations of each step that begins with the heel."""
         if seen.pelvis is None:
             return ()

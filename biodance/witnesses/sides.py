@@ -16,7 +16,7 @@ class Sides(Witness):
     needs = "A step of each foot, each alone on a plate; heel and toe markers."
     source = "6.7 mm between visits of adults, 18 pairs of steps of 9 persons of public laboratories"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one observation of each pair of neighbours; it is shown only: both feet count already."""
         found = []
         for first, last in zip(seen.steps, seen.steps[1:], strict=False):

@@ -26,7 +26,7 @@ class StandingForce(Witness):
     needs = "Standing still on the plates with both feet."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one mass and two horizontal forces of a trial in which somebody stands still."""
         plates = [p for p in seen.trial.plates if p.wrench.time.size and p.wrench.force[:, 2].mean() > ONSET]
         if not plates or not seen.still or not seen.mass > 0:

@@ -27,7 +27,7 @@ class StandingPlace(Witness):
         "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
     )
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return two observations of a trial in which somebody stands still on the plates."""
         trial = seen.trial
         plates = [plate for plate in trial.plates if plate.wrench.time.size]

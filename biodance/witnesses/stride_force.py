@@ -46,7 +46,7 @@ class StrideForce(Witness):
     needs = "Two steps one after the other on two plates, or one step while the other foot swings; pelvis markers."
     source = "21 whole steps and 40 single supports of 10 persons of 5 public laboratories"
 
-    def look(self, seen: SeenTrial) -> tuple[Observation, ...]:
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one mass for each foot alone, one mass and two horizontal forces for each whole step, and one mass of
         all strides on a belt.
         """

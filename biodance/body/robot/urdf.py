@@ -15,8 +15,8 @@ from biodance.body.export import refuse_impossible
 from biodance.body.frames import place_at_zero
 from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters, turn_inertia
 from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
-from biodance.body.robot.likeness import reframed
 from biodance.body.robot.prior import com_deviation, extended, is_point, is_possible, robot_covariance, solid
+from biodance.body.robot.similarity import reframed
 from biodance.body.robot.sole import match_faces, sole_outline
 from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
 from biodance.errors import BiodanceError, FileRefused, known_index

@@ -79,7 +79,7 @@ def _room(walk: Walk, course: Walked, only: tuple[int, ...], first: tuple[int, .
     others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
     for who in (first, others[:_FEW], others[_FEW:]):
         found = perform_with(workers, dance, limits, who=who, only=only)
-        room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.rooms))
+        room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.least_margins))
         if room < 0:
             break
     return room
@@ -112,9 +112,9 @@ def _exchanged(walk: Walk, course: Walked, q: int) -> Iterator[Walked]:
     """Yield courses with another posture in place ``q``, the best first."""
     steps, moves = course.steps, course.moves
     before, after = [*steps[:q]], steps[q + 1] if q + 1 < len(steps) else None
-    stances, belief = tuple(step.catalogue.stance for step in steps), walk.information.beforehand
+    stances, posterior = tuple(step.catalogue.stance for step in steps), walk.information.beforehand
     for number, step in enumerate(before):
-        belief = walk.belief_after(belief, before[:number], step)
+        posterior = walk.posterior_after(posterior, before[:number], step)
     taken = {step.key for step in steps}
 
     def on_from(step: DanceStep) -> DanceStep | None:
@@ -123,7 +123,7 @@ def _exchanged(walk: Walk, course: Walked, q: int) -> Iterator[Walked]:
     def fits(step: DanceStep) -> bool:
         return step.key not in taken and (after is None or on_from(step) is not None)
 
-    for step, move in walk.possible(before, stances, belief, {}, wanted=fits):
+    for step, move in walk.possible(before, stances, posterior, {}, wanted=fits):
         to, on = () if move is None else (move,), on_from(step)
         if on is None:
             yield replace(course, steps=(*before, step), moves=(*moves[: q - 1], *to))

@@ -21,7 +21,7 @@ from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
 from biodance.dance.followable.vocabulary import rest_cut_short
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.problem.information import PostureInformation, update_belief
+from biodance.dance.problem.information import PostureInformation, update_posterior
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words, under
 from biodance.dance.transitions.context import DesignContext
@@ -59,10 +59,10 @@ class NoWay(BiodanceError):
 
 @dataclass(eq=False)
 class _Place:
-    """A place in the walk: the postures ``left`` to try after it, the ``belief`` there, what was ``taken`` to it."""
+    """A place in the walk: the postures ``left`` to try after it, the ``posterior`` there, what was ``taken`` to it."""
 
     left: Iterator[tuple[DanceStep, Move | None]] | None
-    belief: Array
+    posterior: Array
     taken: tuple[DanceStep, Move | None] = None  # type: ignore[assignment]
 
 
@@ -99,10 +99,10 @@ class Walk:
             self.work.tell("postures", number, len(stances))
             if path[-1].left is None:
                 broken = why.setdefault(number, {})
-                path[-1].left = islice(self.possible(steps, stances, path[-1].belief, broken), _WAYS_ON)
+                path[-1].left = islice(self.possible(steps, stances, path[-1].posterior, broken), _WAYS_ON)
             found = next(path[-1].left, None)
             if found is not None:
-                path.append(_Place(None, self.belief_after(path[-1].belief, steps, found[0]), found))
+                path.append(_Place(None, self.posterior_after(path[-1].posterior, steps, found[0]), found))
             elif number:
                 path.pop()
             else:
@@ -121,24 +121,24 @@ class Walk:
 
     def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
         """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
-        steps, belief = list[DanceStep](), self.information.beforehand
+        steps, posterior = list[DanceStep](), self.information.beforehand
         for number, stance in enumerate(stances):
-            step = next((one for one in self._ranked(steps, stances, belief) if not self._kept(one)[1]), None)
+            step = next((one for one in self._ranked(steps, stances, posterior) if not self._kept(one)[1]), None)
             if step is None:
                 raise NoWay(self._stuck(stance, number, {}), stances, number)
-            belief = self.belief_after(belief, steps, step)
+            posterior = self.posterior_after(posterior, steps, step)
             steps.append(step)
         return steps
 
-    def belief_after(self, belief: Array, steps: list[DanceStep], step: DanceStep) -> Array:
-        """Return what is believed (k, k) when ``step`` follows on ``steps``, before whom it was ``belief``."""
-        return update_belief(belief, self._rows(steps[-1] if steps else None, step))
+    def posterior_after(self, posterior: Array, steps: list[DanceStep], step: DanceStep) -> Array:
+        """Return what is believed (k, k) when ``step`` follows on ``steps``, before whom it was ``posterior``."""
+        return update_posterior(posterior, self._rows(steps[-1] if steps else None, step))
 
     def possible(
         self,
         steps: list[DanceStep],
         stances: tuple[Stance, ...],
-        belief: Array,
+        posterior: Array,
         why: dict[str, int],
         *,
         wanted: Callable[[DanceStep], bool] = lambda _: True,
@@ -146,7 +146,7 @@ class Walk:
         """Yield the postures that follow and are ``wanted`` with the move to them, the best first, of a handful those
         first that imprecise people surely can; ``why`` counts the limits that others break.
         """
-        last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, belief))
+        last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, posterior))
         while some := list(islice(ranked, _AT_ONCE)):
             doubtful = list[tuple[float, DanceStep, Move | None]]()
             for step in some:
@@ -175,7 +175,7 @@ class Walk:
             f"instructions, or leave this stance out of the protocol."
         )
 
-    def _ranked(self, steps: list[DanceStep], stances: tuple[Stance, ...], belief: Array) -> Iterator[DanceStep]:
+    def _ranked(self, steps: list[DanceStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[DanceStep]:
         """Yield the postures within reach on the next feet, the best first."""
         stance, catalogue = stances[len(steps)], self.reach.catalogue(stances[len(steps)])
         last = steps[-1] if steps else None
@@ -188,10 +188,10 @@ class Walk:
             yield from (step for step in least if not late(step))
             return
         still = self.information.white(self._standing(catalogue)[[step.s for step in found]])
-        gains = self.information.gains(belief, still) / self._seconds(found)
+        gains = self.information.gains(posterior, still) / self._seconds(found)
         on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
         first = list(islice(on, _LOOKED_AT))
-        gains = np.array([float(self.information.gains(belief, self._rows(last, step))) for step in first])
+        gains = np.array([float(self.information.gains(posterior, self._rows(last, step))) for step in first])
         yield from (first[k] for k in np.argsort(-gains / self._seconds(first), kind="stable"))
         yield from on
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.information import PostureInformation, update_belief
+from biodance.dance.problem.information import PostureInformation, update_posterior
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import SINGLE, Stance, holding, seat, stance
 from biodance.errors import BiodanceError
@@ -42,14 +42,14 @@ def choose(chain: Chain, x: Array, stances: tuple[str, ...], plan: Plan) -> Choi
     """
     information, last = PostureInformation(chain, plan), dict[str, int]()
     still, ways = information.white(information.standing(x)), _Ways(information, x, stances)
-    belief, left, picked, spent = information.beforehand, set(range(len(x))), list[int](), 0.0
+    posterior, left, picked, spent = information.beforehand, set(range(len(x))), list[int](), 0.0
     total = [float(np.sum(information.scale**2))]
     while payable := sorted(p for p in left if spent + _cost(plan, stances[p], last) <= plan.budget):
         rows = {p: np.concatenate([still[p], ways.to(p, last.get(stances[p]))]) for p in payable}
-        p = max(payable, key=lambda p: float(information.gains(belief, rows[p])))
+        p = max(payable, key=lambda p: float(information.gains(posterior, rows[p])))
         spent += _cost(plan, stances[p], last)
-        belief = update_belief(belief, rows[p])
-        total.append(float(np.sum((information.scale @ belief) * information.scale)))
+        posterior = update_posterior(posterior, rows[p])
+        total.append(float(np.sum((information.scale @ posterior) * information.scale)))
         last[stances[p]] = p
         left.discard(p)
         picked.append(p)

@@ -35,7 +35,7 @@ class PostureInformation:
     """What postures of ``chain`` and moves of the plan's duration tell; ``factor`` (10 N, k): the table's covariance is
     ``factor factor'``; ``scale`` (10 N, k) the same per standard deviation of the table, weighted by the plan.
 
-    Rows (m, k) are per standard deviation; a belief (k, k) is the covariance of what they multiply, 1 beforehand.
+    Rows (m, k) are per standard deviation; a posterior (k, k) is the covariance of what they multiply, 1 beforehand.
     """
 
     def __init__(self, chain: Chain, plan: Plan, *, centres: bool = False) -> None:
@@ -51,7 +51,7 @@ class PostureInformation:
 
     @property
     def beforehand(self) -> Array:
-        """(k, k) the belief before any posture."""
+        """(k, k) the posterior before any posture."""
         return np.eye(self.factor.shape[1])
 
     def white(self, W: Array) -> Array:
@@ -76,22 +76,24 @@ class PostureInformation:
         still = self.white(standing[None])[0]
         return np.concatenate([still, rows_of_centres(self.chain, x, still.shape[1])]) if self.centres else still
 
-    def gains(self, belief: Array, rows: Array) -> Array:
-        """Return by how much each of ``rows`` (..., m, k) lowers the weighted variance that a belief leaves, (...)."""
-        return np.asarray(np.sum((learned(belief, rows) @ self.scale.T) ** 2, axis=(-2, -1)))
+    def gains(self, posterior: Array, rows: Array) -> Array:
+        """Return by how much each of ``rows`` (..., m, k) lowers the weighted variance that a posterior leaves,
+        (...).
+        """
+        return np.asarray(np.sum((learned(posterior, rows) @ self.scale.T) ** 2, axis=(-2, -1)))
 
 
-def learned(belief: Array, rows: Array) -> Array:
-    """Return Z (..., m, k) with new covariance = ``belief`` - Z'Z (k, k) after whitened ``rows`` (..., m, k)."""
-    spread = rows @ belief
+def learned(posterior: Array, rows: Array) -> Array:
+    """Return Z (..., m, k) with new covariance = ``posterior`` - Z'Z (k, k) after whitened ``rows`` (..., m, k)."""
+    spread = rows @ posterior
     factor = np.linalg.cholesky(np.eye(rows.shape[-2]) + spread @ np.swapaxes(rows, -1, -2))
     return np.asarray(np.linalg.solve(factor, spread))
 
 
-def update_belief(belief: Array, rows: Array) -> Array:
-    """Return the belief (k, k) after whitened ``rows`` (m, k)."""
-    Z = learned(belief, rows)
-    return np.asarray(belief - Z.T @ Z)
+def update_posterior(posterior: Array, rows: Array) -> Array:
+    """Return the posterior (k, k) after whitened ``rows`` (m, k)."""
+    Z = learned(posterior, rows)
+    return np.asarray(posterior - Z.T @ Z)
 
 
 def rows_of_centres(chain: Chain, x: Array, columns: int) -> Array:

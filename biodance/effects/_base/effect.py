@@ -45,7 +45,7 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     separated_by: ClassVar[str] = ""
     """The movement that tells this cause from its look-alikes, in words for the analyst."""
-    placed: ClassVar[bool] = False
+    taken_up_by_calibration: ClassVar[bool] = False
     """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
     anybody looks.
     """

@@ -124,7 +124,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "findings": [_finding(finding) for finding in one.findings],
         "resembles": [_finding(finding) for finding in one.resembles],
         "within_tolerance": [_finding(finding) for finding in one.tolerated],
-        "gates": [keyed(gate, "check ok text effect target size") for gate in one.gates],
+        "gates": [keyed(quality, "check ok text effect target size") for quality in one.checks],
         "adequacy": [keyed(row, _ADEQUACY) for row in one.adequacy],
         "unobservable": [keyed(row, _LIMIT) for row in one.unobservable],
         "limits": [keyed(row, _LIMIT) for row in one.limits],

@@ -14,7 +14,7 @@ from biodance.body.body import Body
 from biodance.body.solids import segment_solids
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import telling_of
+from biodance.dance.expectation import movement_information
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
@@ -41,7 +41,7 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
     body, points = dance.body, _points(dance.body)
     if not points or not body.n_root:
         return None
-    told = telling_of(dance)
+    told = movement_information(dance)
     return {
         "rate": told.rate,
         "plan": _packed(dance.motion(told.rate).q),

@@ -12,10 +12,10 @@ from biodance.records import Session
 
 
 @dataclass(frozen=True)
-class Gate:
+class QualityCheck:
     """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not
     well the cause: ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN =
-    no number); ``advice`` how the effect is mended (filled in by `gates`).
+    no number); ``advice`` how the effect is mended (filled in by `checks`).
     """
 
     check: str
@@ -52,7 +52,7 @@ class DiscreteEffect(ABC):
 
     @classmethod
     @abstractmethod
-    def look(cls, recorded: Recorded) -> tuple[Gate, ...]:
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return the checks that could be made on the recording."""
 
 
@@ -83,12 +83,12 @@ def reader_decisions(session: Session, patterns: dict[str, str]) -> tuple[Found,
     return tuple(found.values())
 
 
-def overruled_files(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[Gate, ...]:
+def overruled_files(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[QualityCheck, ...]:
     """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect``
     as its cause.
     """
     return tuple(
-        Gate(check, False, sentence, effect, target, float(number) if number else float("nan"))
+        QualityCheck(check, False, sentence, effect, target, float(number) if number else float("nan"))
         for target, sentence, number in reader_decisions(session, patterns)
     )
 

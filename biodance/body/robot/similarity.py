@@ -8,7 +8,7 @@ covariance, boxes, soles, markers, joints that hang on them) is turned along, so
 Under gravity two bodies of the same shape and mass distribution move alike where times go with the square root of
 lengths: lengths times L, masses times M; angles, friction and balance are then the same, forces go with M, moments with
 M L, speeds of joints with 1 / sqrt(L). So a dance may be designed for a body of convenient size and danced, exactly, by
-its small or large likeness.
+its small or large similar model.
 """
 
 from dataclasses import dataclass, replace
@@ -89,8 +89,8 @@ def _ankle(body: Body, segment: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """``length`` and ``mass``: factors from a body to its likeness."""
+class SimilarityScale:
+    """``length`` and ``mass``: factors from a body to its similar model."""
 
     length: float
     mass: float
@@ -101,7 +101,7 @@ class Likeness:
         return float(np.sqrt(self.length))
 
 
-def likeness(body: Body, to: Likeness) -> Body:
+def similar_body(body: Body, to: SimilarityScale) -> Body:
     """Return the body of the same shape with lengths, masses, strengths and speeds changed by the factors of ``to``."""
     length, mass, limits = to.length, to.mass, body.limits
     units: Array = mass * np.tile([1.0, *[length] * 3, *[length**2] * 6], len(body.segments))
