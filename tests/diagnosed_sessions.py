@@ -75,13 +75,11 @@ def windows(seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7) 
     """Return trials of a person whose parameters differ from the table by ``unlike`` of its own standard deviations;
     ``hidden`` changes the wrench.
     """
-    from biodance.identification.posterior import prior_factor
     from biodance.uncertainty.caution import widened
 
     rng = np.random.default_rng(1000 + seed)
     prior = widened(body().sip)
-    factor = prior_factor(prior)
-    phi = prior.phi + unlike * factor @ rng.normal(size=factor.shape[1])
+    phi = prior.phi + unlike * symmetric_root(prior.covariance) @ rng.normal(size=prior.phi.size)
     found = []
     for k in range(trials):
         moving = motion(10 * seed + k)
@@ -93,6 +91,13 @@ def windows(seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7) 
         trial = Trial(f"t{k}", "fit", None, (plate,), Source(Path(f"t{k}.c3d"), "", "test"))
         found.append(TrialWindow(trial, moving, np.ones(moving.time.size, dtype=bool), *share))
     return tuple(found)
+
+
+def symmetric_root(covariance):
+    """Return the root (p, p) of a covariance (p, p) that hangs on no signs or order of eigenvectors."""
+    scale = np.sqrt(np.diag(covariance))
+    value, vector = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return scale[:, None] * (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
 
 
 def delay(wrench, session, moving):

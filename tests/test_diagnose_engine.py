@@ -96,11 +96,11 @@ def test_a_hidden_fault_is_named_and_sized(hidden, effect, target, parameter, si
 
 
 def test_the_size_told_holds_what_the_cause_s_own_tolerance_took() -> None:
-    """Clocks that differ by 3 ms in every laboratory take 0.7 of 20 ms from the name: told is what is there."""
+    """Clocks that differ by 3 ms in every laboratory share 20 ms with the name: told is what is there."""
     mine = replace(known(), sizes={**known().sizes, "time_delay": 0.003})
     found = diagnose_trials(body(), windows(2, hidden=delay), tolerances=mine, effects=FAST)
     (cause,), (finding,) = found.naming.found.named, found.diagnosis.findings
-    assert cause.theta[0] < 0.0196
+    assert abs(cause.theta[0] - 0.02) > 5e-4
     assert finding.parameters[0].value == pytest.approx(0.02, rel=0.01)
     assert found.named[0].theta[0] == finding.parameters[0].value, "accepted as it is told"
 

@@ -32,7 +32,7 @@ def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_i
     (finding,) = strange.diagnosis.findings
     (size,) = finding.parameters
     assert finding.effect == "time_delay"
-    assert abs(size.value - 0.02) < 3 * size.sd  # the draw hangs on signs of eigenvectors: on the processor
+    assert size.interval[0] < 0.02 < size.interval[1]
     alone = diagnosed(delay, unlike=6.0, trials=1)
     assert prior_data_conflict(alone.naming.found) > CONFLICT_LIMIT
     assert not alone.diagnosis.findings, "one trial does not show that the delay is the same in another one"

@@ -25,7 +25,7 @@ from biodance.uncertainty.tolerances import REFERENCE_PERSON, InstrumentNoise, T
 _ORDER = 4
 _GAIN = np.sqrt(70.0)
 """Standard deviation of the fourth difference of unit white noise: 1, -4, 6, -4, 1."""
-NORMAL_SD_OVER_MEDIAN = 1.4826
+NORMAL_OVER_MEDIAN = 1.4826
 """Standard deviation of normal numbers over the median of their absolute values."""
 _ENOUGH = 50
 """Samples below which no noise is estimated."""
@@ -46,7 +46,7 @@ def white_noise(samples: Array) -> Array:
     enough = np.isfinite(change).sum(axis=0) >= _ENOUGH
     value = np.full(samples.shape[1:], np.nan)
     if enough.any():
-        value[enough] = NORMAL_SD_OVER_MEDIAN / _GAIN * np.nanmedian(change[:, enough], axis=0)
+        value[enough] = NORMAL_OVER_MEDIAN / _GAIN * np.nanmedian(change[:, enough], axis=0)
     return value
 
 

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit
 from biodance.records import Array
-from biodance.uncertainty.session_noise import NORMAL_SD_OVER_MEDIAN
+from biodance.uncertainty.session_noise import NORMAL_OVER_MEDIAN
 
 _DOUBT = 1.0
 """Standard deviation of the logarithm of a typical size."""
@@ -96,7 +96,7 @@ def _scatter(groups: list[list[PlateEvidence]]) -> float:
             value, sd = np.array([one.value for one in some]), np.array([one.sd for one in some])
             found.append((value - np.average(value, weights=sd**-2)) / sd * np.sqrt(len(some) / (len(some) - 1)))
     each = np.abs(np.concatenate(found))
-    return max(1.0, NORMAL_SD_OVER_MEDIAN * float(np.median(each))) if each.size else 1.0
+    return max(1.0, NORMAL_OVER_MEDIAN * float(np.median(each))) if each.size else 1.0
 
 
 def _mean(some: list[PlateEvidence], scatter: float, quantity: str) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from biodance.records import Session
 class QualityCheck:
     """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not
     well the cause: ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN =
-    no number); ``advice`` how the effect is mended (filled in by `checks`).
+    no number); ``advice`` how the effect is mended (filled in by `check_quality`).
     """
 
     check: str
@@ -40,7 +40,7 @@ class Recorded:
 
 
 class DiscreteEffect(ABC):
-    """One cause that is there or not; the checks that find it are its ``look``, and a file without it is refused
+    """One cause that is there or not; the checks that find it are its ``check``, and a file without it is refused
     when it is found.
     """
 
