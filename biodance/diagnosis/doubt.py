@@ -6,7 +6,7 @@ from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import SURE
 from biodance.uncertainty.tolerances import Tolerances
 
-Pair = tuple[NamedCause, Finding]
+NamedFinding = tuple[NamedCause, Finding]
 """A named cause with what is told of it."""
 
 SEVERAL_CROSSTALKS = (
@@ -23,7 +23,7 @@ _MAY_NOT_MATTER = (
 )
 
 
-def only_resembled(causes: list[Pair], named: tuple[NamedCause, ...], known: Tolerances) -> list[Pair]:
+def only_resembled(causes: list[NamedFinding], named: tuple[NamedCause, ...], known: Tolerances) -> list[NamedFinding]:
     """Return those of the ``causes`` that are only resembled: at several targets among all ``named`` though believed
     only alone, of a size that is not constant or that may not matter; and every cause of less evidence than one of
     these, which explains what a wrong model of another cause left, and is no surer than that model.
@@ -36,7 +36,7 @@ def only_resembled(causes: list[Pair], named: tuple[NamedCause, ...], known: Tol
     return _with_less_evidence(doubted, causes)
 
 
-def doubt_notes(causes: list[Pair], named: tuple[NamedCause, ...], known: Tolerances) -> tuple[str, ...]:
+def doubt_notes(causes: list[NamedFinding], named: tuple[NamedCause, ...], known: Tolerances) -> tuple[str, ...]:
     """Return why some of the ``causes`` are only resembled, as sentences."""
     several = any(is_one_of_several(cause, named) for cause, _ in causes)
     varying = (f"{_name(one)} {_VARIES} {one.varies_with}." for _, one in causes if one.varies_with)
@@ -66,7 +66,7 @@ def _name(one: Finding) -> str:
     return f"{one.effect.replace('_', ' ')} {one.target}".strip()
 
 
-def _with_less_evidence(doubted: list[Pair], causes: list[Pair]) -> list[Pair]:
+def _with_less_evidence(doubted: list[NamedFinding], causes: list[NamedFinding]) -> list[NamedFinding]:
     """Return the ``doubted`` causes with every one of less evidence than the strongest of them."""
     strongest = max((finding.log_bayes_factor for _, finding in doubted), default=float("-inf"))
     return [pair for pair in causes if pair in doubted or pair[1].log_bayes_factor < strongest]

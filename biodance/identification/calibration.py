@@ -14,7 +14,6 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
-from biodance.identification.base_parameters import structural_base
 from biodance.identification.information import Information
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
@@ -32,7 +31,7 @@ _SPREAD = 0.3
 _PARTS = (("pelvis", "trunk_head"), ("thigh", "shank", "foot"), ("upper_arm", "forearm_hand"))
 
 
-def undiluted(total: Statistics, phi: Array, table: Sip, shown: Array) -> Statistics:
+def undiluted(total: Statistics, phi: Array, known: Information, table: Sip) -> Statistics:
     """Return the statistics with the regressor as it is to be expected without the noise of its kinematics.
 
     Parameters
@@ -41,43 +40,46 @@ def undiluted(total: Statistics, phi: Array, table: Sip, shown: Array) -> Statis
         As measured, p = 10 parameters of each of N segments.
     phi : (p,) array
         SIP under which the gains are measured: those of a fit to ``total``.
+    known : Information
+        ``total`` whitened, without gains.
     table : Sip
         What is known of the N segments before the data.
-    shown : (nb, p) array
-        Base parameters per SIP: what movement can show (`BaseParameters.regroup`).
 
     Returns
     -------
     Statistics
         The columns of trunk, legs and arms times their gains (0 to 1), in every band from 1 Hz and every channel of
         the wrench; slower bands and the wrench as they were. Matter at a joint moves alike on either side of it,
-        whatever the gains: they act on what the ``table`` expects given the base parameters, so that no gain shows
-        what no movement can.
+        whatever the gains: they act on what can be known of the parameters, so that no gain shows what no movement
+        does.
     """
     kinds = [kind_of(name) for name in table.segments]
     parts = np.repeat([[kind in part for kind in kinds] for part in _PARTS], 10, axis=1)
-    expected = _expected(table, shown)
-    gram = np.array(total.gram)
+    learned, gram = _learned(known, table), np.array(total.gram)
     for band in np.flatnonzero((np.array(total.layout.bands.edges[:-1]) >= _FAST) & (total.count > 0)):
-        turn = np.zeros((6, *expected.shape))
+        turn = np.zeros((6, *learned.shape))
         for channel in range(6):
             gain = _gains(total.gram[band, channel, :, channel], parts * phi, int(total.count[band]))
             lost = np.append(np.where(parts.any(axis=0), gain @ parts - 1.0, 0.0), 0.0)
-            turn[channel] = np.eye(len(lost)) + lost[:, None] * expected
+            turn[channel] = np.eye(len(lost)) + lost[:, None] * learned
         gram[band] = np.einsum("cia,cidj,djb->cadb", turn, gram[band], turn, optimize=True)
     return Statistics(gram, total.count, total.layout)
 
 
-def _expected(table: Sip, shown: Array) -> Array:
-    """Return the matrix (p + 1, p + 1) that gives from (phi, -1) the parameters that the ``table`` expects of a body
-    with the base parameters ``shown @ phi``, and -1.
+_NOTHING = 1e-8
+"""Share of what the table knows that data must tell to tell anything: far above rounding (1e-12), far below the least
+that a session of people told (4e-5)."""
+
+
+def _learned(known: Information, table: Sip) -> Array:
+    """Return the matrix (p + 1, p + 1) that gives from true parameters, (phi, -1), those that the ``table`` expects of
+    a body that moves alike, and -1: the table's own where the data tell nothing.
     """
-    spread = table.covariance @ shown.T
-    regression = spread @ np.linalg.solve(shown @ spread, shown)
-    expected = np.eye(len(table.phi) + 1)
-    expected[:-1, :-1] = regression
-    expected[:-1, -1] = regression @ table.phi - table.phi
-    return expected
+    spread = table.covariance @ known.triangle.T
+    learned, nothing = np.eye(len(table.phi) + 1), _NOTHING * np.eye(len(spread))
+    share = spread @ np.linalg.solve(known.triangle @ spread + nothing, known.triangle)
+    learned[:-1, :-1], learned[:-1, -1] = share, share @ table.phi - table.phi
+    return learned
 
 
 def gains_move_masses(before: Posterior, after: Posterior) -> bool:
@@ -136,12 +138,12 @@ def undo_dilution(
     that moves a mass by more than its standard deviation. ``before`` is the table, whose open questions the data
     answer if ``open_table``.
     """
-    room, shown = with_unknown_load(body, before), structural_base(body).regroup
-    now = measured
+    room = with_unknown_load(body, before)
+    now, known = measured, replace(total).information(measured.noise)
     for _ in range(_ROUNDS):
         table = more_probable_table(now.data, before, body)[0] if open_table else before
         posterior = find_posterior(now.data, table)
-        real = undiluted(total, _with_probable_load(posterior, now.data, body).mean, table, shown)
+        real = undiluted(total, _with_probable_load(posterior, now.data, body).mean, known, table)
         now = discounted(real, learn_noise(real, room, rounds=_AGAIN)[0], found, room)
         if gains_move_masses(posterior, find_posterior(now.data, table)):
             return Calibrated(measured.data, measured.sizes, measured.noise, diluted=True)
