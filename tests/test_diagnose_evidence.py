@@ -139,13 +139,20 @@ def test_a_cause_within_any_tolerance_is_told_but_no_finding() -> None:
 
 
 def test_an_alarm_must_matter_physically() -> None:
-    small, large = (Adequacy("Mx", (0.0, 0.04), 12.0, size=size) for size in (0.9 * LEAST_MOMENT, 1.1 * LEAST_MOMENT))
-    force = Adequacy("Fz", (0.0, 0.04), 5.0, size=1.1 * LEAST_FORCE)
+    small, large = (Adequacy("Mx", (0.04, 0.3), 12.0, size=size) for size in (0.9 * LEAST_MOMENT, 1.1 * LEAST_MOMENT))
+    force = Adequacy("Fz", (0.04, 0.3), 5.0, size=1.1 * LEAST_FORCE)
     assert largest_z((small,)) == 0.0
     assert largest_z((small, force)) == 5.0
     assert largest_z((small, large)) == 12.0
     assert verdict(0, largest_z((small,)), ()) == "nothing wrong"
     assert verdict(1, largest_z((large,)), (QualityCheck("x", True, ""),)) == "unexplained"
+
+
+@pytest.mark.parametrize(("channel", "zero"), [("Fz", 2.0), ("Mx", 1.0)])
+def test_the_mean_of_a_trial_must_matter_as_a_zero_of_the_plate_must(channel: str, zero: float) -> None:
+    small, large = (Adequacy(channel, (0.0, 0.04), 7.0, size=size) for size in (0.9 * zero, 1.1 * zero))
+    assert largest_z((small,)) == 0.0
+    assert largest_z((small, large)) == 7.0
 
 
 def test_the_size_of_what_is_left_is_in_newton() -> None:

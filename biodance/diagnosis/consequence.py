@@ -26,7 +26,7 @@ LEAST_THAT_MATTERS: dict[str, dict[str, float]] = {
     "body_weight_support": {"N": 2.0},
     "joint_centre": {"m": 0.005},
     "segment_length": {"m": 0.005},
-    "marker_misplaced": {"m": 0.005},
+    "marker_misplaced": {"m": 0.010},
     "wobbling_mass": {"kg": 0.5},
     "sloshing_load": {"kg": 0.1},
     "filter_mismatch": {"Hz": 0.5},
@@ -39,8 +39,8 @@ at 100 Hz. Zero and drift: what a spot check before a session tolerates (2 N are
 1.4 mm of its centre of pressure). Gain and
 cross-talk: makers' accuracy, 0.2 to 0.5 % and 0.05 to 0.2 % of full scale. Place and turn of a plate: 2 to 5 mm and
 0.2 degrees in laboratories that check (Collins 2009, doi:10.1016/j.gaitpost.2008.10.060). Mass: clinic scale and
-clothes, 0.2 kg. Joints, lengths and markers: who places markers twice places them 4 to 6 mm apart (Della Croce 1999,
-doi:10.1007/BF02513272). Missing joints: as much as everybody moves them anyway (`MissingJoint.natural`). Loads: as an
+clothes, 0.2 kg. Joints and lengths: who places markers twice places them 4 to 6 mm apart (Della Croce 1999,
+doi:10.1007/BF02513272); one marker among forty is twice as far off in every careful laboratory. Missing joints: as much as everybody moves them anyway (`MissingJoint.natural`). Loads: as an
 added mass. A filter: half a hertz below the one that is assumed."""
 
 
@@ -102,5 +102,9 @@ class Adequacy:
 
     @property
     def matters(self) -> bool:
-        """Whether it is large enough to change what a laboratory concludes (`LEAST_FORCE`, `LEAST_MOMENT`)."""
+        """Whether it is large enough to change what a laboratory concludes: `LEAST_FORCE`, `LEAST_MOMENT`; in the means
+        of trials, from 0 Hz on, what a zero of the plate must be to matter.
+        """
+        if self.band_hz[0] == 0:
+            return self.size >= LEAST_THAT_MATTERS["plate_offset"][self.unit]
         return self.size >= (LEAST_MOMENT if self.channel.startswith("M") else LEAST_FORCE)
