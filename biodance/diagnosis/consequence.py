@@ -40,8 +40,9 @@ at 100 Hz. Zero and drift: what a spot check before a session tolerates (2 N are
 cross-talk: makers' accuracy, 0.2 to 0.5 % and 0.05 to 0.2 % of full scale. Place and turn of a plate: 2 to 5 mm and
 0.2 degrees in laboratories that check (Collins 2009, doi:10.1016/j.gaitpost.2008.10.060). Mass: clinic scale and
 clothes, 0.2 kg. Joints and lengths: who places markers twice places them 4 to 6 mm apart (Della Croce 1999,
-doi:10.1007/BF02513272); one marker among forty is twice as far off in every careful laboratory. Missing joints: as much as everybody moves them anyway (`MissingJoint.natural`). Loads: as an
-added mass. A filter: half a hertz below the one that is assumed."""
+doi:10.1007/BF02513272); one marker among forty is twice as far off in every careful laboratory. Missing joints: as much
+as everybody moves them anyway (`MissingJoint.natural`). Loads: as an added mass. A filter: half a hertz below the one
+that is assumed."""
 
 
 def least(effect: Effect) -> dict[str, float]:
