@@ -104,8 +104,10 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
             f"least {need} are needed. Record longer or leave the signal as it is."
         )
     columns = values.reshape(values.shape[0], -1)
-    out = columns.copy()
     whole = ~np.isnan(columns).any(axis=0)
+    if whole.all():
+        return np.asarray(sosfiltfilt(sections, columns, axis=0, padlen=need - 1)).reshape(values.shape)
+    out = columns.copy()
     if whole.any():
         out[:, whole] = sosfiltfilt(sections, columns[:, whole], axis=0, padlen=need - 1)
     for column in np.flatnonzero(~whole):

@@ -107,9 +107,10 @@ class Markers:
         names = tuple(names)
         if names == self.names:
             return self
-        return Markers(
-            names, self.time, self.xyz[:, [known_index("marker of this trial", n, self.names) for n in names]]
-        )
+        chosen = [known_index("marker of this trial", name, self.names) for name in names]
+        xyz = self.xyz.take(chosen, axis=1)
+        xyz.setflags(write=False)  # the record keeps it without a copy
+        return Markers(names, self.time, xyz)
 
     def table(self) -> "pd.DataFrame":
         """Return the trajectories as a table.

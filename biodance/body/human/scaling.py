@@ -7,14 +7,15 @@ joint centre has residual zero.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.human import assemble
-from biodance.body.human.limits import widen_limits
+from biodance.body.human.limits import joint_limits, widen_limits
 from biodance.body.human.measures import Measures, measures
-from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, kind_of
+from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_tree, kind_of
 from biodance.body.human.standing import StaticPosture, standing
 from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres
 from biodance.body.human.unseen import widen_unseen, with_unseen_parts
@@ -62,9 +63,30 @@ class Scaling:
         markers = calibrated_markers(frames, self.posture)
         notes = (*self.notes, *doubts)
         body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
+        return self._standing(replace(body, joint_errors=self.centres.errors), frames)
+
+    def with_centres(self, centres: Centres) -> tuple[Body, Array]:
+        """Return what a search for joint centres follows the markers with, a quarter of the work of `body`: this body
+        with its joints at other ``centres``, markers calibrated anew, and its posture q (30,). What it weighs, its
+        boxes, soles and notes stay those of the present centres.
+        """
+        frames = segment_frames(centres)
+        skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
+        markers, limits = calibrated_markers(frames, self.posture), joint_limits(self.subject)
+        joints = joint_tree(skeleton)
+        return self._standing(replace(self._present, joints=joints, markers=markers, limits=limits), frames)
+
+    @cached_property
+    def _present(self) -> Body:
+        return self.body()[0]
+
+    def _standing(self, body: Body, frames: SegmentFrames) -> tuple[Body, Array]:
+        """Return a body whose limits allow its posture in the static trial, unseen parts held as they stand, and that
+        posture.
+        """
         q = static_posture(body, frames)
         limits, widened = widen_limits(body, q)
-        body = replace(body, limits=limits, notes=(*body.notes, *widened), joint_errors=self.centres.errors)
+        body = replace(body, limits=limits, notes=(*body.notes, *widened))
         return widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
 
 

@@ -84,12 +84,17 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
             else:
                 xyz[start:stop, column] = bridge
                 gaps.append(Gap(label, start, stop, "bridged by a spline"))
+    xyz.setflags(write=False)  # the record keeps it without a copy
     bridged = Markers(markers.names, markers.time, xyz)
+    if not later:
+        return bridged, tuple(gaps)
+    xyz = xyz.copy()
     for gap in later:
         carried, how = _carry(bridged, gap, segments)
         if carried is not None:
             xyz[gap.start : gap.stop, markers.names.index(gap.label)] = carried
         gaps.append(Gap(gap.label, gap.start, gap.stop, how))
+    xyz.setflags(write=False)
     return Markers(markers.names, markers.time, xyz), tuple(gaps)
 
 

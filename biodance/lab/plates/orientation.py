@@ -88,6 +88,7 @@ def oriented(
         said, warnings = (*said, *checked), (*warnings, *warned)
     value = wrench_in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
     value[~reading.known] = np.nan
+    value.setflags(write=False)  # the record keeps it without a copy
     decisions = (*reading.decisions, *moved, *said, _sign_said(sign, otherwise))
     zero = (sign or otherwise) * axes @ reading.empty
     plate = Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions, zero)

@@ -90,9 +90,10 @@ def _alive(readings: list[PlateReading], markers: Markers | None) -> tuple[list[
     alive, said = [], []
     moves = markers is not None and movement(markers) > StandingRules.still
     for reading in readings:
-        vertical = reading.sensor[reading.known, 2]
+        sensor = reading.sensor if reading.known.all() else reading.sensor[reading.known]
+        vertical = sensor[:, 2]
         mean, spread = float(vertical.mean()), float(vertical.std())
-        wanders = float(reading.sensor[reading.known, 3:5].std(axis=0).max())
+        wanders = max(float(moment.std()) for moment in sensor[:, 3:5].T)
         same = spread < _STUCK * abs(mean) and wanders < _SAME_PLACE * abs(mean)
         if not (moves and abs(mean) > TOUCH_FORCE and same):
             alive.append(reading)

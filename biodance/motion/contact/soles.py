@@ -82,7 +82,8 @@ def soles_from_body(body: Body, motion: Motion) -> Soles:
         )
     feet = [body.feet[side] for side in SIDES]
     segments, points = [foot.segment for foot in feet for _ in foot.outline], np.concatenate([f.outline for f in feet])
-    outline = np.empty((motion.time.size, len(points), 3))
+    outline = np.empty((motion.time.size, 2, len(points) // 2, 3))
     for part, frames in in_blocks(motion):
-        outline[part] = poses(body, frames.q).points(segments, points)
-    return Soles(motion.time, outline.reshape(motion.time.size, 2, -1, 3))
+        outline[part] = poses(body, frames.q).points(segments, points).reshape(-1, *outline.shape[1:])
+    outline.setflags(write=False)  # the record keeps it without a copy
+    return Soles(motion.time, outline)

@@ -90,7 +90,7 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     TrialRefused
         The trials show no marker of the body, or no frame determines a posture.
     """
-    postures = spread_postures(trials, scaling.body()[0].markers.names)
+    postures = spread_postures(trials, scaling.with_centres(scaling.centres)[0].markers.names)
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
@@ -126,7 +126,7 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
 
 def _marker_distance(scaling: Scaling, postures: Markers, found: CalibrationState) -> Array:
     """Return the RMS distance (T,) m of the markers of every posture from the body that follows them best."""
-    body = scaling.body()[0]
+    body = scaling.with_centres(scaling.centres)[0]
     place = poses(body, found.q).points(list(body.markers.segment), body.markers.position)
     return np.asarray(np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)))
 
@@ -155,7 +155,7 @@ def _without(postures: Markers, name: str) -> Markers:
 
 def _pulled(scaling: Scaling, found: CalibrationState, marker: str) -> str:
     """Return the joint of the marker's segment that it has pulled farthest, in its standard deviations."""
-    body, off = scaling.body()[0], JointUnknowns(scaling.centres).prior(found.theta)[0]
+    body, off = scaling.with_centres(scaling.centres)[0], JointUnknowns(scaling.centres).prior(found.theta)[0]
     segment = body.markers.segment[body.markers.names.index(marker)]
     meet = []
     for chain in chains(body):

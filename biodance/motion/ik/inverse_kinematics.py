@@ -83,6 +83,7 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
     status = np.where(verdict.determined, FrameStatus.SOLVED, FrameStatus.LEANING).astype(np.int8)
     status[slope > tolerance] = FrameStatus.STOPPED
     residual = np.where(chosen.seen, marker_distances(problem, q), np.nan)
+    residual.setflags(write=False)  # the records keep it without a copy
     return InverseKinematics(q, residual, status, slope, steps, names)
 
 

@@ -167,7 +167,7 @@ def evaluate_joints(
     if all postures were independent.
     """
     unknowns = JointUnknowns(scaling.centres)
-    body, stand = replace(scaling, centres=unknowns.moved(theta)).body()
+    body, stand = scaling.with_centres(unknowns.moved(theta))
     found = solve_ik(body, postures, guess=guess)
     solved = np.asarray(found.status == FrameStatus.SOLVED)
     at = _Linear.of(body, postures, found.q, solved, noise=noise)
@@ -183,7 +183,7 @@ def evaluate_joints(
 def marker_slopes(scaling: Scaling, postures: Markers, found: CalibrationState, *, noise: float) -> MarkerSlopes:
     """Return what the ``postures`` say at ``found`` of the place of every marker that counts."""
     unknowns = JointUnknowns(scaling.centres)
-    body, stand = replace(scaling, centres=unknowns.moved(found.theta)).body()
+    body, stand = scaling.with_centres(unknowns.moved(found.theta))
     at = _Linear.of(body, postures, found.q, found.solved, noise=noise)
     joints = at.left_open(unknowns.slope(body, stand, at.pose, at.points, found.theta))
     kept = np.flatnonzero(body.markers.weight > 0)
