@@ -29,7 +29,7 @@ from biodance.uncertainty.plates import PLATE_SOURCES, plate_errors, plate_sourc
 from biodance.uncertainty.response import Response
 from biodance.uncertainty.sources import deviations, of_markers, transpose
 
-EVERY, ENOUGH = 8, 300
+EVERY, PREDICTING = 8, 300
 """Frames: one of so many (two of a run at least) is enough to predict the size of the marker residuals from; of long
 sessions so many in all (seven minutes: 303 for 1212, the prediction changes by 0.05 %)."""
 SHORTEST = 8
@@ -92,7 +92,7 @@ def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
     whole = parts_as_segments(body)
     sources = of_markers(whole)
     variance, predicted, observed = deviations(whole, sources) ** 2, 0.0, 0.0
-    every = max(EVERY, sum(pick.size for _, pick in _runs(fits, bands)) // ENOUGH)
+    every = max(EVERY, sum(pick.size for _, pick in _runs(fits, bands)) // PREDICTING)
     for fit, pick in _runs(fits, bands):
         residual = fit.motion.residual[pick]
         if residual.shape[1] and np.isfinite(residual).any():
