@@ -83,14 +83,19 @@ def _learned(known: Information, table: Sip) -> Array:
     return learned
 
 
+_MOST = 0.5
+"""Standard deviations by which giving back may move a mass. What is given back is unsure by about its own size, and no
+interval counts that: they are too short by an eighth at most."""
+
+
 def gains_move_masses(before: Posterior, after: Posterior) -> bool:
-    """Whether giving back what noise takes moves a mass by more than its standard deviation.
+    """Whether giving back what noise takes moves a mass by more than `_MOST` of its standard deviations.
 
     A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
     what is fast, each round lowers the one and raises the other.
     """
     sd = np.sqrt(np.diag(before.covariance)[::10])
-    return bool(np.any(np.abs(after.mean - before.mean)[::10] > sd))
+    return bool(np.any(np.abs(after.mean - before.mean)[::10] > _MOST * sd))
 
 
 def _gains(gram: Array, parts: Array, count: int) -> Array:
@@ -136,8 +141,8 @@ def undo_dilution(
     body: Body, total: Statistics, measured: Calibrated, found: Mismatch, before: Sip, *, open_table: bool
 ) -> Calibrated:
     """Return the ``measured`` data of ``total`` with their dilution given back; as they are, and ``diluted``, where
-    that moves a mass by more than its standard deviation. ``before`` is the table, whose open questions the data
-    answer if ``open_table``.
+    that moves a mass by more than its intervals can bear. ``before`` is the table, whose open questions the data answer
+    if ``open_table``.
     """
     room = with_unknown_load(body, before)
     now, known = measured, replace(total).information(measured.noise)
