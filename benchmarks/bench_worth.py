@@ -4,10 +4,10 @@
         [--visits 3] [--ways followable,free,random,squats] [--tell]
 
 FOLDER holds the dances of `bench_followable.py` (`small_woman_short.npz`); the free ones are designed into FOLDER/free
-(same feet, no limit on instructions, no price of one); any other way is a folder in FOLDER with dances of it. Visit k
-of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
+(same feet, no limit on instructions, no price of one), those of ``full`` with that protocol; any other way is a folder
+in FOLDER with dances of it. Visit k of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
 ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances (`foreign_dance.py`) and whose own
-random movement and squats are the rivals. Every way is as long. What is removed counts against one table, the mean of
+random movement and squats are the rivals. Every way is as long, but for ``full``, which takes its own seven minutes. What is removed counts against one table, the mean of
 what the sessions of all ways say (it is scaled by each session).
 Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
 """
@@ -27,6 +27,7 @@ from bench_chain import covered, errors, identified, rms
 from bench_dance import BODIES
 from bench_excitation import random_dance, squats
 from bench_people import deviations, truth
+from foreign_dance import TRIAL
 
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
@@ -59,7 +60,9 @@ def dance_of(folder: Path, name: str, way: str) -> Dance:
     """Return the dance of a body, from the folder if it is there."""
     path = path_of(folder, name, way)
     if not path.exists():
-        subject, plan = BODIES[name][0], replace(read_plan("short"), instructions=np.inf, simplicity=0.0)
+        subject = BODIES[name][0]
+        plan = read_plan("full" if way == "full" else "short")
+        plan = replace(plan, instructions=np.inf, simplicity=0.0)
         like = Dance.load(folder / f"{name}_short.npz")
         dance = random_dance(like, plan, subject) if way == "random" else design(dancer(subject, plan), plan, seed=0)[0]
         path.parent.mkdir(exist_ok=True)
@@ -74,22 +77,23 @@ def own(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[str, 
         simulate_session(subject, squats(seconds), place, seed=seed)
     else:
         dance = dance_of(folder, name, way)
-        performer = replace(PERFORMERS["normal"], pace=seconds / dance.duration)
+        performer = replace(PERFORMERS["normal"], pace=max(seconds / dance.duration, 1.0))
         simulate_dance(subject, dance, place, seed=seed, performer=performer)
     return identified(place)
 
 
 def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[str, Any]:
     """Return what a session of the foreign laboratory gave."""
-    subject, trials = BODIES[name][0], ["--trials", f"{SECONDS['foreign'] / 10.0:.0f}"]
+    subject, seconds = BODIES[name][0], SECONDS["foreign"]
     who: dict[str, Any] = {"seed": seed, "sex": subject.sex, "height": subject.stature, "mass": subject.mass}
     who |= {"noise": 0.6, "camera": 0.3, "out": place}
     if way in ("random", "squats"):
         kinds = ["--kinds", "squat"] if way == "squats" else []
-        first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", *trials, *kinds]
+        first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", "--trials", int(seconds / TRIAL)]
+        first += kinds
     else:
-        dance_of(folder, name, way)
-        first = [Path(__file__).with_name("foreign_dance.py"), path_of(folder, name, way), SECONDS["foreign"]]
+        seconds = max(seconds, TRIAL * np.ceil(dance_of(folder, name, way).duration / TRIAL))
+        first = [Path(__file__).with_name("foreign_dance.py"), path_of(folder, name, way), seconds]
     words = [str(text) for key, value in who.items() for text in (f"--{key}", value)]
     subprocess.run([sys.executable, *map(str, first), *words], check=True, stdout=subprocess.DEVNULL)
     result = examine(read_session(place))
