@@ -5,10 +5,11 @@
 
 FOLDER holds the dances of `bench_followable.py` (`small_woman_short.npz`); the free ones are designed into FOLDER/free
 (same feet, no limit on instructions, no price of one), those of ``full`` with that protocol; any other way is a folder
-in FOLDER with dances of it. Visit k of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
-``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances (`foreign_dance.py`) and whose own
-random movement and squats are the rivals. Every way is as long, but for ``full``, which takes its own seven minutes. What is removed counts against one table, the mean of
-what the sessions of all ways say (it is scaled by each session).
+in FOLDER with dances of it. Visit k of a body is another person of its size. ``own``: the virtual laboratory of this
+package, performer "normal"; ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances
+(`foreign_dance.py`) and whose own random movement and squats are the rivals. Every way is as long, but for ``full``,
+which takes its own seven minutes. What is removed counts against one table, the mean of what the sessions of all ways
+say (it is scaled by each session).
 Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
 """
 
@@ -89,7 +90,11 @@ def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[s
     who |= {"noise": 0.6, "camera": 0.3, "out": place}
     if way in ("random", "squats"):
         kinds = ["--kinds", "squat"] if way == "squats" else []
-        first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", "--trials", int(seconds / TRIAL)]
+        first: list[Any] = [
+            Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py",
+            "--trials",
+            int(seconds / TRIAL),
+        ]
         first += kinds
     else:
         seconds = max(seconds, TRIAL * np.ceil(dance_of(folder, name, way).duration / TRIAL))
