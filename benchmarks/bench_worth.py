@@ -28,6 +28,7 @@ from bench_chain import covered, errors, identified, rms
 from bench_dance import BODIES
 from bench_excitation import random_dance, squats
 from bench_people import deviations, truth
+from better_than_table import expected_better, told
 from foreign_dance import TRIAL
 
 from biodance.dance.dance import Dance
@@ -48,7 +49,7 @@ _TELLING = 0.1
 WAYS = ("followable", "free", "random", "squats")
 HEADING = (
     "| laboratory, sessions | way | mass, kg | removed | share of free | CoM, mm | removed | share of free "
-    "| 95 % intervals hold mass, CoM |\n|" + "---|" * 9
+    "| 95 % intervals hold mass, CoM | better than the table in mass, CoM, both |\n|" + "---|" * 10
 )
 
 
@@ -102,18 +103,19 @@ def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[s
     words = [str(text) for key, value in who.items() for text in (f"--{key}", value)]
     subprocess.run([sys.executable, *map(str, first), *words], check=True, stdout=subprocess.DEVNULL)
     result = examine(read_session(place))
-    body, sip = result.body, identification_of(result).identification.sip
+    body, found = result.body, identification_of(result).identification
     static = next(one.motion for one in result.trials if one.trial.role == "static")
     assert body is not None
     assert static is not None
     document = json.loads(place.with_name(f"{place.name}.truth.json").read_text())
     mass, com, own_com = truth(body, static, document["segments"])
-    sd = deviations(sip)
+    sip, sd = found.sip, deviations(found.sip)
     return {
         "true": {"mass": mass[:, None], "com": com, "own_com": own_com},
         "table": {"mass": body.sip.mass[:, None], "com": body.sip.com},
         "identified": {"mass": sip.mass[:, None], "com": sip.com},
         "sd": {"mass": sd[:, :1], "com": sd[:, 1:]},
+        "chance": expected_better(found.posterior),
     }
 
 
@@ -138,7 +140,7 @@ def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
     tables = [errors(one[way], "table") for one in sessions for way in one]
     table = [rms(pair[k] for pair in tables) for k in (0, 1)]
     off = {way: [rms(pair[k] for pair in mine) for k in (0, 1)] for way, mine in pairs.items()}
-    out = [f"| {lab}, {len(sessions)} | table | {table[0]:.3f} | | | {1000 * table[1]:.1f} | | | |"]
+    out = [f"| {lab}, {len(sessions)} | table | {table[0]:.3f} | | | {1000 * table[1]:.1f} | | | | |"]
     for way, both in off.items():
         cells = []
         for k, (factor, digits) in enumerate(((1.0, 3), (1000.0, 1))):
@@ -147,7 +149,8 @@ def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
             share = f"{100 * removed / free:.0f} %" if free > _TELLING * table[k] else "–"
             cells += [f"{factor * both[k]:.{digits}f}", f"{factor * removed:.{digits}f}", share]
         held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
-        out.append(f"| | {way} | {' | '.join(cells)} | {', '.join(f'{share:.0f} %' for share in held)} |")
+        words = ", ".join(f"{share:.0f} %" for share in held)
+        out.append(f"| | {way} | {' | '.join(cells)} | {words} | {told([one[way] for one in sessions])} |")
     return out
 
 
