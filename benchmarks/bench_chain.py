@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from better_than_table import expected_better, told
 from virtual_visits import subjects
 
 from biodance.body.human.skeleton import SEGMENTS
@@ -151,6 +152,7 @@ def identified(place: Path) -> dict[str, Any]:
         },
         "squats": [[float(np.linalg.norm(r[:3])), float(np.linalg.norm(r[3:]))] for r in rms],
         "sizes": vars(one.identification.sizes),
+        "chance": expected_better(one.identification.posterior),
         "pull": pulled(one.identification.posterior, phi),
     }
 
@@ -203,17 +205,13 @@ def table(rows: dict[tuple[int, str], dict[str, Any]], motions: list[str]) -> st
         f"{moment:.1f} |"
     )
     for motion, mine in some.items():
-        found, before = ([errors(r, which) for r in mine] for which in ("identified", "table"))
-        better = np.array(
-            [[rms([a[k]]) < rms([b[k]]) for k in (0, 1)] for a, b in zip(found, before, strict=True)], dtype=bool
-        )
+        found = [errors(r, "identified") for r in mine]
         share = [100 * np.mean(np.concatenate([covered(r, name) for r in mine])) for name in ("mass", "com")]
         force, moment = np.mean([r["squats"][1] for r in mine], axis=0)
         lines.append(
             f"| {motion} | {np.mean([r['seconds'] for r in mine]):.0f} | {rms(a[0] for a in found):.3f} | "
-            f"{1000 * rms(a[1] for a in found):.1f} | {better[:, 0].sum()}, {better[:, 1].sum()}, "
-            f"{better.all(axis=1).sum()} of {len(mine)} | {share[0]:.0f} %, {share[1]:.0f} % | {force:.1f} | "
-            f"{moment:.1f} |"
+            f"{1000 * rms(a[1] for a in found):.1f} | {told(mine)} | {share[0]:.0f} %, {share[1]:.0f} % | "
+            f"{force:.1f} | {moment:.1f} |"
         )
     return "\n".join(lines)
 

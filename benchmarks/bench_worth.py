@@ -4,11 +4,12 @@
         [--visits 3] [--ways followable,free,random,squats] [--tell]
 
 FOLDER holds the dances of `bench_followable.py` (`small_woman_short.npz`); the free ones are designed into FOLDER/free
-(same feet, no limit on instructions, no price of one); any other way is a folder in FOLDER with dances of it. Visit k
-of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
-``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances (`foreign_dance.py`) and whose own
-random movement and squats are the rivals. Every way is as long. What is removed counts against one table, the mean of
-what the sessions of all ways say (it is scaled by each session).
+(same feet, no limit on instructions, no price of one), those of ``full`` with that protocol; any other way is a folder
+in FOLDER with dances of it. Visit k of a body is another person of its size. ``own``: the virtual laboratory of this
+package, performer "normal"; ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances
+(`foreign_dance.py`) and whose own random movement and squats are the rivals. Every way is as long, but for ``full``,
+which takes its own seven minutes. What is removed counts against one table, the mean of what the sessions of all ways
+say (it is scaled by each session).
 Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
 """
 
@@ -27,6 +28,8 @@ from bench_chain import covered, errors, identified, rms
 from bench_dance import BODIES
 from bench_excitation import random_dance, squats
 from bench_people import deviations, truth
+from better_than_table import expected_better, told
+from foreign_dance import TRIAL
 
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
@@ -46,7 +49,7 @@ _TELLING = 0.1
 WAYS = ("followable", "free", "random", "squats")
 HEADING = (
     "| laboratory, sessions | way | mass, kg | removed | share of free | CoM, mm | removed | share of free "
-    "| 95 % intervals hold mass, CoM |\n|" + "---|" * 9
+    "| 95 % intervals hold mass, CoM | better than the table in mass, CoM, both |\n|" + "---|" * 10
 )
 
 
@@ -59,7 +62,9 @@ def dance_of(folder: Path, name: str, way: str) -> Dance:
     """Return the dance of a body, from the folder if it is there."""
     path = path_of(folder, name, way)
     if not path.exists():
-        subject, plan = BODIES[name][0], replace(read_plan("short"), instructions=np.inf, simplicity=0.0)
+        subject = BODIES[name][0]
+        plan = read_plan("full" if way == "full" else "short")
+        plan = replace(plan, instructions=np.inf, simplicity=0.0)
         like = Dance.load(folder / f"{name}_short.npz")
         dance = random_dance(like, plan, subject) if way == "random" else design(dancer(subject, plan), plan, seed=0)[0]
         path.parent.mkdir(exist_ok=True)
@@ -74,37 +79,43 @@ def own(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[str, 
         simulate_session(subject, squats(seconds), place, seed=seed)
     else:
         dance = dance_of(folder, name, way)
-        performer = replace(PERFORMERS["normal"], pace=seconds / dance.duration)
+        performer = replace(PERFORMERS["normal"], pace=max(seconds / dance.duration, 1.0))
         simulate_dance(subject, dance, place, seed=seed, performer=performer)
     return identified(place)
 
 
 def foreign(folder: Path, name: str, way: str, seed: int, place: Path) -> dict[str, Any]:
     """Return what a session of the foreign laboratory gave."""
-    subject, trials = BODIES[name][0], ["--trials", f"{SECONDS['foreign'] / 10.0:.0f}"]
+    subject, seconds = BODIES[name][0], SECONDS["foreign"]
     who: dict[str, Any] = {"seed": seed, "sex": subject.sex, "height": subject.stature, "mass": subject.mass}
     who |= {"noise": 0.6, "camera": 0.3, "out": place}
     if way in ("random", "squats"):
         kinds = ["--kinds", "squat"] if way == "squats" else []
-        first: list[Any] = [Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py", *trials, *kinds]
+        first: list[Any] = [
+            Path(os.environ["BIODANCE_FOREIGN_LAB"]) / "foreign_lab.py",
+            "--trials",
+            int(seconds / TRIAL),
+        ]
+        first += kinds
     else:
-        dance_of(folder, name, way)
-        first = [Path(__file__).with_name("foreign_dance.py"), path_of(folder, name, way), SECONDS["foreign"]]
+        seconds = max(seconds, TRIAL * np.ceil(dance_of(folder, name, way).duration / TRIAL))
+        first = [Path(__file__).with_name("foreign_dance.py"), path_of(folder, name, way), seconds]
     words = [str(text) for key, value in who.items() for text in (f"--{key}", value)]
     subprocess.run([sys.executable, *map(str, first), *words], check=True, stdout=subprocess.DEVNULL)
     result = examine(read_session(place))
-    body, sip = result.body, identification_of(result).identification.sip
+    body, found = result.body, identification_of(result).identification
     static = next(one.motion for one in result.trials if one.trial.role == "static")
     assert body is not None
     assert static is not None
     document = json.loads(place.with_name(f"{place.name}.truth.json").read_text())
     mass, com, own_com = truth(body, static, document["segments"])
-    sd = deviations(sip)
+    sip, sd = found.sip, deviations(found.sip)
     return {
         "true": {"mass": mass[:, None], "com": com, "own_com": own_com},
         "table": {"mass": body.sip.mass[:, None], "com": body.sip.com},
         "identified": {"mass": sip.mass[:, None], "com": sip.com},
         "sd": {"mass": sd[:, :1], "com": sd[:, 1:]},
+        "chance": expected_better(found.posterior),
     }
 
 
@@ -129,7 +140,7 @@ def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
     tables = [errors(one[way], "table") for one in sessions for way in one]
     table = [rms(pair[k] for pair in tables) for k in (0, 1)]
     off = {way: [rms(pair[k] for pair in mine) for k in (0, 1)] for way, mine in pairs.items()}
-    out = [f"| {lab}, {len(sessions)} | table | {table[0]:.3f} | | | {1000 * table[1]:.1f} | | | |"]
+    out = [f"| {lab}, {len(sessions)} | table | {table[0]:.3f} | | | {1000 * table[1]:.1f} | | | | |"]
     for way, both in off.items():
         cells = []
         for k, (factor, digits) in enumerate(((1.0, 3), (1000.0, 1))):
@@ -138,7 +149,8 @@ def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
             share = f"{100 * removed / free:.0f} %" if free > _TELLING * table[k] else "–"
             cells += [f"{factor * both[k]:.{digits}f}", f"{factor * removed:.{digits}f}", share]
         held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
-        out.append(f"| | {way} | {' | '.join(cells)} | {', '.join(f'{share:.0f} %' for share in held)} |")
+        words = ", ".join(f"{share:.0f} %" for share in held)
+        out.append(f"| | {way} | {' | '.join(cells)} | {words} | {told([one[way] for one in sessions])} |")
     return out
 
 
