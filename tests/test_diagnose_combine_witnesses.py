@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.diagnosis import witness_evidence
-from biodance.diagnosis.combine_witnesses import combine_findings
+from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
@@ -83,7 +83,7 @@ def test_a_size_that_the_movement_excludes_is_not_named(
     names, own = (said.effect, said.target), said.parameters[0]
     evidence = heard(names, witness, own.value, own.sd)
     simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*names, limit, own.unit),))
-    measured = {names: moved, OTHER: other}
+    measured = {names: SimulatedSize(*moved, 0.0), OTHER: SimulatedSize(*other, 0.0)}
     one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
     assert one.findings == ((said,) if named else ())
     assert one.verdict == ("named, complete" if named else "nothing wrong")
@@ -97,7 +97,11 @@ def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
     simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*NAMES, 0.009, "m"),))
     for moved, named in (((0.006, 0.0015), False), ((0.016, 0.0015), True)):
         one = combine_findings(
-            simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured={NAMES: moved}
+            simulation,
+            WitnessFindings((said,), evidence),
+            evidence,
+            judged=True,
+            measured={NAMES: SimulatedSize(*moved, 0.0)},
         )
         assert bool(one.findings) is named
 
@@ -106,7 +110,7 @@ def test_standing_alone_excludes_no_size() -> None:
     """Forces are 62 ms late at every step; in the three seconds that could be compared nobody moved."""
     evidence = heard(("time_delay", ""), "force_onset", 0.062, 0.01)
     simulation = Diagnosis("nothing wrong", (), limits=(Unobservable("time_delay", "", 0.03, "s"),), doubt="standing")
-    measured = {("time_delay", ""): (0.002, 0.005)}
+    measured = {("time_delay", ""): SimulatedSize(0.002, 0.005, 0.0)}
     one = combine_findings(simulation, WitnessFindings((LATE,), evidence), evidence, judged=True, measured=measured)
     assert one.findings == (LATE,)
 
