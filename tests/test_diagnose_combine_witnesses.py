@@ -8,6 +8,7 @@ import pytest
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.engine import UNUSUAL_BODY
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
@@ -104,6 +105,37 @@ def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
             measured={NAMES: SimulatedSize(*moved, 0.0)},
         )
         assert bool(one.findings) is named
+
+
+@pytest.mark.parametrize(("lacking", "named"), [(29.0, True), (31.0, False)])
+def test_feet_and_movement_together_have_the_evidence_that_the_movement_asks_for(lacking: float, named: bool) -> None:
+    """Feet (log evidence 30) and movement agree on 16 mm; the movement, which measures them better, asks for more."""
+    said = replace(PLACE, parameters=(Estimate("shift", 0.018, 0.005, "m"),), set=PLACE.set[:1])
+    evidence = heard(NAMES, "foot_across", 0.018, 0.005)
+    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*NAMES, 0.009, "m"),))
+    measured = {NAMES: SimulatedSize(0.016, 0.0015, lacking)}
+    one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
+    assert bool(one.findings) is named
+
+
+@pytest.mark.parametrize(
+    ("said", "witness", "note", "named"),
+    [
+        (WEIGHT, "standing_force", UNUSUAL_BODY, False),
+        (WEIGHT, "standing_force", "", True),  # the body with that mass is as people are
+        (LATE, "force_onset", UNUSUAL_BODY, True),  # no mass that lies elsewhere makes forces late
+    ],
+)
+def test_weighing_again_names_no_mass_beside_which_the_body_is_unlike_people(
+    said: Finding, witness: str, note: str, named: bool
+) -> None:
+    """2.4 kg on a forearm that nobody looks for weigh like a wrong declared mass, and make an arm that nobody has."""
+    names, own = (said.effect, said.target), said.parameters[0]
+    evidence = heard(names, witness, own.value, own.sd)
+    limits = (Unobservable(*names, 0.6 * own.value, own.unit),)
+    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(said,), notes=(note,), doubt="a neck")
+    one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True)
+    assert [f.effect for f in one.findings] == ([said.effect] if named else [])
 
 
 def test_standing_alone_excludes_no_size() -> None:
