@@ -8,6 +8,7 @@ import pytest
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
 from biodance.diagnosis.engine import UNUSUAL_BODY
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
@@ -136,6 +137,16 @@ def test_weighing_again_names_no_mass_beside_which_the_body_is_unlike_people(
     simulation = Diagnosis("unexplained", (), limits=limits, resembles=(said,), notes=(note,), doubt="a neck")
     one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True)
     assert [f.effect for f in one.findings] == ([said.effect] if named else [])
+
+
+@pytest.mark.parametrize("note", [SEVERAL_CROSSTALKS, ""])
+def test_feet_name_no_crosstalk_that_the_simulation_found_among_several(note: str) -> None:
+    """A plate 30 mm beside its place, which nobody looks for, looks like two cross-talks at once."""
+    crossed = finding("plate_crosstalk", "Fz->My", 0.033, "m", ("plate_offset", "My"))
+    evidence = heard(("plate_crosstalk", "Fz->My"), "standing_place", 0.033, 0.009)
+    simulation = Diagnosis("unexplained", (), resembles=(crossed,), notes=(note,), doubt="a neck")
+    one = combine_findings(simulation, WitnessFindings((crossed,), evidence), evidence, judged=True)
+    assert bool(one.findings) is (note == "")
 
 
 def test_standing_alone_excludes_no_size() -> None:

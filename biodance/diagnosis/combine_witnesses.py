@@ -13,10 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
 from biodance.diagnosis.engine import UNUSUAL_BODY
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, is_beyond_usual, size_from_witnesses
+from biodance.effects import Effect, causes
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
@@ -109,16 +111,18 @@ def _same_cause(alias: Alias, one: Finding | Alias) -> bool:
 def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
     """Return whether the simulation contradicts a finding of the witnesses. It does if it found something else wrong
     although it would detect a cause of this size, if it found this cause with a size that depends on what the
-    witnesses observe (`_weighing_agrees`), or if beside this cause, of which the witnesses see the weight alone, the
-    body is still unlike people: to weigh the same plates twice is no second opinion on which mass it is. Exchanged
-    labels do not affect the plates and do not count. If the simulation doubts its own result, it must have some
-    evidence of a cause that is `_PLAIN`.
+    witnesses observe (`_weighing_agrees`), at several targets though it is believed only alone (`Effect.single`), or
+    with a body that is unlike people beside it, where the witnesses see its weight alone: to weigh the same plates
+    twice is no second opinion on which mass it is. Exchanged labels do not affect the plates and do not count. If the
+    simulation doubts its own result, it must have some evidence of a cause that is `_PLAIN`.
     """
     same = [other for other in one.resembles if _names(other) == _names(finding)]
     hanging = [other for other in same if other.varies_with]
     if hanging:
         return not _weighing_agrees(finding, hanging[0], evidence)
     if same and UNUSUAL_BODY in one.notes and _is_weighed_only(finding, evidence):
+        return True
+    if same and SEVERAL_CROSSTALKS in one.notes and _is_believed_alone(finding):
         return True
     labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
     if not finding.parameters or one.verdict == "nothing wrong" or labels:
@@ -135,6 +139,12 @@ def _weighing_agrees(finding: Finding, hanging: Finding, evidence: WitnessEviden
     """
     weighed = _is_weighed_only(finding, evidence)
     return weighed and hanging.varies_with in WEIGHTLESS and _same_size(finding, hanging)
+
+
+def _is_believed_alone(finding: Finding) -> bool:
+    """Return whether a cause is believed at one target at a time only."""
+    kind = causes().get(finding.effect)
+    return isinstance(kind, Effect) and kind.single
 
 
 def _is_weighed_only(finding: Finding, evidence: WitnessEvidence) -> bool:
