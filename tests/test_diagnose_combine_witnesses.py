@@ -8,8 +8,7 @@ import pytest
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
-from biodance.diagnosis.engine import UNUSUAL_BODY
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
@@ -109,7 +108,7 @@ def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
 
 
 @pytest.mark.parametrize(("lacking", "named"), [(29.0, True), (31.0, False)])
-def test_feet_and_movement_together_have_the_evidence_that_the_movement_asks_for(lacking: float, named: bool) -> None:
+def test_two_sources_carry_a_name_together(lacking: float, named: bool) -> None:
     """Feet (log evidence 30) and movement agree on 16 mm; the movement, which measures them better, asks for more."""
     said = replace(PLACE, parameters=(Estimate("shift", 0.018, 0.005, "m"),), set=PLACE.set[:1])
     evidence = heard(NAMES, "foot_across", 0.018, 0.005)
@@ -127,9 +126,7 @@ def test_feet_and_movement_together_have_the_evidence_that_the_movement_asks_for
         (LATE, "force_onset", UNUSUAL_BODY, True),  # no mass that lies elsewhere makes forces late
     ],
 )
-def test_weighing_again_names_no_mass_beside_which_the_body_is_unlike_people(
-    said: Finding, witness: str, note: str, named: bool
-) -> None:
+def test_weighing_twice_is_one_opinion(said: Finding, witness: str, note: str, named: bool) -> None:
     """2.4 kg on a forearm that nobody looks for weigh like a wrong declared mass, and make an arm that nobody has."""
     names, own = (said.effect, said.target), said.parameters[0]
     evidence = heard(names, witness, own.value, own.sd)
@@ -140,7 +137,7 @@ def test_weighing_again_names_no_mass_beside_which_the_body_is_unlike_people(
 
 
 @pytest.mark.parametrize("note", [SEVERAL_CROSSTALKS, ""])
-def test_feet_name_no_crosstalk_that_the_simulation_found_among_several(note: str) -> None:
+def test_feet_name_no_crosstalk_of_several(note: str) -> None:
     """A plate 30 mm beside its place, which nobody looks for, looks like two cross-talks at once."""
     crossed = finding("plate_crosstalk", "Fz->My", 0.033, "m", ("plate_offset", "My"))
     evidence = heard(("plate_crosstalk", "Fz->My"), "standing_place", 0.033, 0.009)

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
-from biodance.diagnosis.engine import UNUSUAL_BODY
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, is_beyond_usual, size_from_witnesses
