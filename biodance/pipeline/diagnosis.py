@@ -22,7 +22,7 @@ from biodance.effects import DiscreteEffect, Effect, QualityCheck, causes, check
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
-from biodance.pipeline.another_body import beside_another_body
+from biodance.pipeline.another_body import beside_another_body, without_unplaced_markers
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
@@ -209,7 +209,7 @@ def _diagnosed(
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
     joints = tuple(one.name for one in result.shown_joints.gains if one.taken)
-    examined = beside_another_body(examined, result.body, joints)
+    examined = without_unplaced_markers(beside_another_body(examined, result.body, joints), result.body)
     tell("measuring what the findings change")
     return _with_gains(result, examined)
 
