@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from biodance.diagnosis import witness_evidence
-from biodance.diagnosis.combine_witnesses import combine_findings
+from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
@@ -83,7 +84,7 @@ def test_a_size_that_the_movement_excludes_is_not_named(
     names, own = (said.effect, said.target), said.parameters[0]
     evidence = heard(names, witness, own.value, own.sd)
     simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*names, limit, own.unit),))
-    measured = {names: moved, OTHER: other}
+    measured = {names: SimulatedSize(*moved, 0.0), OTHER: SimulatedSize(*other, 0.0)}
     one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
     assert one.findings == ((said,) if named else ())
     assert one.verdict == ("named, complete" if named else "nothing wrong")
@@ -97,16 +98,59 @@ def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
     simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*NAMES, 0.009, "m"),))
     for moved, named in (((0.006, 0.0015), False), ((0.016, 0.0015), True)):
         one = combine_findings(
-            simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured={NAMES: moved}
+            simulation,
+            WitnessFindings((said,), evidence),
+            evidence,
+            judged=True,
+            measured={NAMES: SimulatedSize(*moved, 0.0)},
         )
         assert bool(one.findings) is named
+
+
+@pytest.mark.parametrize(("lacking", "named"), [(29.0, True), (31.0, False)])
+def test_two_sources_carry_a_name_together(lacking: float, named: bool) -> None:
+    """Feet (log evidence 30) and movement agree on 16 mm; the movement, which measures them better, asks for more."""
+    said = replace(PLACE, parameters=(Estimate("shift", 0.018, 0.005, "m"),), set=PLACE.set[:1])
+    evidence = heard(NAMES, "foot_across", 0.018, 0.005)
+    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable(*NAMES, 0.009, "m"),))
+    measured = {NAMES: SimulatedSize(0.016, 0.0015, lacking)}
+    one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
+    assert bool(one.findings) is named
+
+
+@pytest.mark.parametrize(
+    ("said", "witness", "note", "named"),
+    [
+        (WEIGHT, "standing_force", UNUSUAL_BODY, False),
+        (WEIGHT, "standing_force", "", True),  # the body with that mass is as people are
+        (LATE, "force_onset", UNUSUAL_BODY, True),  # no mass that lies elsewhere makes forces late
+    ],
+)
+def test_weighing_twice_is_one_opinion(said: Finding, witness: str, note: str, named: bool) -> None:
+    """2.4 kg on a forearm that nobody looks for weigh like a wrong declared mass, and make an arm that nobody has."""
+    names, own = (said.effect, said.target), said.parameters[0]
+    evidence = heard(names, witness, own.value, own.sd)
+    limits = (Unobservable(*names, 0.6 * own.value, own.unit),)
+    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(said,), notes=(note,), doubt="a neck")
+    one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True)
+    assert [f.effect for f in one.findings] == ([said.effect] if named else [])
+
+
+@pytest.mark.parametrize("note", [SEVERAL_CROSSTALKS, ""])
+def test_feet_name_no_crosstalk_of_several(note: str) -> None:
+    """A plate 30 mm beside its place, which nobody looks for, looks like two cross-talks at once."""
+    crossed = finding("plate_crosstalk", "Fz->My", 0.033, "m", ("plate_offset", "My"))
+    evidence = heard(("plate_crosstalk", "Fz->My"), "standing_place", 0.033, 0.009)
+    simulation = Diagnosis("unexplained", (), resembles=(crossed,), notes=(note,), doubt="a neck")
+    one = combine_findings(simulation, WitnessFindings((crossed,), evidence), evidence, judged=True)
+    assert bool(one.findings) is (note == "")
 
 
 def test_standing_alone_excludes_no_size() -> None:
     """Forces are 62 ms late at every step; in the three seconds that could be compared nobody moved."""
     evidence = heard(("time_delay", ""), "force_onset", 0.062, 0.01)
     simulation = Diagnosis("nothing wrong", (), limits=(Unobservable("time_delay", "", 0.03, "s"),), doubt="standing")
-    measured = {("time_delay", ""): (0.002, 0.005)}
+    measured = {("time_delay", ""): SimulatedSize(0.002, 0.005, 0.0)}
     one = combine_findings(simulation, WitnessFindings((LATE,), evidence), evidence, judged=True, measured=measured)
     assert one.findings == (LATE,)
 

@@ -8,7 +8,8 @@ import pytest
 from diagnosed_sessions import body, delay, known, nothing, windows
 
 from biodance.diagnosis.adequacy import CONFLICT_LIMIT, prior_data_conflict
-from biodance.diagnosis.engine import UNUSUAL_BODY, diagnose_trials
+from biodance.diagnosis.doubt import UNUSUAL_BODY
+from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Round
 from biodance.diagnosis.screening import ScoredCandidate

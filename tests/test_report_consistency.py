@@ -15,8 +15,8 @@ from rich.console import Console
 from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
 from biodance.diagnosis.diagnosis import Diagnosis
-from biodance.diagnosis.doubt import WITHOUT_RESEMBLED
-from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES, UNUSUAL_BODY
+from biodance.diagnosis.doubt import UNUSUAL_BODY, WITHOUT_RESEMBLED
+from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES
 from biodance.pipeline.attention import _checked, headline, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.judged_trials import TOO_SHORT

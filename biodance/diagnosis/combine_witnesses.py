@@ -8,13 +8,16 @@ its look-alikes from the simulation, and a size that the witnesses exclude is wi
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, is_beyond_usual, size_from_witnesses
+from biodance.effects import Effect, causes
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
@@ -30,17 +33,26 @@ _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
 
 
+class SimulatedSize(NamedTuple):
+    """What the simulation tells of a cause where nothing was named: ``size`` of the first parameter, its standard
+    deviation ``sd`` (NaN: not measured), and the log evidence that is ``lacking`` for a name (negative: to spare).
+    """
+
+    size: float
+    sd: float
+    lacking: float
+
+
 def combine_findings(
     one: Diagnosis,
     by_witnesses: WitnessFindings,
     evidence: WitnessEvidence,
     *,
     judged: bool,
-    measured: Mapping[tuple[str, str], tuple[float, float]] = MappingProxyType({}),
+    measured: Mapping[tuple[str, str], SimulatedSize] = MappingProxyType({}),
 ) -> Diagnosis:
     """Return the diagnosis combined with the findings of the witnesses; ``judged``: whether the simulation was
-    available; ``measured``: by effect and target the size of the first parameter in the simulation, with its standard
-    deviation, where nothing was named (`screening.ScoredCandidate`).
+    available; ``measured``: by effect and target what it tells of every cause where nothing was named.
     """
     one = replace(one, witnesses=evidence if evidence.observations else None)
     raw = any(finding.effect in _RAW for finding in one.findings)
@@ -97,13 +109,20 @@ def _same_cause(alias: Alias, one: Finding | Alias) -> bool:
 
 def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
     """Return whether the simulation contradicts a finding of the witnesses. It does if it found something else wrong
-    although it would detect a cause of this size, or if it found this cause with a size that depends on what the
-    witnesses observe (`_weighing_agrees`). Exchanged labels do not affect the plates and do not count. If the
+    although it would detect a cause of this size, if it found this cause with a size that depends on what the
+    witnesses observe (`_weighing_agrees`), at several targets though it is believed only alone (`Effect.single`), or
+    with a body that is unlike people beside it, where the witnesses see its weight alone: to weigh the same plates
+    twice is no second opinion on which mass it is. Exchanged labels do not affect the plates and do not count. If the
     simulation doubts its own result, it must have some evidence of a cause that is `_PLAIN`.
     """
-    hanging = [other for other in one.resembles if _names(other) == _names(finding) and other.varies_with]
+    same = [other for other in one.resembles if _names(other) == _names(finding)]
+    hanging = [other for other in same if other.varies_with]
     if hanging:
         return not _weighing_agrees(finding, hanging[0], evidence)
+    if same and UNUSUAL_BODY in one.notes and _is_weighed_only(finding, evidence):
+        return True
+    if same and SEVERAL_CROSSTALKS in one.notes and _is_believed_alone(finding):
+        return True
     labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
     if not finding.parameters or one.verdict == "nothing wrong" or labels:
         return False
@@ -117,8 +136,19 @@ def _weighing_agrees(finding: Finding, hanging: Finding, evidence: WitnessEviden
     """Return whether a cause that only weighing witnesses detect has the same size in the simulation, where that size
     depends only on moments and fast bands: these do not affect the mean force.
     """
-    alone = _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _WEIGHING
-    return alone and hanging.varies_with in WEIGHTLESS and _same_size(finding, hanging)
+    weighed = _is_weighed_only(finding, evidence)
+    return weighed and hanging.varies_with in WEIGHTLESS and _same_size(finding, hanging)
+
+
+def _is_believed_alone(finding: Finding) -> bool:
+    """Return whether a cause is believed at one target at a time only."""
+    kind = causes().get(finding.effect)
+    return isinstance(kind, Effect) and kind.single
+
+
+def _is_weighed_only(finding: Finding, evidence: WitnessEvidence) -> bool:
+    """Return whether witnesses of mean forces alone see the cause of a finding."""
+    return _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _WEIGHING
 
 
 def _same_size(finding: Finding, other: Finding) -> bool:
@@ -133,36 +163,41 @@ def _movement_shows_none(
     finding: Finding,
     one: Diagnosis,
     evidence: WitnessEvidence,
-    measured: Mapping[tuple[str, str], tuple[float, float]],
+    measured: Mapping[tuple[str, str], SimulatedSize],
 ) -> bool:
     """Return whether a movement in which nothing is wrong, and that would show a cause of this size, measures no such
     size: not of the cause, and not of any look-alike of it. People may stand off centre on a plate that is in its
     place, and forces that fit the movement throughout are not late. Standing alone excludes nothing.
+
+    Two sources of one cause add up their evidence. Where the movement measures it better than the witnesses, theirs
+    must make up what is lacking for a name there.
     """
     if one.verdict != "nothing wrong" or one.doubt or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
         return False
-    alike = [_names(alias) for alias in finding.set if _names(alias) != _names(finding) and _names(alias) in measured]
-    said = {names: size for names in alike if (size := size_from_witnesses(evidence, names))}
-    said[_names(finding)] = finding.parameters[0].value, finding.parameters[0].sd
-    return _names(finding) in measured and not any(
-        _fits_the_movement(names, size, measured[names], evidence) for names, size in said.items()
-    )
+    own = finding.parameters[0]
+    for alias in (alias for alias in finding.set if _names(alias) in measured):
+        names = _names(alias)
+        size = (own.value, own.sd) if names == _names(finding) else size_from_witnesses(evidence, names)
+        if size and _fits_the_movement(alias, size, measured[names], evidence):
+            return False
+    return _names(finding) in measured
 
 
 def _fits_the_movement(
-    names: tuple[str, str], said: tuple[float, float], moved: tuple[float, float], evidence: WitnessEvidence
+    cause: Alias, said: tuple[float, float], moved: SimulatedSize, evidence: WitnessEvidence
 ) -> bool:
     """Return whether the size of a cause that the witnesses ``said`` and the one that the simulation measured are one
-    size, and that is more than laboratories have without a fault; a cause has only one. A size that the simulation did
-    not measure (standard deviation NaN), or measures worse than the witnesses, fits.
+    size, with the evidence of both enough for a name, and more than laboratories have without a fault; a cause has only
+    one. A size that the simulation did not measure (standard deviation NaN), or measures worse than the witnesses,
+    fits.
     """
-    (a, b), (size, sd) = said, moved
+    (a, b), (size, sd, lacking) = said, moved
     if not sd < b:
         return True
-    if abs(a - size) > _FAR * np.hypot(b, sd):
+    if abs(a - size) > _FAR * np.hypot(b, sd) or cause.log_bayes_factor < lacking:
         return False
-    weight = np.array([b**-2, sd**-2])
-    return is_beyond_usual(evidence, names, float(weight @ [a, size] / weight.sum()), float(weight.sum() ** -0.5))
+    weight, both = np.array([b**-2, sd**-2]), np.array([a, size])
+    return is_beyond_usual(evidence, _names(cause), float(weight @ both / weight.sum()), float(weight.sum() ** -0.5))
 
 
 def _size_over_limit(finding: Finding, one: Diagnosis) -> float:

@@ -13,6 +13,11 @@ SEVERAL_CROSSTALKS = (
     "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
     "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
 )
+UNUSUAL_BODY = (
+    "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
+    "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass hides "
+    "in it."
+)
 WITHOUT_RESEMBLED = "What is only resembled explains nothing: what is left is judged without it."
 _VARIES = (
     "is only what this resembles: a true cause has one size in every trial, band and channel, under every load and at "

@@ -23,7 +23,7 @@ from biodance.diagnosis.adequacy import (
 )
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.doubt import WITHOUT_RESEMBLED, doubt_notes, is_doubt, only_resembled
+from biodance.diagnosis.doubt import UNUSUAL_BODY, WITHOUT_RESEMBLED, doubt_notes, is_doubt, only_resembled
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, cause_key, causes_of, name_causes, passes_threshold, without_cause
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
@@ -38,12 +38,6 @@ from biodance.effects import effects as family
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
-
-UNUSUAL_BODY = (
-    "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
-    "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass hides "
-    "in it."
-)
 
 OUTSIDE_TOLERANCES = (
     "What the plates measured fits only if something that is small in every laboratory is many times as large here, "

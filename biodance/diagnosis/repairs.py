@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from biodance.body.body import Body
+from biodance.body.human.scaling import tilted_joints
 from biodance.body.parts import JointError
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import matters
@@ -14,6 +16,7 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck, effects
 from biodance.motion.ik.joint_unknowns import centre_sd
+from biodance.motion.kinematics import chains
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
 _ALIKE = {
@@ -67,9 +70,10 @@ def repairs(cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Eff
 
 def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: Tolerances) -> Iterator[Finding]:
     """Yield a marker that has moved, if it lies so far from its place in the static trial that this explains where the
-    joint seemed to be; one that was wrong in the static trial, too, is a joint elsewhere.
+    joint seemed to be; one that was wrong in the static trial, too, is a joint elsewhere, and where that trial
+    contradicts itself beside the marker, nobody knows (`unplaced_markers`).
     """
-    if error.spared not in effect.targets(cases[0]):
+    if error.spared not in effect.targets(cases[0]) or error.spared in unplaced_markers(cases[0].body):
         return
     own = replace(effect, target=error.spared)
     shift = own.measured(np.zeros(3), *cases)
@@ -77,6 +81,18 @@ def _marker(effect: Effect, error: JointError, cases: tuple[Case, ...], known: T
     sd = np.hypot(alike, known.model_error(own.name) * np.linalg.norm(shift))
     if matters(own, shift) and np.linalg.norm(shift) >= _EXPLAINS * error.moved:
         yield _named(own, [(p.name, v) for p, v in zip(own.parameters, shift, strict=True)], float(sd))
+
+
+def unplaced_markers(body: Body) -> frozenset[str]:
+    """Return the markers of which the static trial tells no place: those of the segments beside a joint that stands
+    away from its axes there. What lies elsewhere than in that trial need not have moved since.
+    """
+    tilted, segments = tilted_joints(body), set()
+    for chain in chains(body):
+        first, last = body.joints[chain[0]], body.joints[chain[-1]]
+        if first.name.rsplit("_", 1)[0] in tilted:
+            segments |= {body.joints[first.parent].segment if first.parent >= 0 else 0, last.segment}
+    return frozenset(name for name, on in zip(body.markers.names, body.markers.segment, strict=True) if on in segments)
 
 
 def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Finding:

@@ -6,7 +6,9 @@ What is left of the forces may be its own. So nothing is told beside it while an
 from dataclasses import replace
 
 from biodance.body.body import Body
-from biodance.diagnosis.engine import Examined, without_names
+from biodance.diagnosis.engine import Examined, without_name, without_names
+from biodance.diagnosis.repairs import unplaced_markers
+from biodance.effects.marker_misplaced import MarkerMisplaced
 
 _MORE_JOINTS = "the body moves at joints ({}) for which nobody has learned yet what is usual"
 """Why what is left of a body with optional joints may be theirs."""
@@ -25,6 +27,19 @@ def beside_another_body(examined: Examined, body: Body, joints: tuple[str, ...])
         return examined
     found = without_names(examined, examined.diagnosis.checks) if examined.diagnosis.findings else examined
     return replace(found, diagnosis=replace(found.diagnosis, doubt=doubt))
+
+
+def without_unplaced_markers(examined: Examined, body: Body) -> Examined:
+    """Return a diagnosis of ``body`` that says of no marker that it moved since a static trial which contradicts itself
+    beside it (`unplaced_markers`): it is only resembled, and what is left is judged without it.
+    """
+    unsure = unplaced_markers(body)
+    while True:
+        names = [(one.effect, one.target) for one in examined.diagnosis.findings]
+        found = next((i for i, (kind, at) in enumerate(names) if kind == MarkerMisplaced.name and at in unsure), None)
+        if found is None:
+            return examined
+        examined = without_name(examined, found)
 
 
 def _doubt(body: Body, joints: tuple[str, ...]) -> str:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, WITHOUT_RESEMBLED
-from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES, UNUSUAL_BODY
+from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY, WITHOUT_RESEMBLED
+from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence

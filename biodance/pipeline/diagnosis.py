@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.combine_witnesses import combine_findings
+from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
+from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
@@ -21,7 +22,7 @@ from biodance.effects import DiscreteEffect, Effect, QualityCheck, causes, check
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
-from biodance.pipeline.another_body import beside_another_body
+from biodance.pipeline.another_body import beside_another_body, without_unplaced_markers
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
@@ -130,8 +131,7 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
-    suspects = naming.screening.suspects if naming else ()
-    measured = {one.names: (float(one.start[0]), one.sd) for one in suspects}
+    measured = _measured(naming) if naming else {}
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
@@ -143,6 +143,14 @@ def diagnose_session(
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
+
+
+def _measured(naming: Naming) -> dict[tuple[str, str], SimulatedSize]:
+    """Return what the simulation tells of every cause, by effect and target, before any is named."""
+    return {
+        one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
+        for one in naming.screening.suspects
+    }
 
 
 def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...]) -> Diagnosis:
@@ -201,7 +209,7 @@ def _diagnosed(
         examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
         return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
     joints = tuple(one.name for one in result.shown_joints.gains if one.taken)
-    examined = beside_another_body(examined, result.body, joints)
+    examined = without_unplaced_markers(beside_another_body(examined, result.body, joints), result.body)
     tell("measuring what the findings change")
     return _with_gains(result, examined)
 

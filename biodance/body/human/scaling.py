@@ -30,6 +30,7 @@ _ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
 """deg: larger constant tilts of a joint point to a misplaced marker."""
+_STANDS = "Warning: {} {} stands"
 LENGTH_RATIO = {
     "thigh": (0.19, 0.29),
     "shank": (0.19, 0.29),
@@ -243,6 +244,12 @@ def chain_angles(relative: Array, axes: Array) -> Array:
     return axes.sum(axis=1) * np.array(angles)
 
 
+def tilted_joints(body: Body) -> tuple[str, ...]:
+    """Return the hinges of a ``body`` that stand away from their axes (`TILT`) in the static trial: ``left_elbow``."""
+    every = [(side, joint) for side in SIDES for joint in TILT]
+    return tuple("_".join(one) for one in every if any(n.startswith(_STANDS.format(*one)) for n in body.notes))
+
+
 def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
     """Return warnings about lengths, sides and tilts that no person has."""
     notes = []
@@ -264,7 +271,7 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
         tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
         if tilt > TILT[joint.split("_")[1]]:
             notes.append(
-                f"Warning: {joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes: check the markers "
-                f"beside it and the wand above it."
+                f"{_STANDS.format(*joint.split('_'))} {tilt:.0f} degrees away from its axes: check the markers beside "
+                f"it and the wand above it."
             )
     return notes
