@@ -30,7 +30,7 @@ _SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%"), "N": (1.0, "N")}
 QUANTITY_TITLES = {
     "place_x": "place along x",
     "place_y": "place along y",
-    "gain": "weighs too much",
+    "gain": "gain error",
     "offset_x": "offset Fx",
     "offset_y": "offset Fy",
     "offset_z": "offset Fz",
