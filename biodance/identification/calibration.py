@@ -83,9 +83,9 @@ def _learned(known: Information, table: Sip) -> Array:
     return learned
 
 
-_MOST = 0.5
+_MOST = 0.6
 """Standard deviations by which giving back may move a mass. What is given back is unsure by about its own size, and no
-interval counts that: they are too short by an eighth at most."""
+interval counts that: they are too short by a sixth at most."""
 
 
 def gains_move_masses(before: Posterior, after: Posterior) -> bool:
