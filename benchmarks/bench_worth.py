@@ -9,13 +9,8 @@ in FOLDER with dances of it. Visit k of a body is another person of its size. ``
 package, performer "normal"; ``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances
 (`foreign_dance.py`) and whose own random movement and squats are the rivals. Every way is as long, but for ``full``,
 which takes its own seven minutes. What is removed counts against one table, the mean of what the sessions of all ways
-say (it is scaled by each session).
-(same feet, no limit on instructions, no price of one); any other way is a folder in FOLDER with dances of it. Visit k
-of a body is another person of its size. ``own``: the virtual laboratory of this package, performer "normal";
-``foreign``: an independent one (BIODANCE_FOREIGN_LAB), which copies our dances (`foreign_dance.py`) and whose own
-random movement and squats are the rivals. Every way is as long. What is removed counts against one table, the mean of
-what the sessions of all ways say (it is scaled by each session). Shares of the free optimum stand with the interval
-that 95 % of the samples of as many people drawn anew from these give.
+say (it is scaled by each session). Shares of the free optimum stand with the interval that 95 % of the samples of as
+many people drawn anew from these give.
 Rows are kept in FOLDER/worth; ``--tell`` only tells what is there.
 """
 
@@ -34,8 +29,9 @@ from bench_chain import covered, errors, identified, rms
 from bench_dance import BODIES
 from bench_excitation import random_dance, squats
 from bench_people import deviations, truth
-    "| laboratory, sessions | way | mass, kg | stated | removed | share of free | CoM, mm | stated | removed "
-    "| share of free | 95 % intervals hold mass, CoM | better than the table in mass, CoM, both |\n|" + "---|" * 12
+from better_than_table import expected_better, told
+from foreign_dance import TRIAL
+from numpy.typing import NDArray
 
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
@@ -58,7 +54,7 @@ _DRAWS = 4000
 WAYS = ("followable", "free", "random", "squats")
 HEADING = (
     "| laboratory, sessions | way | mass, kg | stated | removed | share of free | CoM, mm | stated | removed "
-    "| share of free | 95 % intervals hold mass, CoM |\n|" + "---|" * 11
+    "| share of free | 95 % intervals hold mass, CoM | better than the table in mass, CoM, both |\n|" + "---|" * 12
 )
 
 
@@ -177,7 +173,19 @@ def stated(sessions: list[dict[str, dict[str, Any]]], way: str) -> tuple[float, 
 
 def lines(lab: str, sessions: list[dict[str, dict[str, Any]]]) -> list[str]:
     """Return the table over ``sessions``, each with the row of every way: root mean squares over all segments."""
-@@3@@        held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
+    found, everybody = squares(sessions), np.arange(len(sessions))
+    off = {way: np.sqrt(square.mean(axis=0)) for way, square in found.items()}
+    table = off["table"]
+    out = [f"| {lab}, {len(sessions)} | table | {table[0]:.3f} | | | | {table[1]:.1f} | | | | | |"]
+    for way in sessions[0]:
+        cells, says = [], stated(sessions, way)
+        for k, digits in enumerate((3, 1)):
+            removed, share = table[k] - off[way][k], "–"
+            if "free" in off and table[k] - off["free"][k] > _TELLING * table[k]:
+                low, high = 100 * shares_by_chance(found, way)[:, k]
+                share = f"{100 * shares(found, way, everybody)[k]:.0f} % ({low:.0f} to {high:.0f})"
+            cells += [f"{off[way][k]:.{digits}f}", f"{says[k]:.{digits}f}", f"{removed:.{digits}f}", share]
+        held = (100 * np.mean([covered(one[way], what) for one in sessions]) for what in ("mass", "com"))
         words = ", ".join(f"{share:.0f} %" for share in held)
         out.append(f"| | {way} | {' | '.join(cells)} | {words} | {told([one[way] for one in sessions])} |")
     return out
