@@ -93,6 +93,13 @@ class Effect:
         """(p,) typical sizes, in the parameters' units."""
         return np.array([parameter.typical for parameter in self.parameters])
 
+    @property
+    def unlike(self) -> float:
+        """Share of its size (`told_size`) by which its wrench may be unlike its model, where that is more than for
+        every cause.
+        """
+        return 0.0
+
     def columns(self, case: Case) -> Array:
         """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one,
         about the lab origin.
