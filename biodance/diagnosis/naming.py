@@ -246,11 +246,8 @@ def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model
     with it named.
     """
     settled = settle(found, (*found.named, NamedCause(one.effect, one.start, np.empty((0, 0)))))
-    bayes = log_bayes_factor_between(settled, found)
-    if one.effect.unlike and not can_be_named(found, settled.named[-1]):
-        settled = settle(with_unlike_causes(settled, found.tolerances), settled.named)
     possible = can_be_named(found, settled.named[-1])
-    bayes = bayes if possible else -np.inf
+    bayes = log_bayes_factor_between(settled, found) if possible else -np.inf
     return replace(one, log_bayes_factor=bayes, score=bayes + one.score - one.log_bayes_factor), settled
 
 

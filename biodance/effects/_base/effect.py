@@ -59,6 +59,9 @@ class Effect:
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
     """
+    carries: ClassVar[tuple[str, ...]] = ()
+    """Joints of the model that it moves along: where a movement placed them without it, nothing beside them is accused.
+    """
     distinguished_by: ClassVar[str] = ""
     """The parameter without which it is another, simpler cause (a load in which nothing sloshes); "" for none."""
     advice: ClassVar[str] = ""
