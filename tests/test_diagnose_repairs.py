@@ -88,3 +88,12 @@ def test_nothing_moved_in_a_body_that_exchanged_labels_placed(pair: str) -> None
 )
 def test_nothing_is_named_that_does_not_explain_it(error, diagnosis, chosen) -> None:
     assert named(error, diagnosis, chosen) == diagnosis
+
+
+def test_no_marker_is_accused_beside_a_joint_that_a_named_girdle_carries() -> None:
+    """The movement placed the shoulder on a trunk that was taken for stiff."""
+    error = JointError("right_knee", 0.007, 0.1, moved=0.04, spared="RKNE")
+    girdle = Finding("shoulder_girdle", "", (), (Alias("shoulder_girdle", "", 90.0),), 1.0)
+    told = replace(CLEAN, verdict="named, complete", findings=(girdle,))
+    assert len(named(error, told).findings) == 2
+    assert named(error._replace(joint="right_shoulder"), told) == told

@@ -86,3 +86,20 @@ def test_a_model_under_another_noise_is_the_one_that_is_built_with_it() -> None:
     built, _ = build_model(bare.problem, louder, every)
     np.testing.assert_allclose(bare.under(louder).posterior.mean, built.posterior.mean, atol=1e-4)
     assert bare.under(louder).log_likelihood == pytest.approx(built.log_likelihood, rel=1e-4)
+
+
+class Strap(Cable):
+    """A cable that says how poorly it is described."""
+
+    @property
+    def unlike(self) -> float:
+        return 0.5
+
+
+def test_a_cause_that_says_how_unlike_its_model_it_is_leaves_so_much() -> None:
+    """0.6 rad late: of 50 N, 28 are left. Of a cause known to a half that is no other size in any band or trial."""
+    some = windows(1, trials=2, hidden=lambda wrench, session, moving: wrench + 50.0 * shaken(moving.time, 0.6))
+    every = effects(("time_delay", "plate_offset")) | {"cable": Strap()}
+    (one,) = diagnose_trials(body(), some, tolerances=known(), effects=every).diagnosis.findings
+    assert one.effect == "cable"
+    assert not one.varies_with

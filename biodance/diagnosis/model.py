@@ -232,15 +232,23 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected, tolerated=own)
 
 
+def unlike(effect: Effect) -> float:
+    """Return the share of its size by which the wrench of a cause may be unlike its model: no cause is quite like it,
+    and some say that they are less so (`Effect.unlike`).
+    """
+    return max(UNLIKE, effect.unlike)
+
+
 def with_unlike_causes(found: Model, known: Tolerances) -> Model:
     """Return the model with the noise of the ``known`` tolerances and, beside it, what the named causes leave because
-    no cause is quite like its model: `UNLIKE` of what each adds to the wrench, per band. Causes that come and go have
-    a course of their own, which fits what is there.
+    no cause is quite like its model: the share `unlike` of what each adds to the wrench, per band. Causes that come and
+    go have a course of their own, which fits what is there.
     """
     band = found.problem.spectrum.band
     added = np.zeros_like(known.noise)
     for one in (one for one in found.named if not one.course):
-        rows = UNLIKE * removed(found.problem, one.effect, one.theta)[: 6 * band.size].reshape(-1, 6)
+        whole = removed(found.problem, one.effect, one.effect.told_size(one.theta))
+        rows = unlike(one.effect) * whole[: 6 * band.size].reshape(-1, 6)
         for b in range(1, len(added)):
             added[b] += rows[band == b].T @ rows[band == b] / max(1, np.sum(band == b))
     wider = with_own_noise(known, added, _body_mass(found.problem))

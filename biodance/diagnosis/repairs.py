@@ -42,8 +42,11 @@ def with_repairs(
     ``known`` and limited to ``chosen`` effects; as it is where more is wrong that nobody can name, or where markers
     carry each other's names: that body was placed by wrong ones.
     """
-    exchanged = any(one.effect == _EXCHANGED for one in diagnosis.findings)
-    found = () if exchanged else tuple(repairs(cases, known, effects(chosen)))
+    exchanged, family = any(one.effect == _EXCHANGED for one in diagnosis.findings), effects(chosen)
+    carried = frozenset(
+        joint for one in diagnosis.findings if one.effect in family for joint in family[one.effect].carries
+    )
+    found = () if exchanged else tuple(repairs(cases, known, family, carried))
     if not found or diagnosis.verdict == "unexplained":
         return diagnosis
     told = diagnosis.verdict
@@ -54,12 +57,17 @@ def with_repairs(
     return replace(diagnosis, verdict=told, findings=(*found, *rest))
 
 
-def repairs(cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Effect]) -> Iterator[Finding]:
+def repairs(
+    cases: tuple[Case, ...], known: Tolerances, family: Mapping[str, Effect], carried: frozenset[str] = frozenset()
+) -> Iterator[Finding]:
     """Yield what was put right in the body of ``cases``: a marker that has moved with how far it lies from its place
     in postures that do not follow it, a joint with how far the movement puts it from the static trial's place, if that
-    is more than it may be wrong by (the body's own warning stays).
+    is more than it may be wrong by (the body's own warning stays). Joints that a named cause has ``carried`` along were
+    placed without it, and accuse nothing.
     """
     for error in cases[0].body.joint_errors:
+        if error.joint in carried:
+            continue
         if error.spared and "marker_misplaced" in family:
             yield from _marker(family["marker_misplaced"], error, cases, known)
         elif error.contradicted and "joint_centre" in family:

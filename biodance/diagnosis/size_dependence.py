@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.candidates import removed
-from biodance.diagnosis.model import UNLIKE, Model, NamedCause
+from biodance.diagnosis.model import Model, NamedCause, unlike
 from biodance.diagnosis.naming import cause_key
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import absorbed
@@ -39,7 +39,7 @@ class SizeDependence:
     """Dependence of a named cause's size on something: ``cause`` (effect, target), ``over`` the variable, ``share`` the
     relative change of the size (for twice the load, 0.1 m of place, the whole time; in one channel, band or trial),
     ``z`` its distance from zero in standard deviations. These include the model error of the cause
-    (`Tolerances.model_error`).
+    (`Tolerances.model_error`), and by how much its wrench is `unlike` its model.
     """
 
     cause: tuple[str, str]
@@ -81,18 +81,19 @@ def _of_one(found: Model, named: NamedCause) -> Iterator[SizeDependence]:
     s, alone = Z.T @ found.posterior.residual, np.sum(Z**2, axis=0) - np.sum(half**2, axis=0)
     other = s + _lost_to_errors(found, named, over)
     s = np.where(s * other > 0, np.where(np.abs(s) < np.abs(other), s, other), 0.0)
-    unlike = max(UNLIKE, found.tolerances.model_error(named.effect.name))
+    poor = max(unlike(named.effect), found.tolerances.model_error(named.effect.name))
     least = _SAME * float(np.sum(Z**2, axis=0).max())
     seen = alone - np.sum(absorbed(found, Z, half) ** 2, axis=0)
     for name, score, own in zip(over, s, seen, strict=True):
         if own > least:
-            share, sd = float(score / own), float(np.hypot(own**-0.5, unlike))
+            share, sd = float(score / own), float(np.hypot(own**-0.5, poor))
             yield SizeDependence(cause_key(named), name, share, share / sd)
 
 
 def _traces(put: Problem, named: NamedCause) -> Iterator[tuple[str, Array]]:
     """Yield what the cause would have added (r,), had its size grown with something, and with what."""
-    whole = tuple(named.effect.removed(case, named.theta) for case in put.cases)
+    size = named.effect.told_size(named.theta)
+    whole = tuple(named.effect.removed(case, size) for case in put.cases)
     for name, signals in _signals(put).items():
         samples = tuple((part * signal[:, None])[:, :, None] for part, signal in zip(whole, signals, strict=True))
         yield name, put.padded(put.spectrum.rows(samples)[:, :, 0])

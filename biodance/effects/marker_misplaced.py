@@ -58,6 +58,13 @@ class MarkerMisplaced(Effect):
             else -case.geometry.marker_changes.residual[..., own]
         )
 
+    @property
+    def unlike(self) -> float:
+        """How far the wrench of a posture that a marker pulls along is from its derivative; learned where sizes were
+        inferred from all rows (docs/decisions/2026-11-22-sizes-as-shown.md).
+        """
+        return 0.46
+
     def measured(self, theta: Array, *cases: Case) -> Array:
         """Return the place (3,) m of the marker beside the one in the model, upright, over postures tracked without it:
         a posture that follows the marker hides half of how far it has moved. What goes with the joints beside its

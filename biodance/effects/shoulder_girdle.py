@@ -34,6 +34,7 @@ class ShoulderGirdle(MissingJoint):
     )
     separated_by = "Shrugging alone, with hanging arms."
     advice = "Accept a body with collar bones; keep the shoulder markers on the acromion, not on the deltoid."
+    carries = ("right_shoulder", "left_shoulder")
     natural = 0.058
     """Root mean square of thirty virtual sessions (0.033 to 0.08), whose collar bones follow the arms."""
 

@@ -59,6 +59,9 @@ class Effect:
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
     """
+    carries: ClassVar[tuple[str, ...]] = ()
+    """Joints of the model that it moves along: where a movement placed them without it, nothing beside them is accused.
+    """
     distinguished_by: ClassVar[str] = ""
     """The parameter without which it is another, simpler cause (a load in which nothing sloshes); "" for none."""
     advice: ClassVar[str] = ""
@@ -92,6 +95,13 @@ class Effect:
     def typical(self) -> Array:
         """(p,) typical sizes, in the parameters' units."""
         return np.array([parameter.typical for parameter in self.parameters])
+
+    @property
+    def unlike(self) -> float:
+        """Share of its size (`told_size`) by which its wrench may be unlike its model, where that is more than for
+        every cause.
+        """
+        return 0.0
 
     def columns(self, case: Case) -> Array:
         """Return (T, 6, p): what one unit of each parameter adds to the measured wrench minus the predicted one,

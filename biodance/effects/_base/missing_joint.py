@@ -88,6 +88,13 @@ class MissingJoint(Effect, ABC):
         """Return the angle alone."""
         return np.array([theta[0], 0.0])
 
+    @property
+    def unlike(self) -> float:
+        """How much more or less than the angle shown the wrench may show: so poorly is it known where the joint lies
+        and what hangs on it, and so unlike may the wrench be in one trial, band or channel as in all of them.
+        """
+        return float(self.typical[1] / self.typical[0])
+
     def possible(self, theta: Array) -> bool:
         """Return whether markers and wrench show a movement the same way: the joint turns by the sum of both."""
         return bool(theta.sum() > 0)
