@@ -49,7 +49,6 @@ CAUSES = (
 UNTOLD = (
     "head_joint:angle=0.25",  # the body has a neck where its markers show one, so that no joint is missing
     "joint_centre:target=right_shoulder,shift=0;0;0.07",
-    "shoulder_girdle:angle=0.25",
 )
 """What half a minute of this movement does not tell (a body explains most of it): these must not name another cause.
 Whoever makes one of them nameable takes it out of here.
