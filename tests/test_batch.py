@@ -193,6 +193,9 @@ def test_what_moved_stands_beside_each_trial() -> None:
     assert (walk["speed_m_per_s"], walk["knee_flexion_max_deg"], walk["hip_flexion_max_deg"]) == (1.2, 64.0, None)
     assert "gait_cycles" not in static
     assert set(walk) <= set(ROW_TYPES)
+    assert walk["verdict"] == "not judged"
+    judged = {"verdict": "unexplained", "doubt": "standing alone tells no cause"}
+    assert {row["verdict"] for row in rows_of(document | {"diagnosis": judged})} == {"cannot tell"}
 
 
 def test_what_stands_out_is_measured_by_the_archive_itself() -> None:

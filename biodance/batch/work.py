@@ -238,7 +238,7 @@ def rows_of(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
     moved = {one["trial"]: one for one in (document["movement"] or {"trials": ()})["trials"]}
     mass, diagnosis = document["mass_check"] or {}, document["diagnosis"] or {}
     shared = {
-        "verdict": diagnosis.get("verdict") or "not judged",
+        "verdict": "cannot tell" if diagnosis.get("doubt") else diagnosis.get("verdict") or "not judged",
         "findings": "; ".join(f"{one['effect']} {one['target']}".strip() for one in diagnosis.get("findings", ())),
         "first": document["attention"][0]["text"] if document["attention"] else "",
         "declared_mass_kg": document["subject"]["mass_kg"],
