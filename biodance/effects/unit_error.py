@@ -61,7 +61,11 @@ class UnitError(DiscreteEffect):
                 said = f"The plates carry {middle:.4g} times the declared weight: {meaning}."
                 return (QualityCheck("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
         return (
-            QualityCheck("weight on the plates", True, f"No unit is mistaken: the middle load of all trials is {middle:.2f} of the declared weight."),
+            QualityCheck(
+                "weight on the plates",
+                True,
+                f"No unit is mistaken: the middle load of all trials is {middle:.2f} of the declared weight.",
+            ),
         )
 
 

@@ -114,8 +114,8 @@ def _masses(found: Identification | None) -> list[dict[str, Any]] | None:
 
 
 def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
-    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen); ``doubt`` is
-    why nothing can be told, "" where it can.
+    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen); ``doubt``
+    is why nothing can be told, "" where it can.
     """
     one = found.diagnosis
     return {
