@@ -70,6 +70,7 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float |
         motion = fit.motion.at(pick)
         weight, wrong = _weighed(body, motion, noise.at(fit.motion.rate))
         plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
+        del wrong  # a tenth of what a long run keeps
         scores += transpose(sources, Response.of(whole, motion), weight).T
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = softness(body, fits, noise.bands) if softer is None else softer
