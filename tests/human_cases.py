@@ -53,3 +53,10 @@ def human_case(frames: int = 300) -> Case:
     skin = rng.normal(0, 0.004, (2, xyz.shape[1], 3))
     xyz = xyz + skin[0] + skin[1] * np.sin(2 * np.pi * 0.4 * time)[:, None, None]
     return case_of(body, Markers(body.markers.names, time, xyz), rng)
+
+
+def with_tilted(body: Body, joint: str, degrees: float) -> Body:
+    """Return the body with one joint, ``right_knee``, that stood so far off its axes in the static trial."""
+    at = next(i for i, one in enumerate(body.joints) if one.name.startswith(f"{joint}_"))
+    off = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+    return replace(body, joints=(*body.joints[:at], replace(body.joints[at], rotation=off), *body.joints[at + 1 :]))

@@ -30,7 +30,6 @@ _ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
 TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
 """deg: larger constant tilts of a joint point to a misplaced marker."""
-_STANDS = "Warning: {} {} stands"
 LENGTH_RATIO = {
     "thigh": (0.19, 0.29),
     "shank": (0.19, 0.29),
@@ -246,8 +245,14 @@ def chain_angles(relative: Array, axes: Array) -> Array:
 
 def tilted_joints(body: Body) -> tuple[str, ...]:
     """Return the hinges of a ``body`` that stand away from their axes (`TILT`) in the static trial: ``left_elbow``."""
-    every = [(side, joint) for side in SIDES for joint in TILT]
-    return tuple("_".join(one) for one in every if any(n.startswith(_STANDS.format(*one)) for n in body.notes))
+    first = {joint.name.rsplit("_", 1)[0]: joint.rotation for joint in reversed(body.joints)}
+    hinges = ((f"{side}_{joint}", most) for side in SIDES for joint, most in TILT.items())
+    return tuple(name for name, most in hinges if name in first and _tilt(first[name]) > most)
+
+
+def _tilt(rotation: Array) -> float:
+    """Return the angle of a ``rotation`` (3, 3), deg."""
+    return float(np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0))))
 
 
 def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
@@ -268,10 +273,10 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
                 f"Warning: the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}: check the markers."
             )
     for joint, rotation in skeleton.turns.items():
-        tilt = np.degrees(np.arccos((np.trace(rotation) - 1) / 2))
+        tilt = _tilt(rotation)
         if tilt > TILT[joint.split("_")[1]]:
             notes.append(
-                f"{_STANDS.format(*joint.split('_'))} {tilt:.0f} degrees away from its axes: check the markers beside "
-                f"it and the wand above it."
+                f"Warning: {joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes: check the markers "
+                f"beside it and the wand above it."
             )
     return notes
