@@ -214,6 +214,9 @@ _STANDING = f"simulate --protocol standing {_WHO} --out x"
         ("dance --urdf pipe --feet a,b --out x", "pipe: is a pipe"),
         ("feedback empty --out x.html", "empty: is not a dance"),
         ("foresee pipe", "pipe: is a pipe"),
+        ("foresee pipe --out page", "page: a page is one file that ends in .html. Choose --out page.html."),
+        ("foresee pipe --out a.html", "a.html: is a folder; one file is written"),
+        ("foresee pipe --out a.html --force", "a.html: is a folder; one file is written"),
         ("plates loop --out x", "loop: is no folder"),
         ("batch loop --out x", "loop: is no folder"),
         ("batch static --limit nan --out x", "--limit nan"),
@@ -223,6 +226,7 @@ def test_a_wrong_call_is_one_sentence(words, says, tmp_path, capsys, monkeypatch
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").touch()
     (tmp_path / "static").mkdir()
+    (tmp_path / "a.html").mkdir()
     shutil.copy(session / "static.c3d", tmp_path / "static")
     shutil.copytree(tmp_path / "static", tmp_path / "skipped")
     (tmp_path / "skipped" / "session.toml").write_text('[trials."*"]\nrole = "skip"\n')

@@ -78,6 +78,8 @@ def test_the_command_writes_one_file_and_overwrites_none(
     assert out.stat().st_size < 12_000_000
     assert run(["feedback", str(tmp_path / "dance.npz"), "--out", str(out)]) == 2
     assert "is not overwritten" in capsys.readouterr().err
+    assert run(["feedback", str(tmp_path), "--out", str(tmp_path / "page")]) == 2
+    assert "a page is one file that ends in .html" in capsys.readouterr().err
     with pytest.raises(BiodanceError, match="there is no such folder"):
         write_feedback(dance, tmp_path / "nowhere" / "page.html")
 

@@ -43,7 +43,7 @@ def foresee_command(
     """
     from biodance.pipeline.dance_result import foresee_dance
     from biodance.report.documents.diagnosis import foresight_document
-    from biodance.report.files import refuse_page
+    from biodance.report.files import refuse_page, write_files
     from biodance.report.pages.foresight import foresight_page
     from biodance.report.terminal import print_foresight
 
@@ -55,7 +55,7 @@ def foresee_command(
         document = foresight_document(found, seated=seated)
         if out is not None:
             page = foresight_page(document, f"the dance “{protocol}”" if protocol else "the dance")
-            out.write_text(page, encoding="utf-8", newline="\n")
+            write_files(out.parent, {out.name: page})
     show(document, print_foresight, json=json)
     return DONE
 

@@ -179,10 +179,10 @@ def export_command(
     """
     from biodance.pipeline.export import FOLDERS, replaceable
     from biodance.pipeline.export import export as write
-    from biodance.report.files import refuse_page
+    from biodance.report.files import refuse_file
 
     if format not in FOLDERS:
-        refuse_page(out, force=force)
+        refuse_file(out, force=force)
     with progress() as tell, replaceable(out, force=force) as place:
         _, sentence = write(
             source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell

@@ -7,7 +7,16 @@ from biodance.errors import BiodanceError
 
 
 def refuse_page(path: Path, *, force: bool) -> None:
-    """Raise BiodanceError where ``path`` exists and ``force`` was not given, or its folder is missing."""
+    """Raise BiodanceError where ``path`` does not end in .html, or as `refuse_file`."""
+    if path.suffix.lower() != ".html":
+        raise BiodanceError(f"{path}: a page is one file that ends in .html. Choose --out {path}.html.")
+    refuse_file(path, force=force)
+
+
+def refuse_file(path: Path, *, force: bool) -> None:
+    """Raise BiodanceError where ``path`` is a folder, exists and ``force`` was not given, or its folder is missing."""
+    if path.is_dir():
+        raise BiodanceError(f"{path}: is a folder; one file is written. Choose another --out.")
     if path.exists() and not force:
         raise BiodanceError(f"{path}: exists already and is not overwritten. Choose another --out, or --force.")
     refuse_missing_folder(path)

@@ -210,8 +210,8 @@ def write_feedback(dance: Dance, path: Path, *, force: bool = False) -> bool:
     Raises
     ------
     BiodanceError
-        There is a file of that name and ``force`` was not given, the folder is missing, the dance is that of a robot
-        without solids, or the drawing library is missing.
+        The name does not end in .html, there is a file of that name and ``force`` was not given, the folder is missing,
+        the dance is that of a robot without solids, or the drawing library is missing.
     """
     refuse_page(path, force=force)
     scene, carried = scene_of(dance), bundle()
