@@ -3,6 +3,7 @@ without.
 """
 
 import importlib
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -126,6 +127,21 @@ def test_a_known_factor_is_named(factor: float) -> None:
 @pytest.mark.parametrize("share", [0.5, 0.7, 1.04, 1.2])
 def test_a_foot_beside_the_plate_is_no_unit(share: float) -> None:
     assert failed(discrete_effects()["unit_error"].check(recorded(share * standing(np.random.default_rng(2))))) == []
+
+
+def test_the_share_of_the_weight_is_told_with_its_trials() -> None:
+    """Of three trials a walk with 0.94 of the weight: no median that belongs to nobody, beside a standing of 1.00."""
+    stand = recorded(standing(np.random.default_rng(3))).session
+    walk, late = (
+        replace(recorded(share * standing(np.random.default_rng(4))).session.trials[0], name=name)
+        for name, share in (("walk", 0.94), ("late", 0.97))
+    )
+    (told,) = discrete_effects()["unit_error"].check(Recorded(replace(stand, trials=(*stand.trials, walk, late))))
+    assert told.ok
+    assert re.search(r"carry 0\.94\d? \(walk\) to (?:1|0\.99\d|1\.0\d) \(stand\) times the declared weight", told.text)
+    assert "while loaded" in told.text
+    (alone,) = discrete_effects()["unit_error"].check(Recorded(stand))
+    assert re.search(r"carry \S+ \(stand\) times the declared weight", alone.text)
 
 
 def test_what_the_reader_overruled_is_told() -> None:

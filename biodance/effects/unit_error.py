@@ -52,21 +52,23 @@ class UnitError(DiscreteEffect):
         mass = recorded.session.subject.mass
         if not mass > 0 or "mass" in recorded.session.subject.guessed:
             return ()
-        ratios = [ratio for trial in recorded.session.trials if (ratio := weight_ratio(trial, mass)) is not None]
+        found = ((trial.name, weight_ratio(trial, mass)) for trial in recorded.session.trials)
+        ratios = {name: ratio for name, ratio in found if ratio is not None}
         if not ratios:
             return ()
-        middle = float(np.median(ratios))
+        middle, carried = float(np.median(list(ratios.values()))), _carried(ratios)
         for factor, meaning in FACTORS.items():
             if abs(middle / factor - 1) < _NEAR:
-                said = f"The plates carry {middle:.4g} times the declared weight: {meaning}."
+                said = f"{carried}: {meaning}."
                 return (QualityCheck("weight on the plates", False, said, cls.name, "", factor, "factor", "1"),)
-        return (
-            QualityCheck(
-                "weight on the plates",
-                True,
-                f"No unit is mistaken: the middle load of all trials is {middle:.2f} of the declared weight.",
-            ),
-        )
+        return (QualityCheck("weight on the plates", True, f"{carried}: no unit is mistaken."),)
+
+
+def _carried(ratios: dict[str, float]) -> str:
+    """Return what the plates carry of the declared weight, and in which trials least and most."""
+    ends = dict.fromkeys((min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)))
+    words = " to ".join(f"{float(f'{ratios[name]:.3g}'):g} ({name})" for name in ends)
+    return f"The plates carry {words} times the declared weight (median of a trial while loaded, movement included)"
 
 
 def weight_ratio(trial: Trial, mass: float) -> float | None:
