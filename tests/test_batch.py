@@ -62,6 +62,13 @@ def test_a_session_inside_another_one_keeps_its_results(tmp_path: Path) -> None:
     assert 'href="sessions' not in (tmp_path / "out" / "report.html").read_text(), "no page was drawn"
 
 
+def test_a_session_that_lies_elsewhere_is_called_as_its_link(tmp_path: Path) -> None:
+    archive, far = archive_of(tmp_path / "a", 1), archive_of(tmp_path / "far", 1)
+    (archive / "linked").symlink_to(far / "s0", target_is_directory=True)
+    found = run_batch(archive, tmp_path / "out", workers=1, work=batch_work.count, pages=False)
+    assert [one.name for one in found.outcomes] == ["linked", "s0"]
+
+
 def test_a_session_that_kills_its_process_takes_nobody_along(tmp_path: Path) -> None:
     archive = archive_of(tmp_path / "a", 5)
     found = run_batch(archive, tmp_path / "out", workers=2, work=batch_work.die_in_s2)

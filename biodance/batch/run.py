@@ -235,7 +235,7 @@ def _work_off(
 
 def _name(session: Path, archive: Path) -> str:
     """Return the name of a session: its folder below the archive, that of the archive where it is one session."""
-    below = session.resolve().relative_to(archive.resolve())
+    below = session.relative_to(archive)  # as it is called there, also where it is a link to another disk
     return below.as_posix() if below.parts else archive.resolve().name
 
 
