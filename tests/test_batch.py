@@ -201,8 +201,25 @@ def test_what_moved_stands_beside_each_trial() -> None:
     assert "gait_cycles" not in static
     assert set(walk) <= set(ROW_TYPES)
     assert walk["verdict"] == "not judged"
-    judged = {"verdict": "unexplained", "doubt": "standing alone tells no cause"}
-    assert {row["verdict"] for row in rows_of(document | {"diagnosis": judged})} == {"cannot tell"}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "doubt", "findings", "told"),
+    [
+        (3.0, "", [], "unexplained"),
+        (3.0, "standing alone tells no cause", [], "cannot tell"),
+        (0.0, "", [], "not judged"),
+        (0.0, "", [{"effect": "clipping", "target": "Fz"}], "unexplained"),
+    ],
+)
+def test_plates_alone_have_no_verdict(seconds: float, doubt: str, findings: list, told: str) -> None:
+    trial = dict.fromkeys(("name", "role", "status", "reason", "frames", "rate_hz", "gaps_percent", "wrench"))
+    trial |= {"marker_rms_m": None, "marker_max_m": None, "warnings": []}
+    judged = [{"trial": "stand", "seconds": seconds, "why_not": None if seconds else "it has no markers"}]
+    diagnosis = {"verdict": "unexplained", "doubt": doubt, "findings": findings, "judged": judged}
+    document = {"mass_check": None, "diagnosis": diagnosis, "attention": [], "subject": {"mass_kg": 60.0}}
+    (row,) = rows_of(document | {"refused": {}, "trials": [trial], "movement": None})
+    assert row["verdict"] == told
 
 
 def test_what_stands_out_is_measured_by_the_archive_itself() -> None:

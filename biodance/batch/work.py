@@ -238,7 +238,7 @@ def rows_of(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
     moved = {one["trial"]: one for one in (document["movement"] or {"trials": ()})["trials"]}
     mass, diagnosis = document["mass_check"] or {}, document["diagnosis"] or {}
     shared = {
-        "verdict": "cannot tell" if diagnosis.get("doubt") else diagnosis.get("verdict") or "not judged",
+        "verdict": _verdict(diagnosis),
         "findings": "; ".join(f"{one['effect']} {one['target']}".strip() for one in diagnosis.get("findings", ())),
         "first": document["attention"][0]["text"] if document["attention"] else "",
         "declared_mass_kg": document["subject"]["mass_kg"],
@@ -260,6 +260,15 @@ def rows_of(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         {"trial": name, "status": "refused", "reason": why, **shared} for name, why in document["refused"].items()
     )
     return (*rows, *refused)
+
+
+def _verdict(diagnosis: dict[str, Any]) -> str:
+    """Return the verdict on a session: "not judged" where nothing was named and no second could be compared, as with
+    plates alone, "cannot tell" where evidence is short.
+    """
+    if not diagnosis or not (diagnosis["findings"] or any(row["seconds"] > 0 for row in diagnosis["judged"])):
+        return "not judged"
+    return "cannot tell" if diagnosis["doubt"] else str(diagnosis["verdict"])
 
 
 def _vertical(wrench: dict[str, Any] | None, body: str) -> float | None:
