@@ -1,6 +1,7 @@
 """The page that follows: what a dance tells is the same in Python and in the browser; who is not seen is told so."""
 
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,16 @@ def test_the_bundle_is_that_of_the_lock_file() -> None:
     for line in lines:
         digest, name = line.split()
         assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest, f"{name}: run make clean bundle"
+
+
+def test_what_only_tests_need_is_shipped_with_nothing() -> None:
+    """axe-core (MPL-2.0) is asked about the pages, and is in none of them."""
+    lock = json.loads((SUMS.parent / "package-lock.json").read_text())
+    tools = {name.removeprefix("node_modules/"): one for name, one in lock["packages"].items() if one.get("dev")}
+    assert {name: one["license"] for name, one in tools.items()} == {"axe-core": "MPL-2.0"}
+    assert not set(tools) & set(lock["packages"][""]["dependencies"])
+    for path in (Path(write.__file__).parent / "bundle").glob("*") if BUILT else ():
+        assert b"axe-core" not in path.read_bytes(), path.name
 
 
 def test_without_the_bundle_the_page_leads_and_asks_for_nothing(

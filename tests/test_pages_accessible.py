@@ -1,0 +1,149 @@
+"""Every page that is written, asked by axe-core on a desk and on a phone: no violation, and nothing wider than the
+screen. axe-core comes with the tools that build the bundle (web/package-lock.json) and is shipped with nothing.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browser import BROWSER, Page
+from example_results import html_of, refused_session
+from hidden_faults import hidden
+from identified_sessions import session_result
+from plate_archives import Step, draw
+from small_dances import small_dance
+
+import biodance
+from biodance.batch.summary import write_summary
+from biodance.batch.work import Outcome, rows_of
+from biodance.cli import run
+from biodance.cli.app import NOT_DONE
+from biodance.dance.problem.plan import read_plan
+from biodance.diagnosis.archive.judge import judge
+from biodance.lab.session.read import read_session
+from biodance.pipeline.dance_result import DanceResult
+from biodance.pipeline.for_subject import account_for
+from biodance.pipeline.plates import PlatesJudged
+from biodance.pipeline.session import examine
+from biodance.report.documents.plates import plates_document
+from biodance.report.feedback.write import write_feedback
+from biodance.report.pages.dance import cards_page
+from biodance.report.pages.plates import plates_page
+from biodance.report.pages.subject import subject_page
+from biodance.report.write import write_diagnosis, write_report
+
+AXE = Path(__file__).parents[1] / "web" / "node_modules" / "axe-core" / "axe.min.js"
+pytestmark = pytest.mark.skipif(
+    not (BROWSER and AXE.is_file()), reason="no Chromium, or `make bundle` could not reach npm for axe-core"
+)
+SCREENS = {1280: 900, 390: 844}
+"""Width and height in CSS pixels: a desk and a phone."""
+NAMES = ("report", "diagnose", "refused", "subject", "subject without numbers")
+NAMES += ("cards", "foresee", "feedback", "group", "plates")
+_VIOLATIONS = """axe.run().then(found => found.violations.map(
+  one => `${one.id}: ${one.help}, ${one.nodes.length} times, first ${one.nodes[0].html.slice(0, 150)}`))"""
+_WIDER = """(width => [...document.querySelectorAll('html, body *')].filter(one => one.getClientRects().length
+  && Math.max(one.getBoundingClientRect().right, one.tagName === 'HTML' && one.scrollWidth) > width + 1).map(
+  one => `wider than ${width} px: ${one.outerHTML.slice(0, 150)}`).slice(0, 5))"""
+
+
+def complaints(browser: Page, page: Path) -> list[str]:
+    """Return what axe-core finds on a page with all its parts unfolded, and what is wider than a screen."""
+    browser.open(page.as_uri())
+    browser.run("document.querySelectorAll('details').forEach(one => one.open = true)")
+    browser.run(f"{AXE.read_text(encoding='utf-8')};0")
+    found = []
+    for width, height in SCREENS.items():
+        browser.send(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
+        found += [f"{width} px: {one}" for one in browser.run(_VIOLATIONS) + browser.run(f"{_WIDER}({width})")]
+    return found
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Page]:
+    with Page("about:blank#begin") as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return every page, by name."""
+    folder = tmp_path_factory.mktemp("pages")
+    return _of_a_session(folder) | _of_a_dance(folder) | _of_archives(folder)
+
+
+def _of_a_session(folder: Path) -> dict[str, Path]:
+    """Return the pages of a session with a fault beside another one of the same person, of the person with and without
+    numbers, and of a session in which nothing could be done.
+    """
+    before = biodance.identify(hidden(folder / "S02", visit=1, trials=("static", "move_1")))
+    now = hidden(folder / "S01", "plate_gain:target=Fz,gain=0.06", trials=("static", "move_1", "squat_1"))
+    result = examine(read_session(now), reference=before)
+    found, moved = biodance.diagnose(result, reference=before), biodance.describe_movement(result)
+    for name in ("report", "diagnose"):
+        (folder / name).mkdir()
+    write_report(result, folder / "report", diagnosis=found, movement=moved)
+    write_diagnosis(result, found, folder / "diagnose", accepted=False, movement=moved)
+    pages = {name: folder / name / "report.html" for name in ("report", "diagnose")}
+    for name, text in (
+        ("refused", html_of(refused_session())),
+        ("subject", subject_page(account_for(session_result()))),
+        ("subject without numbers", subject_page(account_for(result, found))),
+    ):
+        pages[name] = folder / f"{name}.html"
+        pages[name].write_text(text, encoding="utf-8")
+    return pages
+
+
+def _of_a_dance(folder: Path) -> dict[str, Path]:
+    dance = small_dance()
+    dance.save(folder / "dance.npz")
+    found = {name: folder / f"{name}.html" for name in ("foresee", "feedback", "cards")}
+    assert run(["foresee", str(folder / "dance.npz"), "--out", str(found["foresee"])]) != NOT_DONE
+    write_feedback(dance, found["feedback"])
+    result = DanceResult(dance.body, read_plan("short"), dance, (), None, None, "", (), 1.0)
+    found["cards"].write_text(cards_page(result), encoding="utf-8")
+    return found
+
+
+def _of_archives(folder: Path) -> dict[str, Path]:
+    """Return the pages of nine sessions, one of which weighs more, with a refused one, and of plates that moved."""
+    rows = rows_of(json.loads((folder / "report" / "results.json").read_text(encoding="utf-8")))
+    away = [{"mass_difference_percent": 20.0 if k == 4 else 0.1 * k} for k in range(9)]
+    sessions = [Outcome(f"s{k}", "0", "done", "", tuple(row | one for row in rows)) for k, one in enumerate(away)]
+    lost = Outcome(
+        "a_session_with_a_rather_long_name" * 2, "0", "refused", f"/a_long_path{'/with_folders' * 9}: empty."
+    )
+    (folder / "group").mkdir()
+    write_summary(folder / "group", "archive", [*sessions, lost])
+    evidence = draw(5, visits=13, step=Step("plate2", "place_y", 0.005, 8))
+    moved = PlatesJudged(folder, judge(evidence), evidence, {"V99": "is no recording."}, ("A date was guessed.",))
+    (folder / "plates.html").write_text(plates_page(moved, plates_document(moved)), encoding="utf-8")
+    return {"group": folder / "group" / "report.html", "plates": folder / "plates.html"}
+
+
+def test_the_pages_hold_what_is_to_be_asked(pages: dict[str, Path]) -> None:
+    text = {name: page.read_text(encoding="utf-8") for name, page in pages.items()}
+    assert set(text) == set(NAMES)
+    for part in ("replay", "changes", "movement", "predicts", "checks", "standing", "trials"):
+        assert f'<section id="{part}">' in text["report"]
+    assert "plate gain" in text["diagnose"]
+    assert " kg" in text["subject"]
+    assert " kg" not in text["subject without numbers"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nobody_is_shut_out_of_a_page(browser: Page, pages: dict[str, Path], name: str) -> None:
+    assert complaints(browser, pages[name]) == []
+
+
+def test_what_is_wrong_with_a_page_is_found(browser: Page, tmp_path: Path) -> None:
+    page = tmp_path / "wrong.html"
+    page.write_text('<!doctype html><title>t</title><p style="width:500px;color:#ddd">pale</p><img src="data:,">')
+    found = complaints(browser, page)
+    assert {one.split(":")[1].strip() for one in found} >= {"color-contrast", "image-alt", "html-has-lang"}
+    assert [one for one in found if "wider than 390 px" in one]
+    assert not [one for one in found if "wider than 1280 px" in one]
