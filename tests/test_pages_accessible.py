@@ -48,11 +48,15 @@ _WIDER = """(width => [...document.querySelectorAll('html, body *')].filter(one 
   one => `wider than ${width} px: ${one.outerHTML.slice(0, 150)}`).slice(0, 5))"""
 
 
-def complaints(browser: Page, page: Path) -> list[str]:
-    """Return what axe-core finds on a page with all its parts unfolded, and what is wider than a screen."""
+def unfold(browser: Page, page: Path) -> None:
+    """Load a page with all its parts unfolded."""
     browser.open(page.as_uri())
     browser.run("document.querySelectorAll('details').forEach(one => one.open = true)")
     browser.run(f"{AXE.read_text(encoding='utf-8')};0")
+
+
+def complaints(browser: Page) -> list[str]:
+    """Return what axe-core finds on the page that is loaded, and what is wider than a screen."""
     found = []
     for width, height in SCREENS.items():
         browser.send(
@@ -137,13 +141,31 @@ def test_the_pages_hold_what_is_to_be_asked(pages: dict[str, Path]) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nobody_is_shut_out_of_a_page(browser: Page, pages: dict[str, Path], name: str) -> None:
-    assert complaints(browser, pages[name]) == []
+    unfold(browser, pages[name])
+    assert complaints(browser) == []
+
+
+def test_without_webgl_the_replay_says_so_and_the_time_still_runs(pages: dict[str, Path]) -> None:
+    parts = "[...document.querySelectorAll('.replay [data-part]')].filter(one => one.checkVisibility())"
+    time = "document.querySelector('[data-part=time]')"
+    with Page("about:blank#begin") as browser:
+        without = "HTMLCanvasElement.prototype.getContext = () => null"
+        browser.send("Page.addScriptToEvaluateOnNewDocument", source=without)
+        unfold(browser, pages["report"])
+        browser.run("document.getElementById('replay').scrollIntoView()")
+        browser.until(f"{parts}.some(one => one.dataset.part === 'undrawn')", 10.0)
+        shown = set(browser.run(f"{parts}.map(one => one.dataset.part)"))
+        assert shown == {"undrawn", "play", "time", "said", "trial", "worst", "speed"}
+        browser.run(f"{time}.value = 1; {time}.dispatchEvent(new Event('input'))")
+        assert browser.run("document.querySelector('[data-part=said]').textContent").startswith("1.00 s")
+        assert complaints(browser) == []
 
 
 def test_what_is_wrong_with_a_page_is_found(browser: Page, tmp_path: Path) -> None:
     page = tmp_path / "wrong.html"
     page.write_text('<!doctype html><title>t</title><p style="width:500px;color:#ddd">pale</p><img src="data:,">')
-    found = complaints(browser, page)
+    unfold(browser, page)
+    found = complaints(browser)
     assert {one.split(":")[1].strip() for one in found} >= {"color-contrast", "image-alt", "html-has-lang"}
     assert [one for one in found if "wider than 390 px" in one]
     assert not [one for one in found if "wider than 1280 px" in one]

@@ -136,7 +136,7 @@
       load.position.add(place(frame, data.load.on, share));
     }
     const size = force(frame, 2, 1), word = part("said");
-    word.textContent = `${second.toFixed(2)} s` + (size ? ` \u00b7 left: ${size.length().toFixed(0)} N` : "");
+    word.textContent = `${second.toFixed(2)} s` + (size ? ` \u00b7 residual ${size.length().toFixed(0)} N` : "");
     part("time").value = second;
     part("time").setAttribute("aria-valuetext", word.textContent);
     if (!renderer) return;
@@ -226,7 +226,10 @@
     try {
       renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: true, preserveDrawingBuffer: true });
     } catch (error) {
-      part("said").textContent = "This browser cannot draw in 3-D; the drawing above shows the worst frame.";
+      const drawn = ["scene", "front", "side", "top", "legend"].map(part);
+      drawn.push(...["solids", "markers", "forces"].map((name) => part(name).closest("label")));
+      for (const one of drawn) one.hidden = true;
+      part("undrawn").hidden = false;
       return;
     }
     draw();
