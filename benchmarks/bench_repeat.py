@@ -1,7 +1,7 @@
 """Are the three transitions that the page proposes worth more than three others? A dance danced by imprecise people,
 who then repeat what is proposed for them, and three transitions drawn by chance.
 
-    OMP_NUM_THREADS=1 python benchmarks/bench_repeat.py DANCE.npz [PERFORMERS]
+    OMP_NUM_THREADS=1 python benchmarks/bench_repeat.py DANCE.npz [PERFORMERS [FIRST]]
 
 Gain: by how much the share of the table's variance removed grows, mean over the segments, of the repetition as it is
 danced (other errors, other tempo). Every performer draws five triples; the first is the one that is compared.
@@ -46,8 +46,8 @@ def _share(plan: PlannedDance, known: Worth) -> Array:
     return shares(posterior_after(plan.dance.body, known.H, known.disturbed))
 
 
-def main(path: str, performers: str = "20") -> None:
-    """Print a row a performer and how many gain more from what is proposed."""
+def main(path: str, performers: str = "20", first: str = "0") -> None:
+    """Print a row a performer, from number ``first`` on, and how many gain more from what is proposed."""
     dance = Dance.load(Path(path))
     plan, body = PlannedDance(dance), dance.body
     noise = typical_noise(predict_wrench(body, dance.motion(12.5)))
@@ -58,7 +58,7 @@ def main(path: str, performers: str = "20") -> None:
     ]
     better = mean_better = 0
     print("| performer | proposed | gain, % | three by chance, % | mean of five triples, % |\n|" + "---|" * 5)
-    for k in range(int(performers)):
+    for k in range(int(first), int(first) + int(performers)):
         motion = danced(plan, 0.0, dance.duration, [0, k])
         found = score_performance(dance, body, ((motion, np.ones(motion.time.size, dtype=bool)),))
         known, rng = worth_of(body, motion, noise=noise), np.random.default_rng([1, k])
