@@ -77,6 +77,11 @@ def test_a_load_is_found_against_the_unloaded_session():
     assert changes["left_forearm_hand", "mass"].interval[0] > 0
     text = identification_section(compared)
     assert "What changed since session S01" in text
+    alone = "The added mass above stands all the same"
+    assert alone not in text
+    vague = replace(compared, changes=tuple(replace(row, p=1.0) for row in compared.changes))
+    assert alone in identification_section(vague)
+    assert alone not in identification_section(replace(vague, search=bare.identification.search))
     assert any("kg more than the identified body" in note for note in compared.notes)
     assert not any("than the identified body" in note for note in bare.identification.notes)
     assert search.found
