@@ -37,6 +37,7 @@ class Page:
         )
         os.close(ours[0])
         os.close(theirs[1])
+        self.process = self._process.pid
         self._out, self._in, self._rest, self._number = ours[1], theirs[0], b"", 0
         self.events: list[dict[str, Any]] = []
         self._session: str | None = None
