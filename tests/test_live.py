@@ -8,6 +8,8 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
+from accessible import ASKED, complaints, unfold
+from browser import Page
 
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON, NOT_DONE
@@ -148,6 +150,17 @@ def test_the_page_shows_the_newest_state_to_this_machine_alone():
             refused.value.close()
         with pytest.raises(BiodanceError, match="Give another one"):
             LivePage(int(page.address.rsplit(":", 1)[1].strip("/")))
+
+
+@ASKED
+def test_nobody_is_shut_out_of_the_page():
+    state = LiveState(3.0, {"left_thigh": "known", "pelvis": "partly known"}, ("Plate 1 fell silent.",), "Mend it.")
+    with LivePage() as page, Page("about:blank#begin") as browser:
+        page.show(state)
+        page.warn(LiveWarning(2.5, "plate_gone", "plate1", "Plate 1 fell silent."))
+        unfold(browser, page.address)
+        browser.until("/Mend it/.test(document.body.innerText) && /thigh/.test(document.body.innerText)", 10.0)
+        assert complaints(browser) == []
 
 
 def test_the_running_belief_is_least_squares_with_the_prior():

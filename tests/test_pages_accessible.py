@@ -1,5 +1,5 @@
 """Every page that is written, asked by axe-core on a desk and on a phone: no violation, and nothing wider than the
-screen. axe-core comes with the tools that build the bundle (web/package-lock.json) and is shipped with nothing.
+screen. Those of a robot and of a stream: `test_robot_recording`, `test_live`.
 """
 
 import json
@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser import BROWSER, Page
+from accessible import ASKED, complaints, unfold
+from browser import Page
 from example_results import html_of, refused_session
 from hidden_faults import hidden
 from identified_sessions import session_result
@@ -33,37 +34,9 @@ from biodance.report.pages.plates import plates_page
 from biodance.report.pages.subject import subject_page
 from biodance.report.write import write_diagnosis, write_report
 
-AXE = Path(__file__).parents[1] / "web" / "node_modules" / "axe-core" / "axe.min.js"
-pytestmark = pytest.mark.skipif(
-    not (BROWSER and AXE.is_file()), reason="no Chromium, or `make bundle` could not reach npm for axe-core"
-)
-SCREENS = {1280: 900, 390: 844}
-"""Width and height in CSS pixels: a desk and a phone."""
+pytestmark = ASKED
 NAMES = ("report", "diagnose", "refused", "subject", "subject without numbers")
 NAMES += ("cards", "foresee", "feedback", "group", "plates")
-_VIOLATIONS = """axe.run().then(found => found.violations.map(
-  one => `${one.id}: ${one.help}, ${one.nodes.length} times, first ${one.nodes[0].html.slice(0, 150)}`))"""
-_WIDER = """(width => [...document.querySelectorAll('html, body *')].filter(one => one.getClientRects().length
-  && Math.max(one.getBoundingClientRect().right, one.tagName === 'HTML' && one.scrollWidth) > width + 1).map(
-  one => `wider than ${width} px: ${one.outerHTML.slice(0, 150)}`).slice(0, 5))"""
-
-
-def unfold(browser: Page, page: Path) -> None:
-    """Load a page with all its parts unfolded."""
-    browser.open(page.as_uri())
-    browser.run("document.querySelectorAll('details').forEach(one => one.open = true)")
-    browser.run(f"{AXE.read_text(encoding='utf-8')};0")
-
-
-def complaints(browser: Page) -> list[str]:
-    """Return what axe-core finds on the page that is loaded, and what is wider than a screen."""
-    found = []
-    for width, height in SCREENS.items():
-        browser.send(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
-        )
-        found += [f"{width} px: {one}" for one in browser.run(_VIOLATIONS) + browser.run(f"{_WIDER}({width})")]
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +114,7 @@ def test_the_pages_hold_what_is_to_be_asked(pages: dict[str, Path]) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nobody_is_shut_out_of_a_page(browser: Page, pages: dict[str, Path], name: str) -> None:
-    unfold(browser, pages[name])
+    unfold(browser, pages[name].as_uri())
     assert complaints(browser) == []
 
 
@@ -151,20 +124,20 @@ def test_without_webgl_the_replay_says_so_and_the_time_still_runs(pages: dict[st
     with Page("about:blank#begin") as browser:
         without = "HTMLCanvasElement.prototype.getContext = () => null"
         browser.send("Page.addScriptToEvaluateOnNewDocument", source=without)
-        unfold(browser, pages["report"])
+        unfold(browser, pages["report"].as_uri())
         browser.run("document.getElementById('replay').scrollIntoView()")
         browser.until(f"{parts}.some(one => one.dataset.part === 'undrawn')", 10.0)
         shown = set(browser.run(f"{parts}.map(one => one.dataset.part)"))
         assert shown == {"undrawn", "play", "time", "said", "trial", "worst", "speed"}
         browser.run(f"{time}.value = 1; {time}.dispatchEvent(new Event('input'))")
         assert browser.run("document.querySelector('[data-part=said]').textContent").startswith("1.00 s")
-        assert complaints(browser) == []
+        assert complaints(browser, "#replay") == []
 
 
 def test_what_is_wrong_with_a_page_is_found(browser: Page, tmp_path: Path) -> None:
     page = tmp_path / "wrong.html"
     page.write_text('<!doctype html><title>t</title><p style="width:500px;color:#ddd">pale</p><img src="data:,">')
-    unfold(browser, page)
+    unfold(browser, page.as_uri())
     found = complaints(browser)
     assert {one.split(":")[1].strip() for one in found} >= {"color-contrast", "image-alt", "html-has-lang"}
     assert [one for one in found if "wider than 390 px" in one]

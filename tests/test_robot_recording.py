@@ -1,11 +1,16 @@
 """A robot's recording through the front door: masses of a truth made by pinocchio, and bad recordings in a sentence."""
 
 import json
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from accessible import ASKED, complaints, unfold
+from browser import Page
 from robot_lab import RobotLab
 from robot_recordings import COVER, FEET, drawing, matched, real_robot, recorded
 
@@ -41,12 +46,17 @@ def refused(folder: Path, place: Path) -> str:
     return str(told.value)
 
 
-def test_a_missing_cover_is_found_from_files_alone(
-    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture(scope="module")
+def told(place: Path) -> tuple[dict[str, Any], Path]:
+    """Return what the command prints of the good recording, and its page."""
     asked = ["identify", str(place / "good"), "--urdf", str(place / "hoap3.urdf"), "--feet", ",".join(FEET)]
-    assert run([*asked, "--out", str(tmp_path / "out"), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    with redirect_stdout(StringIO()) as printed:
+        assert run([*asked, "--out", str(place / "out"), "--json"]) == 0
+    return json.loads(printed.getvalue()), place / "out" / "report.html"
+
+
+def test_a_missing_cover_is_found_from_files_alone(told: tuple[dict[str, Any], Path]) -> None:
+    found, page = told
     truth = real_robot().sip
     rows = found["segments"]
     assert [row["name"] for row in rows] == list(truth.segments)
@@ -67,8 +77,15 @@ def test_a_missing_cover_is_found_from_files_alone(
     assert [stance["foot"] for stance in match["standing"]] == ["left"]
     assert found["added_mass"] is None
     assert any("less than drawn" in said["text"] for said in found["attention"])
-    assert "7.94 kg" in (tmp_path / "out" / "report.html").read_text()
-    assert ".curves" in (tmp_path / "out" / "report.html").read_text()  # the style without which figures are black
+    assert "7.94 kg" in page.read_text()
+    assert ".curves" in page.read_text()  # the style without which figures are black
+
+
+@ASKED
+def test_nobody_is_shut_out_of_the_page(told: tuple[dict[str, Any], Path]) -> None:
+    with Page("about:blank#begin") as browser:
+        unfold(browser, told[1].as_uri())
+        assert complaints(browser) == []
 
 
 def test_time_and_place_of_a_plate_follow_from_the_path_alone() -> None:
