@@ -101,6 +101,20 @@ def test_a_browser_shows_the_cue_of_the_second(dance: Dance, page: Path) -> None
     assert "Thank you" in shown["end"]
 
 
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_without_webgl_the_words_lead_and_the_page_says_why(dance: Dance, page: Path) -> None:
+    cue = scene_of(dance)["cues"][1]
+    with Page("about:blank#begin") as browser:
+        without = "HTMLCanvasElement.prototype.getContext = () => null"
+        browser.send("Page.addScriptToEvaluateOnNewDocument", source=without)
+        browser.open(f"{page.as_uri()}#t={cue['move_s'] + 0.1}")
+        shown = "(id) => document.getElementById(id).checkVisibility()"
+        names = ["undrawn", "scene", "label-left", "label-right", "view", "now"]
+        assert browser.run(f"{names}.map({shown})") == [True, False, False, False, False, True]
+        assert "Move now" in browser.run("document.getElementById('now').innerText")
+        assert "hardware acceleration" in browser.run("document.getElementById('undrawn').innerText")
+
+
 def _words(dom: str) -> list[str]:
     items = re.search(r'<ol id="calls">(.*?)</ol>', dom, re.DOTALL)
     assert items is not None

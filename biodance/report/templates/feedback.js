@@ -63,7 +63,8 @@ let renderer = null;
 try {
   renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: true, preserveDrawingBuffer: true });
 } catch (error) {
-  by("said").textContent = "This browser cannot draw in 3-D; the words and the count lead all the same.";
+  for (const one of [canvas, by("label-left"), by("label-right"), by("view").closest("label")]) one.hidden = true;
+  by("undrawn").hidden = false;
 }
 const front = new THREE.PerspectiveCamera(32, 1, 0.1, 50), side = new THREE.PerspectiveCamera(32, 1, 0.1, 50);
 for (const [camera, x, y] of [[front, 4.3, 0], [side, 0, -4.3]]) {
