@@ -1,7 +1,7 @@
 """How many pictures a second the page that leads draws and looks at, with a film of a rendered dancer as its camera and
 without one, in headless Chromium without graphics.
 
-    PYTHONPATH=.:benchmarks:tests python benchmarks/bench_frames.py FOLDER [SECONDS]
+    PYTHONPATH=.:benchmarks:tests python benchmarks/bench_frames.py FOLDER [SECONDS [WIDTH,HEIGHT]]
 
 Frames by the clock hang on who else uses the machine; processor time a frame (all processes of the browser, Linux)
 hardly does. The dancer is the first of `bench_follow.py`, 10 pictures a second for 20 s. FOLDER keeps film and page.
@@ -41,9 +41,9 @@ def processor_time(process: int) -> float:
     return total
 
 
-def row(page: Path, film: Path | None, seconds: float) -> str:
+def row(page: Path, film: Path | None, seconds: float, size: str) -> str:
     """Return the row of a table: how many frames and looks a second, and processor time a frame."""
-    with Page(page.as_uri(), film=film) as browser:
+    with Page(page.as_uri(), film=film, size=size) as browser:
         if film:
             browser.run("document.getElementById('film').click()")
             browser.until("Number(document.body.dataset.looks ?? 0) > 2", 120.0)
@@ -56,8 +56,8 @@ def row(page: Path, film: Path | None, seconds: float) -> str:
     return f"| {kind} | {frames / clock:.1f} | {looks / clock:.1f} | {1000 * used / frames:.0f} |"
 
 
-def main(folder: str, seconds: str = "20") -> None:
-    """Print the table."""
+def main(folder: str, seconds: str = "20", size: str = "1280,900") -> None:
+    """Print the table of a window of ``size`` pixels."""
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     page, film, dance = place / "page.html", place / "film.mjpeg", known_dance(human(Subject(65.0, 1.75, "F", 33.0)))
@@ -71,7 +71,7 @@ def main(folder: str, seconds: str = "20") -> None:
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     print("| camera | frames/s | looks of the model/s | processor time a frame (ms) |\n|" + "---|" * 4)
     for one in (film, None):
-        print(row(page.resolve(), one, float(seconds)), flush=True)
+        print(row(page.resolve(), one, float(seconds), size), flush=True)
 
 
 if __name__ == "__main__":
