@@ -9,8 +9,9 @@ from diagnosed_sessions import RATE, body, known, motion, offset, windows
 from biodance.diagnosis.adequacy import adequacy, largest_z, verdict
 from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT, Adequacy, least, matters
 from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.joint_fit import settle
 from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import build_model, drop_weak_causes, is_significant, required_evidence, settle
+from biodance.diagnosis.naming import build_model, drop_weak_causes, is_significant, required_evidence
 from biodance.diagnosis.problem import problem
 from biodance.effects import Case, QualityCheck, effects
 from biodance.motion.regressor import predict_wrench

@@ -59,5 +59,5 @@ def test_only_what_the_screening_suspects_is_fitted(score: float, first: tuple[s
     put, causes = build_model(problem(body(), windows(1, hidden=about_plate(gained))), known(), ("plate_gain",))
     true, other = (next(one for one in screen(put, causes) if one.names[1] == channel) for channel in ("Fz", "Fx"))
     ranking = Round((replace(other, score=11.0, log_bayes_factor=11.0), replace(true, score=score)))
-    refined, _ = refine(put, ranking)
+    refined, _ = refine(put, ranking, put.tolerances)
     assert refined.suspects[0].names == first

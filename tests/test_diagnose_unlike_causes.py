@@ -7,8 +7,9 @@ import pytest
 from diagnosed_sessions import body, known, windows
 
 from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.joint_fit import settle
 from biodance.diagnosis.model import NamedCause, with_unlike_causes
-from biodance.diagnosis.naming import build_model, settle
+from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Effect, Parameter, effects
 from biodance.records import Array

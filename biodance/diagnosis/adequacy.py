@@ -92,11 +92,9 @@ def loudness(found: Model) -> float:
 def sizes(found: Model) -> Array:
     """Return (B, 6): root mean square over the time of all trials of what is left, N and N·m, per band and channel."""
     where = found.problem.spectrum
-    mass = float(found.problem.cases[0].body.sip.mass.sum())
-    left = found.posterior.residual[: 6 * where.band.size].reshape(-1, 6)
     frames = max(1, sum(pick.size for picks in where.picks for pick in picks))
-    coloured = np.linalg.inv(found.tolerances.whiteners(mass))
-    return np.sqrt([np.sum((left[where.band == b] @ coloured[b].T) ** 2, axis=0) / frames for b in range(len(BANDS))])
+    left = found.in_newtons(found.posterior.residual)
+    return np.sqrt([np.sum(left[where.band == b] ** 2, axis=0) / frames for b in range(len(BANDS))])
 
 
 def largest_z(left: tuple[Adequacy, ...]) -> float:

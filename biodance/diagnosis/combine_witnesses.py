@@ -212,8 +212,10 @@ def _evidence(finding: Finding, one: Diagnosis) -> float:
 
 
 def _merged(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
-    """Return a finding with the size combined from witnesses and simulation. If the simulation distinguishes
-    look-alikes that the witnesses do not, or places a load that only weighs the same, its finding is returned.
+    """Return a finding with the size combined from witnesses and simulation, and the set of the simulation: it knows
+    what the witnesses see and more, so what it tells apart is no look-alike, and what it does not tell apart is one. If
+    it distinguishes look-alikes that the witnesses do not, or places a load that only weighs the same, its finding is
+    returned.
     """
     if by_simulation is not None and _names(by_simulation) != _names(by_witnesses):
         return by_simulation
@@ -224,18 +226,21 @@ def _merged(by_witnesses: Finding, by_simulation: Finding | None) -> Finding:
         return by_witnesses
     weight = np.array([first.sd**-2, last.sd**-2])
     value = float(weight @ [first.value, last.value] / weight.sum())
-    loads = any(alias.effect == UNPLACED_LOAD[0] for alias in by_simulation.set)
-    alike = (alias for alias in by_witnesses.set[1:] if loads or _names(alias) != UNPLACED_LOAD)
-    bayes = by_witnesses.log_bayes_factor + max(0.0, by_simulation.log_bayes_factor)
     return replace(
         by_simulation,
         parameters=(
             Estimate(first.name, value, float(weight.sum() ** -0.5), first.unit),
             *by_simulation.parameters[1:],
         ),
-        set=(Alias(by_witnesses.effect, by_witnesses.target, bayes), *alike),
+        set=tuple(_with_witnesses(alias, by_witnesses) for alias in by_simulation.set),
         advice=by_witnesses.advice,
     )
+
+
+def _with_witnesses(one: Alias, by_witnesses: Finding) -> Alias:
+    """Return a look-alike with the evidence that the witnesses have for it, if any."""
+    said = (alias.log_bayes_factor for alias in by_witnesses.set if _same_cause(alias, one))
+    return replace(one, log_bayes_factor=one.log_bayes_factor + next(said, 0.0))
 
 
 def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:

@@ -110,6 +110,12 @@ class Model:
         alone, both = np.linalg.cholesky(known.noise[0] - known.zeros[0]), np.linalg.cholesky(known.noise[0])
         return float(np.sum(Z**2) - np.sum(means**2) + np.sum((np.linalg.solve(alone, both) @ means) ** 2))
 
+    def in_newtons(self, white: Array) -> Array:
+        """Return (m, 6) N, N·m: the plates' rows of whitened rows ``white`` (r,), as they were before."""
+        band = self.problem.spectrum.band
+        coloured = np.linalg.inv(self.tolerances.whiteners(_body_mass(self.problem)))
+        return np.asarray(np.einsum("mij,mj->mi", coloured[band], white[: 6 * band.size].reshape(-1, 6)))
+
     def white_by_trial(self, columns: ByTrial) -> ByTrial:
         """Return the whitened ``columns`` of the plates' rows, of which every trial has its own."""
         band, mass = self.problem.spectrum.band, _body_mass(self.problem)

@@ -8,15 +8,15 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import CONFLICT_LIMIT, prior_data_conflict
-from biodance.diagnosis.candidates import SCALE, Candidate, candidates
+from biodance.diagnosis.candidates import Candidate, candidates
 from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Alias
+from biodance.diagnosis.joint_fit import log_bayes_factor_between, settle
 from biodance.diagnosis.model import Model, NamedCause, is_much_heavier, model, needs_rebuilding, with_unlike_causes
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.screening import ScoredCandidate, screen
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects
-from biodance.records import Array
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
 _ROUNDS = 3
@@ -34,8 +34,6 @@ SEEN, OVERWHELMING = 0.2, 3.0
 threshold: it rests on the sizes of tolerances. (A gain of Fz of 5 % is visible to 2 %: the rest looks like mass. The
 declared mass still makes it 25 standard deviations.)
 """
-_STEPS = 5
-"""Gauss-Newton steps at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +93,10 @@ def name_causes(
     for _ in range(rounds):
         if not passes_threshold(ranking, tolerances):
             break
-        ranking, settled = refine(found, ranking)
+        ranking, settled = refine(found, ranking, tolerances)
         if not passes_threshold(ranking, tolerances):
             break
         accepted.append(ranking)
-        settled = with_unlike_causes(settled, tolerances)
         again = needs_rebuilding(settled) and prior_data_conflict(settled) <= CONFLICT_LIMIT
         found, causes = rebuild_model(settled, settled.tolerances, chosen) if again else (settled, causes)
         ranking = Round(
@@ -177,11 +174,6 @@ def _without(found: Model, index: int) -> Model:
     return settle(found, (*found.named[:index], *found.named[index + 1 :]))
 
 
-def log_bayes_factor_between(found: Model, other: Model) -> float:
-    """Return the log Bayes factor of the causes named in ``found`` against those named in ``other``."""
-    return found.log_likelihood - _penalty(found) - other.log_likelihood + _penalty(other)
-
-
 def _price(one: Round) -> float:
     """Return what the first of a round paid for its number of targets."""
     return one.suspects[0].log_bayes_factor - one.suspects[0].score
@@ -226,19 +218,33 @@ def cause_key(one: NamedCause) -> tuple[str, str]:
     return one.effect.name, one.effect.target
 
 
-def refine(found: Model, ranking: Round) -> tuple[Round, Model]:
+def refine(found: Model, ranking: Round, known: Tolerances) -> tuple[Round, Model]:
     """Return the ranking with its first causes fitted with all their curvature, and the model with the most probable
     one named. Where none of them is possible, they hide nobody: the next ones are fitted.
+
+    No cause is quite like its model: what the most probable one leaves of its wrench for that is noise beside the
+    ``known`` tolerances, and no evidence for or against a look-alike, so all are fitted again under it.
     """
-    refined, rest = [_refined(found, one) for one in _near(found, ranking)], ranking
-    while True:
-        tried = {one.names for one, _ in refined}
-        rest = Round(tuple(one for one in rest.suspects if one.names not in tried))
-        if any(np.isfinite(one.score) for one, _ in refined) or not passes_threshold(rest, found.tolerances):
-            break
-        refined += [_refined(found, one) for one in _near(found, rest)]
-    refined.sort(key=lambda pair: -pair[0].score)
-    return Round((*(one for one, _ in refined), *rest.suspects)), refined[0][1]
+    near = _near(found, ranking)
+    refined, rest = _fitted(found, near), _others(ranking, near)
+    while not np.isfinite(refined[0][0].score) and passes_threshold(rest, found.tolerances):
+        near = [*near, *_near(found, rest)]
+        refined, rest = _fitted(found, near), _others(ranking, near)
+    settled = with_unlike_causes(refined[0][1], known)
+    if settled is not refined[0][1]:
+        refined = _fitted(settle(settled, found.named), near)
+    return Round((*(one for one, _ in refined), *rest.suspects)), with_unlike_causes(refined[0][1], known)
+
+
+def _others(ranking: Round, tried: list[ScoredCandidate]) -> Round:
+    """Return the ranking without the causes ``tried``."""
+    names = {one.names for one in tried}
+    return Round(tuple(one for one in ranking.suspects if one.names not in names))
+
+
+def _fitted(found: Model, some: list[ScoredCandidate]) -> list[tuple[ScoredCandidate, Model]]:
+    """Return the causes as `_refined`, most probable first."""
+    return sorted((_refined(found, one) for one in some), key=lambda pair: -pair[0].score)
 
 
 def _refined(found: Model, one: ScoredCandidate) -> tuple[ScoredCandidate, Model]:
@@ -257,44 +263,3 @@ def _near(found: Model, ranking: Round) -> list[ScoredCandidate]:
     """
     least = max(ranking.suspects[0].score * 0.5, found.tolerances.threshold)
     return [one for one in ranking.suspects[:REFINED] if one.score >= least]
-
-
-def settle(found: Model, named: tuple[NamedCause, ...]) -> Model:
-    """Return the model with the parameters of all ``named`` causes at their most probable values, by Gauss-Newton
-    steps.
-    """
-    current = found if named is found.named else found.without_causes(named)
-    for _ in range(_STEPS):
-        if not named:
-            return current
-        s, G = current.named_score
-        u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in named])
-        inner: Array = np.asarray(np.linalg.inv(np.eye(len(s)) + G), dtype=float)
-        step = inner @ (s - u)
-        named = _moved(named, u + step, inner)
-        current = current.without_causes(named)
-        if np.abs(step).max() < 1e-3:
-            break
-    return current
-
-
-def _moved(named: tuple[NamedCause, ...], u: Array, inner: Array) -> tuple[NamedCause, ...]:
-    """Return the causes with new parameters ``u`` (in standard deviations of a fault) and their covariances."""
-    out, start = [], 0
-    for one in named:
-        width = one.effect.typical.size
-        cut, scale = slice(start, start + width), SCALE * one.effect.typical
-        out.append(NamedCause(one.effect, scale * u[cut], inner[cut, cut] * np.outer(scale, scale)))
-        start += width
-    return tuple(out)
-
-
-def _penalty(found: Model) -> float:
-    """Return what the parameters of the named causes cost: their prior, and the volume that the data leave of it
-    (Laplace).
-    """
-    if not found.named:
-        return 0.0
-    _, G = found.named_score
-    u = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in found.named])
-    return 0.5 * float(u @ u) + 0.5 * float(np.linalg.slogdet(np.eye(len(u)) + G)[1])

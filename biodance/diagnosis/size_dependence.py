@@ -7,10 +7,9 @@ is present in the residual, with all tolerances and the sizes of all named cause
 
 The trace of a cause in proportion to the wrench that the movement needs (`Effect.in_proportion`) has the movement's
 errors in it, and so has the residual, with the other sign: in a fast band, where they are a good part of the wrench,
-the size comes out too small (errors in variables). With whitened errors e of the movement and the proportion L, the
-score is E[(L e)' (-e)] = -trace(L) too low per coefficient, whatever their covariance, if the movement makes all of
-what sessions without fault leave, and not at all if it makes none: between the two nothing is known, and the score
-nearest to zero counts.
+the size comes out too small (errors in variables). What was measured, with the named causes off, has none of them, but
+every error of the plates. The size lies between those that the two traces show (the bounds of Frisch 1934; Klepper and
+Leamer 1984, doi:10.2307/1911466), and the score nearest to zero counts.
 """
 
 from collections.abc import Iterator
@@ -113,13 +112,18 @@ def _picks(put: Problem) -> dict[str, NDArray[np.bool_]]:
 
 
 def _lost_to_errors(found: Model, named: NamedCause, over: tuple[str, ...]) -> Array:
-    """Return (k,): by how much the score of each trace is too low if the movement makes all of what sessions without
-    fault leave; those of signals about their mean lose nothing.
+    """Return (k,): by how much the score of each trace is too low if the movement makes all that is left of the wrench:
+    what the trace of the measured wrench would add; those of signals about their mean lose nothing.
     """
-    put = found.problem
-    share = named.effect.in_proportion(put.cases[0], named.theta) * found.tolerances.energy[put.spectrum.band]
-    picks = _picks(put)
-    return np.array([np.sum(share, where=np.broadcast_to(picks.get(name, False), share.shape)) for name in over])
+    put, lost = found.problem, np.zeros(len(over))
+    share = named.effect.in_proportion(put.cases[0], named.theta)
+    if not share.any():
+        return lost
+    errors, picks = found.in_newtons(found.posterior.y) @ share.T, _picks(put)
+    asked = [name in picks for name in over]
+    rows = [put.padded(np.where(picks[name], errors, 0.0)) for name in over if name in picks]
+    lost[asked] = found.white(np.stack(rows, axis=1)).T @ found.posterior.residual
+    return lost
 
 
 def _band(index: int) -> str:

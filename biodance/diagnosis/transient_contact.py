@@ -17,8 +17,9 @@ from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.candidates import local_basis
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.evidence import Evidence, evidence, linear_posterior, visible
+from biodance.diagnosis.joint_fit import log_bayes_factor_between
 from biodance.diagnosis.model import Model, NamedCause
-from biodance.diagnosis.naming import Naming, Round, is_significant, log_bayes_factor_between, required_evidence
+from biodance.diagnosis.naming import Naming, Round, is_significant, required_evidence
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
 from biodance.effects import Effect, effects

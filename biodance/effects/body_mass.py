@@ -29,7 +29,7 @@ class BodyMass(Effect):
 
     def in_proportion(self, case: Case, theta: Array) -> Array:
         """Return the share of the body's mass, of every channel."""
-        return np.full(6, theta[0] / case.phi[::10].sum())
+        return np.asarray(theta[0] / case.phi[::10].sum() * np.eye(6))
 
     def possible_in(self, case: Case, theta: Array) -> bool:
         """Return whether a scale or a form can be so wrong: by at most `_WRONG` of the person's mass."""

@@ -10,6 +10,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.records import Array
+from biodance.spatial import wrench_shift
 
 
 class PlateGain(ChannelEffect):
@@ -28,8 +29,9 @@ class PlateGain(ChannelEffect):
         return case.predicted_on(self.plate_of(case))[:, self.channel]
 
     def in_proportion(self, case: Case, theta: Array) -> Array:
-        """Return the gain of its channel."""
-        return theta[0] * np.eye(6)[self.channel]
+        """Return the gain of its channel about the plate's centre."""
+        there, only = wrench_shift(self.plate_of(case).centre), np.diag(np.eye(6)[self.channel])
+        return np.asarray(theta[0] * np.linalg.inv(there) @ only @ there)
 
 
 EFFECT = PlateGain

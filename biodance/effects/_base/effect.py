@@ -172,10 +172,10 @@ class Effect:
         return self.added(case, theta)
 
     def in_proportion(self, case: Case, theta: Array) -> Array:
-        """Return (6,): the share of each channel of the wrench that the movement needs which this cause of size
-        ``theta`` (p,) adds to the same channel; errors of the movement are then in its columns, too. By default none.
+        """Return (6, 6): what this cause of size ``theta`` (p,) adds to the wrench about the lab origin is this matrix
+        times the wrench that the movement needs; errors of the movement are then in its columns, too. By default none.
         """
-        return np.zeros(6)
+        return np.zeros((6, 6))
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that
