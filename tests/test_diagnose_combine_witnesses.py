@@ -136,6 +136,29 @@ def test_weighing_twice_is_one_opinion(said: Finding, witness: str, note: str, n
     assert [f.effect for f in one.findings] == ([said.effect] if named else [])
 
 
+@pytest.mark.parametrize(
+    ("moved", "named"),
+    [
+        (SimulatedSize(2.4, 0.05, 29.0), True),  # both show it, and have the evidence together
+        (SimulatedSize(2.4, 0.05, 31.0), False),
+        (SimulatedSize(1.4, 0.05, 0.0), False),  # another mass of 1.4 kg
+        (SimulatedSize(1.4, 0.5, 31.0), True),  # the movement measures it worse
+        (None, True),  # or nothing, as in quiet standing
+    ],
+)
+def test_joints_that_nobody_knows_change_no_weight(moved: SimulatedSize | None, named: bool) -> None:
+    """Forces of a body with a neck fit only a plate's gain nine standard deviations large, which nobody looks for."""
+    names = (WEIGHT.effect, WEIGHT.target)
+    evidence = heard(names, "standing_force", 2.5, 0.125)
+    limits = (Unobservable(*names, 1.6, "kg"),)
+    simulation = Diagnosis("unexplained", (), limits=limits, doubt="a neck")
+    measured = {names: moved} if moved else {}
+    one = combine_findings(simulation, WitnessFindings((WEIGHT,), evidence), evidence, judged=True, measured=measured)
+    assert one.findings == ((WEIGHT,) if named else ())
+    assert one.resembles == (() if named else (WEIGHT,))
+    assert one.verdict == ("named, incomplete" if named else "unexplained")
+
+
 @pytest.mark.parametrize("note", [SEVERAL_CROSSTALKS, ""])
 def test_feet_name_no_crosstalk_of_several(note: str) -> None:
     """A plate 30 mm beside its place, which nobody looks for, looks like two cross-talks at once."""

@@ -52,7 +52,8 @@ def combine_findings(
     measured: Mapping[tuple[str, str], SimulatedSize] = MappingProxyType({}),
 ) -> Diagnosis:
     """Return the diagnosis combined with the findings of the witnesses; ``judged``: whether the simulation was
-    available; ``measured``: by effect and target what it tells of every cause where nothing was named.
+    available; ``measured``: by effect and target what it tells of every cause where nothing was named (empty: it
+    looked for none, or is not believed).
     """
     one = replace(one, witnesses=evidence if evidence.observations else None)
     raw = any(finding.effect in _RAW for finding in one.findings)
@@ -167,12 +168,14 @@ def _movement_shows_none(
 ) -> bool:
     """Return whether a movement in which nothing is wrong, and that would show a cause of this size, measures no such
     size: not of the cause, and not of any look-alike of it. People may stand off centre on a plate that is in its
-    place, and forces that fit the movement throughout are not late. Standing alone excludes nothing.
+    place, and forces that fit the movement throughout are not late. Standing alone excludes nothing. What is only
+    weighed has to fit a movement with a doubt, too: joints for which nobody knows what is usual change no weight.
 
     Two sources of one cause add up their evidence. Where the movement measures it better than the witnesses, theirs
     must make up what is lacking for a name there.
     """
-    if one.verdict != "nothing wrong" or one.doubt or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
+    heard = _is_weighed_only(finding, evidence) if one.doubt else one.verdict == "nothing wrong"
+    if not heard or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
         return False
     own = finding.parameters[0]
     for alias in (alias for alias in finding.set if _names(alias) in measured):

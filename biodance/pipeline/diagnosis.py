@@ -10,7 +10,7 @@ from biodance import display
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
-from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
+from biodance.diagnosis.engine import STANDING_ALONE, Examined, diagnose_trials, without_names
 from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
@@ -131,7 +131,8 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
-    measured = _measured(naming) if naming else {}
+    unheard = found.diagnosis.doubt in (STANDING_ALONE, _FAR)
+    measured = _measured(naming) if naming and not unheard else {}
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
