@@ -131,8 +131,7 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
-    unheard = found.diagnosis.doubt in (STANDING_ALONE, _FAR)
-    measured = _measured(naming) if naming and not unheard else {}
+    measured = _measured(naming, found.diagnosis.doubt) if naming else {}
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
@@ -146,8 +145,12 @@ def diagnose_session(
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
 
 
-def _measured(naming: Naming) -> dict[tuple[str, str], SimulatedSize]:
-    """Return what the simulation tells of every cause, by effect and target, before any is named."""
+def _measured(naming: Naming, doubt: str) -> dict[tuple[str, str], SimulatedSize]:
+    """Return what the simulation tells of every cause, by effect and target, before any is named; nothing where its
+    ``doubt`` is that it looked for none, or that its tolerances do not hold.
+    """
+    if doubt in (STANDING_ALONE, _FAR):
+        return {}
     return {
         one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
         for one in naming.screening.suspects
