@@ -8,8 +8,9 @@ from human_cases import with_tilted
 
 from biodance.body.body import Body
 from biodance.diagnosis.diagnosis import Verdict
-from biodance.diagnosis.engine import Examined, diagnose_trials
+from biodance.diagnosis.engine import STANDING_ALONE, Examined, diagnose_trials
 from biodance.pipeline.another_body import beside_another_body, without_unplaced_markers
+from biodance.pipeline.diagnosis import _FAR, _measured
 
 
 def gained(local, session):
@@ -49,6 +50,15 @@ def test_a_name_beside_what_is_left_of_another_body_is_only_resembled(
     assert ([f.effect for f in one.findings], [f.effect for f in one.resembles]) == (
         ([], ["plate_gain"]) if doubted else (["plate_gain"], [])
     )
+
+
+@pytest.mark.parametrize(("doubt", "heard"), [("", True), ("a neck", True), (STANDING_ALONE, False), (_FAR, False)])
+def test_a_movement_that_was_not_looked_through_or_believed_measures_no_weight(
+    examined: Examined, doubt: str, heard: bool
+) -> None:
+    measured = _measured(examined.naming, doubt)
+    assert (("plate_gain", "Fz") in measured) is heard
+    assert not heard or measured["plate_gain", "Fz"].size == pytest.approx(0.06, abs=0.015)
 
 
 def resembled(examined: Examined, index: int) -> Examined:

@@ -136,6 +136,37 @@ def test_weighing_twice_is_one_opinion(said: Finding, witness: str, note: str, n
     assert [f.effect for f in one.findings] == ([said.effect] if named else [])
 
 
+WEIGHED = replace(WEIGHT, parameters=(Estimate("error", 2.5, 0.125, "kg"),))
+
+
+@pytest.mark.parametrize(
+    ("said", "witness", "moved", "named"),
+    [
+        (WEIGHED, "standing_force", SimulatedSize(2.4, 0.05, 29.0), True),  # both show it, with the evidence of both
+        (WEIGHED, "standing_force", SimulatedSize(2.4, 0.05, 31.0), False),
+        (WEIGHED, "standing_force", SimulatedSize(1.4, 0.05, 0.0), False),  # another mass of 1.4 kg
+        (WEIGHED, "standing_force", SimulatedSize(1.4, 0.5, 31.0), True),  # the movement measures it worse
+        (WEIGHED, "standing_force", None, True),  # or nothing, as in quiet standing
+        (PLACE, "standing_place", SimulatedSize(0.007, 0.002, 0.0), False),  # somebody leans
+        (PLACE, "foot_across", SimulatedSize(0.007, 0.002, 0.0), True),  # steps are more than a mean
+    ],
+)
+def test_joints_that_nobody_knows_change_no_mean_wrench(
+    said: Finding, witness: str, moved: SimulatedSize | None, named: bool
+) -> None:
+    """Forces of a body with a neck fit only a gain nine standard deviations large, which nobody looks for."""
+    names, own = (said.effect, said.target), said.parameters[0]
+    said = replace(said, set=said.set[:1])
+    evidence = heard(names, witness, own.value, own.sd)
+    limits = (Unobservable(*names, 0.6 * own.value, own.unit),)
+    simulation = Diagnosis("unexplained", (), limits=limits, doubt="a neck")
+    measured = {names: moved} if moved else {}
+    one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
+    assert one.findings == ((said,) if named else ())
+    assert one.resembles == (() if named else (said,))
+    assert one.verdict == ("named, incomplete" if named else "unexplained")
+
+
 @pytest.mark.parametrize("note", [SEVERAL_CROSSTALKS, ""])
 def test_feet_name_no_crosstalk_of_several(note: str) -> None:
     """A plate 30 mm beside its place, which nobody looks for, looks like two cross-talks at once."""

@@ -26,7 +26,7 @@ from biodance.effects import (
     wrench_about_origin,
     wrench_about_point,
 )
-from biodance.effects.frame_rate import FrameRate, clock_beside_body
+from biodance.effects.frame_rate import FrameRate, clock_beside_body, late
 from biodance.effects.unit_error import FACTORS
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
@@ -103,18 +103,29 @@ def test_nothing_is_found_where_nothing_is_wrong() -> None:
     }
 
 
+def part(step: float, push: float = 0.0) -> tuple[Array, Array, float]:
+    """Return a trial of 10 s whose forces come ``step`` seconds later from the middle on, and in which something pushes
+    the body by ``push`` N for a tenth of a second while its force falls.
+    """
+    time = np.arange(0, 10, 0.01)
+    needed, late = (20 * np.sin(2 * np.pi * 0.5 * (time - by))[:, None] for by in (0.0, np.where(time < 5, 0, step)))
+    pushed = np.where(abs(time - 7) < 0.05, push, 0.0)[:, None]
+    return (late + pushed) * np.ones(3), needed * np.ones(3), 100.0
+
+
 def test_frames_that_are_lost_are_not_found_again() -> None:
     """Forces 30 ms later from the middle on in all trials, or in two of three and 30 ms earlier in the third."""
-    time = np.arange(0, 10, 0.01)
-
-    def part(step: float):
-        needed, late = (
-            20 * np.sin(2 * np.pi * 0.5 * (time - by))[:, None] for by in (0.0, np.where(time < 5, 0, step))
-        )
-        return late * np.ones(3), needed * np.ones(3), 100.0
-
     assert failed(FrameRate._lost([part(0.03)] * 3)) == [("frame_rate", "")]
     assert FrameRate._lost([part(0.03), part(0.03), part(-0.03)]) == ()
+
+
+def test_a_hand_that_pushes_loses_no_frames() -> None:
+    """Pushes of 60 N move the delay of the second half by more than two frames, and leave themselves."""
+    pushed = part(0.0, push=60.0)
+    measured, needed, rate = (pushed[0][500:], pushed[1][500:], pushed[2])
+    assert late(measured, needed, rate) > 0.018
+    assert failed(FrameRate._lost([pushed, pushed])) == []
+    assert failed(FrameRate._lost([part(0.03, push=60.0)] * 2)) == [("frame_rate", "")]
 
 
 @pytest.mark.parametrize("factor", FACTORS)

@@ -27,6 +27,8 @@ _EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks 
 """Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _WEIGHING = {"standing_force", "stride_force"}
 """Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
+_STANDING = {*_WEIGHING, "standing_place"}
+"""Witnesses of a mean wrench, of which a movement on the same plates has one, too."""
 _NOT_MOVED = "Feet, clocks and weights alone look like a {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
@@ -52,7 +54,8 @@ def combine_findings(
     measured: Mapping[tuple[str, str], SimulatedSize] = MappingProxyType({}),
 ) -> Diagnosis:
     """Return the diagnosis combined with the findings of the witnesses; ``judged``: whether the simulation was
-    available; ``measured``: by effect and target what it tells of every cause where nothing was named.
+    available; ``measured``: by effect and target what it tells of every cause where nothing was named (empty: it
+    looked for none, or is not believed).
     """
     one = replace(one, witnesses=evidence if evidence.observations else None)
     raw = any(finding.effect in _RAW for finding in one.findings)
@@ -119,7 +122,7 @@ def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvi
     hanging = [other for other in same if other.varies_with]
     if hanging:
         return not _weighing_agrees(finding, hanging[0], evidence)
-    if same and UNUSUAL_BODY in one.notes and _is_weighed_only(finding, evidence):
+    if same and UNUSUAL_BODY in one.notes and _is_shown_by(finding, evidence, _WEIGHING):
         return True
     if same and SEVERAL_CROSSTALKS in one.notes and _is_believed_alone(finding):
         return True
@@ -136,7 +139,7 @@ def _weighing_agrees(finding: Finding, hanging: Finding, evidence: WitnessEviden
     """Return whether a cause that only weighing witnesses detect has the same size in the simulation, where that size
     depends only on moments and fast bands: these do not affect the mean force.
     """
-    weighed = _is_weighed_only(finding, evidence)
+    weighed = _is_shown_by(finding, evidence, _WEIGHING)
     return weighed and hanging.varies_with in WEIGHTLESS and _same_size(finding, hanging)
 
 
@@ -146,9 +149,9 @@ def _is_believed_alone(finding: Finding) -> bool:
     return isinstance(kind, Effect) and kind.single
 
 
-def _is_weighed_only(finding: Finding, evidence: WitnessEvidence) -> bool:
-    """Return whether witnesses of mean forces alone see the cause of a finding."""
-    return _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= _WEIGHING
+def _is_shown_by(finding: Finding, evidence: WitnessEvidence, witnesses: set[str]) -> bool:
+    """Return whether some ``witnesses`` alone see the cause of a finding."""
+    return _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= witnesses
 
 
 def _same_size(finding: Finding, other: Finding) -> bool:
@@ -167,12 +170,14 @@ def _movement_shows_none(
 ) -> bool:
     """Return whether a movement in which nothing is wrong, and that would show a cause of this size, measures no such
     size: not of the cause, and not of any look-alike of it. People may stand off centre on a plate that is in its
-    place, and forces that fit the movement throughout are not late. Standing alone excludes nothing.
+    place, and forces that fit the movement throughout are not late. Standing alone excludes nothing. What only the
+    mean wrench shows has to fit a movement with a doubt, too: joints for which nobody knows what is usual change none.
 
     Two sources of one cause add up their evidence. Where the movement measures it better than the witnesses, theirs
     must make up what is lacking for a name there.
     """
-    if one.verdict != "nothing wrong" or one.doubt or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
+    heard = _is_shown_by(finding, evidence, _STANDING) if one.doubt else one.verdict == "nothing wrong"
+    if not heard or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
         return False
     own = finding.parameters[0]
     for alias in (alias for alias in finding.set if _names(alias) in measured):

@@ -51,6 +51,8 @@ NOISY_LABORATORY = (
     "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
     "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
 )
+STANDING_ALONE = "standing alone tells no cause"
+"""Doubt of a session in which nothing but quiet standing could be compared: no cause was looked for."""
 ONLY_STANDING = (
     "Only quiet standing could be compared with the whole body: sway, soft tissue and a plate's zero look alike there, "
     "so this comparison names no cause that has a size. A few squats on the plates tell them apart."
@@ -110,7 +112,7 @@ def diagnose_trials(
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
         notes=posed.notes,
-        doubt="standing alone tells no cause" if standing else "",
+        doubt=STANDING_ALONE if standing else "",
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
     found = assess(Examined(bare, naming))

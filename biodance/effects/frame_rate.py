@@ -36,6 +36,10 @@ _NOISE = np.array([3.0, 3.0, 3.0, 1.5, 1.5, 1.0])
 """N, N·m: what soft tissue leaves in one coefficient."""
 _STEP = 0.018
 """s by which the delay may differ between the two halves of a trial."""
+_SHARE = 0.05
+"""Least share of the force that one delay a trial leaves, which another delay from its middle on must explain (two to
+twelve frames lost: 0.10 to 0.37; hands that push now and then, and slow clocks: 0.024 at most).
+"""
 EXPLAINED = 0.5
 """Least share of the moving force that the motion must explain before anything is said."""
 _EDGE = 0.5
@@ -93,7 +97,7 @@ class FrameRate(DiscreteEffect):
         step = float(np.median(steps))
         if np.min(np.sign(step) * np.array(steps)) < -_STEP:
             return ()  # lost frames are not found again: where trials contradict each other, something else is wrong
-        if abs(step) > _STEP:
+        if abs(step) > _STEP and explained_by_step(parts) > _SHARE:
             said = (
                 f"From the middle of the trials on, forces are {1000 * step:.0f} ms later than at their start: "
                 f"frames were lost."
@@ -184,6 +188,24 @@ def late(measured: Array, needed: Array, rate: float) -> float:
     """
     speed = np.gradient(needed, 1 / rate, axis=0)
     return float(-((measured - needed) * speed).sum() / max((speed**2).sum(), 1e-12))
+
+
+def explained_by_step(parts: list[tuple[Array, Array, float]]) -> float:
+    """Return the share of the force that one delay of each trial leaves, which another delay from the middle of the
+    trial on explains: lost frames are a step of the clock, and what pushes leaves its own force.
+    """
+    one = two = 0.0
+    for measured, needed, rate in parts:
+        half = len(measured) // 2
+        one += _left_by_delay(measured, needed, rate)
+        two += sum(_left_by_delay(measured[some], needed[some], rate) for some in (slice(half), slice(half, None)))
+    return 1.0 - two / max(one, 1e-12)
+
+
+def _left_by_delay(measured: Array, needed: Array, rate: float) -> float:
+    """Return the sum of squares that the needed force (n, 3) leaves of the measured one once it is delayed (`late`)."""
+    speed = np.gradient(needed, 1 / rate, axis=0)
+    return float(np.sum((measured - needed + late(measured, needed, rate) * speed) ** 2))
 
 
 EFFECT = FrameRate

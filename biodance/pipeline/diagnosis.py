@@ -10,7 +10,7 @@ from biodance import display
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
-from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
+from biodance.diagnosis.engine import STANDING_ALONE, Examined, diagnose_trials, without_names
 from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
@@ -131,7 +131,7 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
-    measured = _measured(naming) if naming else {}
+    measured = _measured(naming, found.diagnosis.doubt) if naming else {}
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
@@ -145,8 +145,12 @@ def diagnose_session(
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
 
 
-def _measured(naming: Naming) -> dict[tuple[str, str], SimulatedSize]:
-    """Return what the simulation tells of every cause, by effect and target, before any is named."""
+def _measured(naming: Naming, doubt: str) -> dict[tuple[str, str], SimulatedSize]:
+    """Return what the simulation tells of every cause, by effect and target, before any is named; nothing where its
+    ``doubt`` is that it looked for none, or that its tolerances do not hold.
+    """
+    if doubt in (STANDING_ALONE, _FAR):
+        return {}
     return {
         one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
         for one in naming.screening.suspects
