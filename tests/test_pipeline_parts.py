@@ -101,6 +101,15 @@ def test_mass_and_place_of_a_standing_are_measured():
     assert np.isnan(found.com_ahead)
 
 
+def test_who_sways_stands_still_for_a_part():
+    """Foreign statics sway by 40 mm in 5 s; of them it was said that nobody stands still for 0.4 s."""
+    found = quiet_standing(standing_trial(drift=0.025), np.ones(200, dtype=bool), None, None)
+    assert found.end - found.start == pytest.approx(0.99)
+    assert found.mass == pytest.approx(60.0)
+    short = standing_trial(drift=0.045)  # half of it sways by 39 mm, a quarter is shorter than one second
+    assert quiet_standing(short, np.ones(200, dtype=bool), None, None) is None
+
+
 def test_a_walker_with_even_force_does_not_stand():
     assert quiet_standing(standing_trial(drift=0.3), np.ones(200, dtype=bool), None, None) is None
 

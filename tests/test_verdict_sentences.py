@@ -17,7 +17,7 @@ from biodance.pipeline.attention import (
     session_attention,
 )
 from biodance.pipeline.finding_words import EXPLAINS, in_words
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial_result import Check, Step
 from biodance.records.attention import Attention, Judged, strongest_first
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
@@ -90,6 +90,16 @@ def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
     assert one.verdict == "unexplained"
     assert one.attention[0].text.startswith("Cannot tell")
     assert not is_well(one)
+
+
+def test_beside_a_refused_step_nothing_is_well() -> None:
+    """Exit code 1, as of report and identify: the declared mass of such a session was never checked."""
+    full = full_session()
+    calm = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=(), steps=())
+    refused = replace(calm, steps=(Step("standing", "refused", "Nobody stands still."),))
+    told = [reconcile_with_checks(Diagnosis("nothing wrong", ()), some, (STATIC,)) for some in (calm, refused)]
+    assert [one.verdict for one in told] == ["nothing wrong", "nothing wrong"]
+    assert [is_well(one) for one in told] == [True, False]
 
 
 def test_a_check_points_to_the_cause_that_was_found() -> None:

@@ -129,6 +129,13 @@ def test_standing_weighs_pushes_and_lies_under_the_pelvis() -> None:
     np.testing.assert_allclose(values(standing(), "standing_place"), 0.0, atol=1e-9)
 
 
+def test_a_plate_that_is_not_under_the_person_tells_no_place() -> None:
+    """Exchanged plates of a real laboratory: 0.75 m aside, of which 0.07 m ahead were named as the shift of a plate."""
+    near = values(standing(Wrong(moved=(0.07, 0.0))), "standing_place")
+    assert sorted(map(abs, near)) == pytest.approx([0.0, 0.07])
+    assert values(standing(Wrong(moved=(0.07, 0.75))), "standing_place") == []
+
+
 def test_empty_plates_tell_what_was_taken_off() -> None:
     found = seen(walk(Wrong(zero=(3.0, -2.0, 12.0))), "empty_plate")
     assert [found[f"plate1 {c}, taken off"].value for c in ("Fx", "Fy", "Fz")] == [3.0, -2.0, 12.0]

@@ -98,12 +98,15 @@ def examine_with_reference(
 
     What cannot be read or written is said before the long work starts.
     """
+    from biodance.errors import SessionRefused
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.front import identify
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.saved_results import known_body
     from biodance.pipeline.session import examine
 
+    if reading.reference and reading.reference.resolve() == session.resolve():
+        raise SessionRefused(f"{session}: is itself the --reference. Give an earlier session of the same person.")
     lab, known = read_lab(reading.lab), known_body(reading.body)
     earlier = lab.corrected(reading.read(reading.reference, tell)) if reading.reference else None
     recording = lab.corrected(reading.read(session, tell))

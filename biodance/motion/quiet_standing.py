@@ -22,6 +22,12 @@ FOOT_LANDMARKS = tuple(
 )
 
 
+_PART = 1.0
+"""s: shorter parts of a steady run are not looked at: in one of this length the typical marker gains less than 0.06 m/s,
+which is 0.6 % of the weight.
+"""
+
+
 @dataclass(frozen=True, eq=False)
 class QuietStanding:
     """A quiet standing on the plates from ``start`` to ``end`` s; ``mass`` kg on the plates (mean vertical force / g),
@@ -80,15 +86,27 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
     return tuple(places), np.array(list(places.values())).reshape(-1, 2)
 
 
-def _still(markers: Markers | None, run: slice, within: float) -> bool:
-    """Return whether the typical marker stays ``within`` m during ``run``; True without markers."""
-    return markers is None or movement(Markers(markers.names, markers.time[run], markers.xyz[run])) <= within
+def _still_part(markers: Markers | None, run: slice, rate: float, within: float) -> slice | None:
+    """Return the longest part of ``run`` in which the typical marker stays ``within`` m: the whole, a half, a quarter,
+    ... of `_PART` s or more; None without one. Who sways farther than that in 5 s stands still for 1 s all the same.
+    """
+    if markers is None:
+        return run
+    length = run.stop - run.start
+    while True:
+        for start in range(run.start, run.stop - length + 1, length):
+            part = slice(start, start + length)
+            if movement(Markers(markers.names, markers.time[part], markers.xyz[part])) <= within:
+                return part
+        length //= 2
+        if length < _PART * rate:
+            return None
 
 
 def quiet_standing(
     trial: Trial, used: NDArray[np.bool_], body: Body | None, motion: Motion | None
 ) -> QuietStanding | None:
-    """Return the quiet standing of a prepared trial, over the longest steady run of the frames ``used`` (T,); None
+    """Return the quiet standing of a prepared trial, in the longest steady run of the frames ``used`` (T,); None
     without one.
 
     Steady means the vertical force, and the markers where there are any: walking, too, loads the plates evenly for a
@@ -96,7 +114,8 @@ def quiet_standing(
     """
     wrench, rules = trial.wrench, trial.settings.standing
     run = quiet_run(wrench.force[:, 2], used, wrench.rate, rules)
-    if run is None or not _still(trial.markers, run, rules.still):
+    run = _still_part(trial.markers, run, wrench.rate, rules.still) if run is not None else None
+    if run is None:
         return None
     cop = wrench.cop(height=trial.floor)[run, :2]
     com, ahead = np.empty((0, 2)), np.array([1.0, 0.0])

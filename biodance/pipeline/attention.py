@@ -69,8 +69,10 @@ def _only_standing_judged(result: SessionResult, judged: tuple[Judged, ...]) -> 
 
 
 def is_well(one: Diagnosis) -> bool:
-    """Return whether nothing is wrong, every trial was judged, and no check is outside its limit."""
-    return one.verdict == "nothing wrong" and all(said.level == "note" for said in one.attention if said.about == ABOUT)
+    """Return whether nothing is wrong, every trial was judged, no check is outside its limit, and nothing was refused."""
+    refused = any(said.level == "fail" for said in one.attention)
+    said = all(said.level == "note" for said in one.attention if said.about == ABOUT)
+    return one.verdict == "nothing wrong" and said and not refused
 
 
 def amount(result: SessionResult, judged: tuple[Judged, ...]) -> str:
@@ -131,8 +133,8 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
 
 
 def _checks(one: Diagnosis) -> str:
-    """Return where the named causes that have no size were seen, as sentences: which labels, in which trials."""
-    bare = {(finding.effect, finding.target) for finding in one.findings if not finding.parameters}
+    """Return where the named causes whose size is not told were seen, as sentences: which labels, in which trials."""
+    bare = {(f.effect, f.target) for f in one.findings if all(p.sd != p.sd for p in f.parameters)}
     said = [quality.text for quality in one.checks if not quality.ok and (quality.effect, quality.target) in bare]
     return "".join(f"{_first_sentence(text)}. " for text in dict.fromkeys(said))
 

@@ -19,14 +19,12 @@ from biodance.motion.ik.functional_joints import PLACED, functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
 from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
+from biodance.pipeline.same_person import refuse_another_body
 from biodance.pipeline.trial import Prepared, attempt, track_trial
 from biodance.pipeline.trial_result import ForceGain, ShownJoints, Step, TrialResult
 from biodance.records import Sip, Subject, Trial
 from biodance.settings import Settings
 from biodance.uncertainty.caution import in_other_frames
-
-ANOTHER = 0.15
-"""Share of the body mass by which nobody differs from an earlier session: more is another person."""
 
 _NO_STATIC = (
     "No static trial can be used, so the body comes from stature alone or from one frame of a moving trial, "
@@ -120,7 +118,7 @@ def starting_from(known: Body, body: Body, mass: float, source: str) -> tuple[Bo
     Raises
     ------
     SessionRefused
-        The earlier body has other segments, no uncertainty, or weighs so much less or more that it is another person's.
+        The earlier body has other segments, no uncertainty, or is another person's (`refuse_another_body`).
     """
     before = float(known.sip.mass.sum())
     if known.segments != body.segments or not np.any(known.sip.covariance):
@@ -128,11 +126,7 @@ def starting_from(known: Body, body: Body, mass: float, source: str) -> tuple[Bo
             f"Body {known.name}: is none that was identified from such a person ({len(known.segments)} segments, "
             f"{len(body.segments)} here). Give the body.json of `biodance identify`."
         )
-    if abs(mass / before - 1) > ANOTHER:
-        raise SessionRefused(
-            f"The body that was given weighs {before:.1f} kg, {mass:.1f} kg are declared here: it is of another "
-            f"person. Give the same person's body.json."
-        )
+    refuse_another_body(known, body, mass)
     prior = in_other_frames(scaled_to_mass(known.sip, mass), body.joint_errors)
     words = (
         f"Its masses and inertias are those of an earlier session ({before:.1f} kg there, {mass:.1f} kg here), which "

@@ -17,6 +17,7 @@ from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.same_person import refuse_another_reference
 from biodance.pipeline.saved_results import known_body
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Session
@@ -282,6 +283,7 @@ def _beside(result: SessionResult, before: SessionIdentification) -> SessionResu
     found = result.identification
     if result.body is None or found is None or found.search.reference == f"session {before.name}":
         return result
+    refuse_another_reference(before.identification.body, result.body, result.subject.mass, before.name)
     name = result.session.folder.name
     again = identify_trials(
         result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior

@@ -12,6 +12,7 @@ from biodance.pipeline.body import body_of, shown_joints, starting_from, with_fo
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult, Still
+from biodance.pipeline.same_person import refuse_another_reference
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, TrialResult
@@ -63,6 +64,8 @@ def examine(
     ------
     UnknownName
         There is no such table of segment inertial parameters for the subject's sex.
+    SessionRefused
+        ``reference`` or ``known`` is of another person.
 
     See Also
     --------
@@ -83,6 +86,8 @@ def examine(
         read.append(prepare_trial(trial))
     tell("scaling the body")
     body, source = body_of(session.subject, tuple(read), session.settings, steps)
+    if body is not None and reference is not None:
+        refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)
     prior = None
     if body is not None and known is not None:
         body, prior, source = starting_from(known, body, session.subject.mass, source)
@@ -171,4 +176,6 @@ def identification_of(result: SessionResult) -> SessionIdentification:
     reasons = " ".join(dict.fromkeys([*said, *(reason for trial in fits for reason in trial.reasons)]))
     none = "no trial has the role fit. Set roles in session.toml."
     why = "no trial to fit has motion and fully measured ground contact." if fits else none
-    raise SessionRefused(f"{folder}: nothing can be identified, {why} {reasons}".strip())
+    outside = [f"{c.what}, {c.where}: {c.value} ({c.limit})." for c in result.checks if fits and not c.inside]
+    also = f"Outside the limit: {' '.join(outside)}" if outside else ""
+    raise SessionRefused(" ".join(filter(None, (f"{folder}: nothing can be identified, {why}", also, reasons))))

@@ -15,6 +15,10 @@ _ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
 pressure to the left of the pelvis's middle; ahead of it."""
 _OWN = 0.003
 """m: sway in a short trial."""
+_REACH = 0.30
+"""m: no pressure lies farther from the pelvis of who stands still. One that does is of plates that are not where the
+file says at all (exchanged, for example): of these no shift is told, along one axis as little as along the other.
+"""
 
 
 class StandingPlace(Witness):
@@ -39,6 +43,8 @@ class StandingPlace(Witness):
             return ()
         height = float(np.mean([plate.height for plate in plates]))
         away = np.nanmean(seen.total.cop(height=height)[:, :2], axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
+        if not np.linalg.norm(away) <= _REACH:
+            return ()
         loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * force]
         where = loaded[0] if len(loaded) == 1 else ""
         axes = {"to the left": (np.array([-ahead[1], ahead[0]]), _ASIDE), "ahead": (ahead, _AHEAD)}
