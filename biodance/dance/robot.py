@@ -110,7 +110,7 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
         )
     usual = float(np.median(body.limits.velocity))
     ahead = float(np.clip(plan.forward * _FORWARD * leg_length(body), 0.05, 0.4))
-    free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0}
+    free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0, "plate": None}
     if any(isinstance(limit, Balance) and limit.share == FOLLOWABLE_SHARE for limit in plan.limits):
         plan = plan.with_limits([Balance()])  # people have performers instead
     return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead, **free)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.footprint import feet_on_plate
 from biodance.dance.problem.information import PostureInformation, update_posterior
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import SINGLE, Stance, holding, seat, stance
@@ -168,7 +169,8 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
 
 
 def _double(body: Body, plan: Plan, name: str) -> Stance:
-    feet = stance(body, name, right=plan.forward if name == "right_forward" else 0.0, share=plan.share, wide=plan.wide)
+    wide, forward = feet_on_plate(body, plan)
+    feet = stance(body, name, right=forward if name == "right_forward" else 0.0, share=plan.share, wide=wide)
     return holding(feet, body, plan.holds)
 
 

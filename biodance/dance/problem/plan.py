@@ -21,6 +21,8 @@ shipped ones are in ``protocols/dances``:
     deep = false                 true: deep squats and bows, one-leg squats, too
     lively = false               true: wider postures, too, for people who move easily
     wide = 1.35                  distance between the feet, times the usual one (free: 1)
+    plate_m = [0.40, 0.60]       force plate from side to side and ahead: feet stand nearer where they would not fit
+                                 (as here; robots: any)
     other_weight = 1.0           emphasis of the segments that [weights] does not name
     ranges = "comfortable"       what joints may use: what is reached without effort, or "anatomical": all that a
                                  healthy joint allows
@@ -59,6 +61,12 @@ from biodance.records import SIDES, Array
 _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
 """Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
 
+LEAST_WIDE, LEAST_FORWARD = 0.8, 0.05
+"""Times the usual distance between the feet, and m by which one is in front: the least that are legal."""
+USUAL_PLATE = (0.40, 0.60)
+"""m from side to side and ahead: the commonest force plate (AMTI BP400600, Kistler 9281), long side ahead."""
+_PLATE = (0.2, 3.0)
+"""m that a side of a plate, or of several that touch, may have."""
 _BRIEF = 1.0
 """s that postures in between are held at most."""
 
@@ -92,6 +100,7 @@ class Plan:
     simplicity: float = 0.0
     instructions: float = float("inf")
     wide: float = 1.0
+    plate: tuple[float, float] | None = None
     gentle: bool = False
     deep: bool = False
     lively: bool = False
@@ -119,14 +128,20 @@ class Plan:
         for name, low, high, unit in (
             ("move", 0.5, 20.0, "s"),
             ("hold", 0.0, 60.0, "s"),
-            ("forward", 0.05, 0.4, "m"),
+            ("forward", LEAST_FORWARD, 0.4, "m"),
             ("simplicity", 0.0, 100.0, ""),
             ("instructions", 2.0, float("inf"), ""),
-            ("wide", 0.8, 1.5, "times the usual distance"),
+            ("wide", LEAST_WIDE, 1.5, "times the usual distance"),
         ):
             value = getattr(self, name)
             if not low <= value <= high:
                 raise BiodanceError(f"Plan {self.name}: {name} = {value:g} {unit}; legal are {low:g} to {high:g}.")
+        low, high = _PLATE
+        if self.plate is not None and not all(low <= side <= high for side in self.plate):
+            raise BiodanceError(
+                f"Plan {self.name}: plate = {' by '.join(f'{side:g}' for side in self.plate)} m; legal are {low:g} to "
+                f"{high:g} m from side to side and ahead (metres, for example 0.40 and 0.60)."
+            )
         if not self.budget > 0:
             raise BiodanceError(f"Plan {self.name}: budget = {self.budget:g} s; it must be positive (inf: no limit).")
         factors = [self.other_weight, *(factor for _, factor in self.weights)]
@@ -185,7 +200,8 @@ _FOLLOWABLE = {"instructions": 4.0, "simplicity": 1.0, "wide": 1.35}
 """Of protocols that are not free, unless the file says otherwise."""
 FOLLOWABLE_SHARE = 0.8
 """Share of the support that a followable dance may use: what imprecise people need is judged by performers."""
-_KEYS = ("name", "description", "postures", "limits", "weights", "ranges", "for", *_NUMBERS, *_SHORT, *_FLAGS)
+_WORDS = ("name", "description", "postures", "limits", "weights", "ranges", "for", "plate_m")
+_KEYS = (*_WORDS, *_NUMBERS, *_SHORT, *_FLAGS)
 
 
 def read_plan(name_or_path: str | Path) -> Plan:
@@ -211,6 +227,7 @@ def read_plan(name_or_path: str | Path) -> Plan:
     free = flags.pop("free", False)
     fields: dict[str, Any] = (
         ({} if free else dict(_FOLLOWABLE))
+        | {"plate": _plate(path, raw["plate_m"]) if "plate_m" in raw else USUAL_PLATE}
         | flags
         | words
         | {field: finite_number(path, key, raw[key]) for key, field in _NUMBERS.items() if key in raw}
@@ -235,6 +252,15 @@ def _flag(path: Path, key: str, value: object) -> bool:
     if not isinstance(value, bool):
         raise BiodanceError(f"{path}: {key} = {value!r}; expected true or false.")
     return value
+
+
+def _plate(path: Path, value: object) -> tuple[float, float]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise BiodanceError(
+            f"{path}: plate_m = {value!r}; expected two lengths in m, from side to side and ahead, as [0.40, 0.60]."
+        )
+    side, ahead = (finite_number(path, "plate_m", one) for one in value)
+    return side, ahead
 
 
 def _limits(path: Path, raw: dict[str, Any], usual: dict[str, dict[str, float]]) -> tuple[Limit, ...]:
