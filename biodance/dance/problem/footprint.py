@@ -60,16 +60,28 @@ def feet_on_plate(body: Body, plan: Plan) -> tuple[float, float]:
     """
     if plan.plate is None:
         return plan.wide, plan.forward
-    over = np.maximum(_room(body, plan, plan.wide, plan.forward) - plan.plate, 0.0)
+    wide, forward, least = _nearer(body, plan, plan.plate)
+    if not _fits(least, plan.plate):
+        turned = plan.plate[::-1]
+        raise BiodanceError(_too_small(plan, plan.plate, least, turned=_fits(_nearer(body, plan, turned)[2], turned)))
+    return wide, forward
+
+
+def _nearer(body: Body, plan: Plan, plate: tuple[float, float]) -> tuple[float, float, Array]:
+    """Return ``wide`` and ``forward`` as near to the plan's as a ``plate`` asks for and is legal, and the room (2,) m
+    that the feet then need.
+    """
+    over = np.maximum(_room(body, plan, plan.wide, plan.forward) - plate, 0.0)
     wide, forward = plan.wide, plan.forward
     if over[0] > 0:
         wide = max((apart(body, plan.share, wide=wide) - float(over[0])) / apart(body, 1.0), LEAST_WIDE)
     if over[1] > 0:
         forward = max(forward - float(over[1]), LEAST_FORWARD)
-    least = _room(body, plan, wide, forward)
-    if np.any(least > np.array(plan.plate) + _ROUNDING):
-        raise BiodanceError(_too_small(plan, plan.plate, least))
-    return wide, forward
+    return wide, forward, _room(body, plan, wide, forward)
+
+
+def _fits(room: Array, plate: tuple[float, float]) -> bool:
+    return bool(np.all(room <= np.array(plate) + _ROUNDING))
 
 
 def _room(body: Body, plan: Plan, wide: float, forward: float) -> Array:
@@ -79,9 +91,8 @@ def _room(body: Body, plan: Plan, wide: float, forward: float) -> Array:
     return room_on_plates(stance(body, "parallel", right=right, share=plan.share, wide=wide) for right in ahead)
 
 
-def _too_small(plan: Plan, plate: tuple[float, float], least: Array) -> str:
+def _too_small(plan: Plan, plate: tuple[float, float], least: Array, *, turned: bool) -> str:
     side, ahead = plate
-    turned = bool(np.all(least <= np.array([ahead, side]) + _ROUNDING))
     nearest = "" if plan.seated else ", as near together as is legal"
     remedy = f"Let the person face across it (--plate {ahead:g},{side:g})" if turned else "Use a larger plate"
     return (
