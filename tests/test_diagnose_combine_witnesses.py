@@ -107,6 +107,16 @@ def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
         assert bool(one.findings) is named
 
 
+def test_what_the_movement_tells_apart_and_what_not_is_the_set_of_what_both_found() -> None:
+    """A trunk load, a wrong mass and a gain weigh the same: the movement tells the gain from it, and not the load."""
+    moved = finding("body_mass", "", 2.4, "kg", ("added_mass", "trunk_head"))
+    evidence = heard(("body_mass", ""), "standing_force", 2.5, 0.125)
+    simulation = replace(BY_SIMULATION, findings=(moved,))
+    (one,) = combine_findings(simulation, WitnessFindings((WEIGHT,), evidence), evidence, judged=True).findings
+    assert one.set == (Alias("body_mass", "", 60.0), Alias("added_mass", "trunk_head", 30.0))
+    assert 2.4 < one.parameters[0].value < 2.5
+
+
 @pytest.mark.parametrize(("lacking", "named"), [(29.0, True), (31.0, False)])
 def test_two_sources_carry_a_name_together(lacking: float, named: bool) -> None:
     """Feet (log evidence 30) and movement agree on 16 mm; the movement, which measures them better, asks for more."""

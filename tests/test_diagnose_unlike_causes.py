@@ -104,3 +104,38 @@ def test_a_cause_that_says_how_unlike_its_model_it_is_leaves_so_much() -> None:
     (one,) = diagnose_trials(body(), some, tolerances=known(), effects=every).diagnosis.findings
     assert one.effect == "cable"
     assert not one.varies_with
+
+
+class Second(Cable):
+    """The same cable as a model that swings ``late`` rad behind it."""
+
+    name = "second_cable"
+    late = 0.0
+
+    def columns(self, case: Case) -> Array:
+        """Return the wrench of one newton."""
+        return shaken(case.motion.time, self.late)[:, :, None]
+
+
+class Close(Second):
+    """One per cent unlike the first: no cause is so near to its model."""
+
+    late = 0.01
+
+
+class Apart(Second):
+    """Half unlike the first."""
+
+    late = 0.5
+
+
+@pytest.mark.parametrize(("second", "alike"), [(Close(), True), (Apart(), False)])
+def test_look_alikes_are_told_apart_by_more_than_a_model_leaves(second: Second, alike: bool) -> None:
+    """50 N exactly as the first model says: the second one leaves 0.5 N, as loud as the noise and in every swing, or
+    25 N.
+    """
+    some = windows(1, hidden=lambda wrench, session, moving: wrench + 50.0 * shaken(moving.time, 0.0))
+    every = effects(("plate_offset",)) | {"cable": Cable(), "second_cable": second}
+    (one,) = diagnose_trials(body(), some, tolerances=known(), effects=every).diagnosis.findings
+    assert one.effect == "cable"
+    assert ("second_cable" in {alias.effect for alias in one.set}) is alike
