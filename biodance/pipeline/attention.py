@@ -133,8 +133,8 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
 
 
 def _checks(one: Diagnosis) -> str:
-    """Return where the named causes that have no size were seen, as sentences: which labels, in which trials."""
-    bare = {(finding.effect, finding.target) for finding in one.findings if not finding.parameters}
+    """Return where the named causes whose size is not told were seen, as sentences: which labels, in which trials."""
+    bare = {(f.effect, f.target) for f in one.findings if all(p.sd != p.sd for p in f.parameters)}
     said = [quality.text for quality in one.checks if not quality.ok and (quality.effect, quality.target) in bare]
     return "".join(f"{_first_sentence(text)}. " for text in dict.fromkeys(said))
 

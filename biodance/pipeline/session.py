@@ -176,4 +176,6 @@ def identification_of(result: SessionResult) -> SessionIdentification:
     reasons = " ".join(dict.fromkeys([*said, *(reason for trial in fits for reason in trial.reasons)]))
     none = "no trial has the role fit. Set roles in session.toml."
     why = "no trial to fit has motion and fully measured ground contact." if fits else none
-    raise SessionRefused(f"{folder}: nothing can be identified, {why} {reasons}".strip())
+    outside = [f"{c.what}, {c.where}: {c.value} ({c.limit})." for c in result.checks if fits and not c.inside]
+    also = f"Outside the limit: {' '.join(outside)}" if outside else ""
+    raise SessionRefused(" ".join(filter(None, (f"{folder}: nothing can be identified, {why}", also, reasons))))

@@ -84,12 +84,15 @@ def reader_decisions(session: Session, patterns: dict[str, str]) -> tuple[Found,
 
 
 def overruled_files(session: Session, patterns: dict[str, str], *, check: str, effect: str) -> tuple[QualityCheck, ...]:
-    """Return a failed ``check`` for each different decision that the reader took against the files, with ``effect``
-    as its cause.
+    """Return a failed ``check`` for each target, or each size of it, on which the reader decided against the files,
+    with ``effect`` as its cause; of several trials, which name their own numbers, the first tells.
     """
+    first: dict[tuple[str, str], str] = {}
+    for target, sentence, number in reader_decisions(session, patterns):
+        first.setdefault((target, number), sentence)
     return tuple(
         QualityCheck(check, False, sentence, effect, target, float(number) if number else float("nan"))
-        for target, sentence, number in reader_decisions(session, patterns)
+        for (target, number), sentence in first.items()
     )
 
 
