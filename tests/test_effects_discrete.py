@@ -169,6 +169,14 @@ def test_what_the_reader_overruled_is_told() -> None:
     assert sorted(quality.size for quality in found if quality.size > 0) == [90, 1000]
 
 
+def test_one_unit_is_one_cause_though_every_trial_tells_its_own_number() -> None:
+    said = (f"POINT:UNITS is 'mm'; a cloud of markers of {size} can only be in m, so lengths are in m." for size in
+            ("1.431", "1.445", "1.545"))  # fmt: skip
+    found = check_quality(recorded(standing(np.random.default_rng(3)), warnings=tuple(said)).session)
+    assert failed(found) == [("unit_error", "markers")]
+    assert "1.431" in next(one.text for one in found if not one.ok)
+
+
 @pytest.mark.parametrize(("channel", "target"), [(1, "Fy"), (3, "Mx"), (5, "Mz")])
 def test_a_mirrored_channel_is_named(channel: int, target: str) -> None:
     sign = np.ones(6) - 2 * np.eye(6)[channel]

@@ -8,6 +8,7 @@ from diagnosed_sessions import body
 from example_results import FOUND, VERDICTS, full_session
 
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.repairs import by_checks
 from biodance.effects import QualityCheck, effects
 from biodance.pipeline.attention import (
     headline,
@@ -90,6 +91,13 @@ def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
     assert one.verdict == "unexplained"
     assert one.attention[0].text.startswith("Cannot tell")
     assert not is_well(one)
+
+
+def test_a_unit_whose_factor_has_no_interval_is_told_in_words() -> None:
+    said = "The plates carry 0.4536 times the declared weight: pounds declared as kilograms."
+    quality = QualityCheck("weight on the plates", False, said, "unit_error", "", 0.4536, "factor", "1")
+    one = by_checks((quality,))
+    assert f"Found: unit error. {said}" in headline(one, "", (), ()).text
 
 
 def test_beside_a_refused_step_nothing_is_well() -> None:

@@ -23,8 +23,8 @@ FOOT_LANDMARKS = tuple(
 
 
 _PART = 1.0
-"""s: shorter parts of a steady run are not looked at: in one of this length the typical marker gains less than 0.06
-m/s, which is 0.6 % of the weight.
+"""s: shorter parts of a steady run are not looked at: in this time the typical marker gains less than 0.06 m/s,
+which is 0.6 % of the weight.
 """
 
 

@@ -69,7 +69,7 @@ def _only_standing_judged(result: SessionResult, judged: tuple[Judged, ...]) -> 
 
 
 def is_well(one: Diagnosis) -> bool:
-    """Return whether nothing is wrong, every trial was judged, no check is outside its limit, nothing was refused."""
+    """Return whether nothing is wrong or refused, every trial was judged, and no check is outside its limit."""
     refused = any(said.level == "fail" for said in one.attention)
     said = all(said.level == "note" for said in one.attention if said.about == ABOUT)
     return one.verdict == "nothing wrong" and said and not refused
