@@ -91,7 +91,7 @@ def test_a_gain_is_not_doubted_where_the_movement_itself_errs(seed: int) -> None
     assert found.diagnosis.findings[0].parameters[0].value == pytest.approx(0.07, abs=0.005)
 
 
-def test_how_much_the_movement_errs_is_what_the_session_shows_and_not_what_was_learned() -> None:
+def test_the_movement_errs_by_what_the_session_shows() -> None:
     """The pelvis shakes at 2.5 to 6 Hz, and no session without fault left as little there as the tolerances say: the
     size of a true gain is 5.6 standard deviations too small there, by which it would be resembled, and none once what
     was measured is the regressor.
