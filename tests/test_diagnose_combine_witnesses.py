@@ -107,7 +107,7 @@ def test_two_sizes_that_agree_must_be_more_than_laboratories_have() -> None:
         assert bool(one.findings) is named
 
 
-def test_what_the_movement_tells_apart_and_what_not_is_the_set_of_what_both_found() -> None:
+def test_the_set_of_what_both_found_is_the_movements() -> None:
     """A trunk load, a wrong mass and a gain weigh the same: the movement tells the gain from it, and not the load."""
     moved = finding("body_mass", "", 2.4, "kg", ("added_mass", "trunk_head"))
     evidence = heard(("body_mass", ""), "standing_force", 2.5, 0.125)

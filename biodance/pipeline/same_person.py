@@ -56,7 +56,8 @@ def _unlike_legs(known: Body, body: Body) -> str:
     before, now = _leg(known), _leg(body)
     if not (before > 0 and now > 0) or abs(now / before - 1) <= ANOTHER_LEG:
         return ""
-    return f"has legs of {before:.2f} m from hip to ankle, {now:.2f} m are measured here: it is of another person"
+    legs = f"has legs of {before:.2f} m from hip to ankle, {now:.2f} m are measured here"
+    return f"{legs}: it is of another person, or of one who has grown since"
 
 
 def _leg(body: Body) -> float:
