@@ -129,7 +129,13 @@ class Apart(Second):
     late = 0.5
 
 
-@pytest.mark.parametrize(("second", "alike"), [(Close(), True), (Apart(), False)])
+class Far(Second):
+    """Less than a quarter of its wrench is like the first's: not asked under the noise that the first one leaves."""
+
+    late = 1.2
+
+
+@pytest.mark.parametrize(("second", "alike"), [(Close(), True), (Apart(), False), (Far(), False)])
 def test_look_alikes_are_told_apart_by_more_than_a_model_leaves(second: Second, alike: bool) -> None:
     """50 N exactly as the first model says: the second one leaves 0.5 N, as loud as the noise and in every swing, or
     25 N.

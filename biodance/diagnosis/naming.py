@@ -223,7 +223,8 @@ def refine(found: Model, ranking: Round, known: Tolerances) -> tuple[Round, Mode
     one named. Where none of them is possible, they hide nobody: the next ones are fitted.
 
     No cause is quite like its model: what the most probable one leaves of its wrench for that is noise beside the
-    ``known`` tolerances, and no evidence for or against a look-alike, so all are fitted again under it.
+    ``known`` tolerances, and no evidence for or against a look-alike, so all are fitted again under it. The others, of
+    which no evidence under it is known and less than half as much without, are no look-alikes then.
     """
     near = _near(found, ranking)
     refined, rest = _fitted(found, near), _others(ranking, near)
@@ -232,7 +233,7 @@ def refine(found: Model, ranking: Round, known: Tolerances) -> tuple[Round, Mode
         refined, rest = _fitted(found, near), _others(ranking, near)
     settled = with_unlike_causes(refined[0][1], known)
     if settled is not refined[0][1]:
-        refined = _fitted(settle(settled, found.named), near)
+        refined, rest = _fitted(settle(settled, found.named), near), Round(())
     return Round((*(one for one, _ in refined), *rest.suspects)), with_unlike_causes(refined[0][1], known)
 
 
