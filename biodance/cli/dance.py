@@ -4,6 +4,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,6 +45,10 @@ def dance_command(
     limits: Annotated[
         Path | None, Parameter(help="TOML file with the joint, strength and other limits of the person.")
     ] = None,
+    plate: Annotated[
+        str | None,
+        Parameter(help="Force plate, m from side to side and ahead as the person faces, e.g. 0.40,0.60 (usual)."),
+    ] = None,
     robot: RobotFile = NO_ROBOT,
     seed: Annotated[
         int,
@@ -76,6 +81,8 @@ def dance_command(
 
     plan, able = read_plan(protocol), read_person(limits) if limits else HEALTHY
     who = _who(person, robot)
+    if plate is not None:
+        plan = replace(plan, plate=_plate(plate, robot))
     if isinstance(who, RobotFile):
         body, make = robot_dancer(*who.named(), mend=who.mend), make_robot_dance
     else:
@@ -156,6 +163,20 @@ def play_command(
     else:
         sys.stdout.write(f"{found.table()}\n{place}\n")
     return DONE if found.playback.stays_up else NEEDS_A_PERSON
+
+
+def _plate(text: str, robot: RobotFile) -> tuple[float, float]:
+    """Return the sides of the plate, m; BiodanceError if it is not two numbers, or for a robot."""
+    if robot.given:
+        raise BiodanceError("--plate is for people: the feet of a robot stand as far apart as its hips. Leave it out.")
+    try:
+        side, ahead = (float(one) for one in text.split(","))
+    except ValueError as error:
+        raise BiodanceError(
+            f"--plate {text}: expected two lengths in m, from side to side and ahead of the person, for example "
+            f"0.40,0.60."
+        ) from error
+    return side, ahead
 
 
 def _who(person: PersonFacts, robot: RobotFile) -> "Subject | RobotFile":

@@ -41,7 +41,7 @@ def foresee_command(
     dance
         The dance.npz written by `biodance dance`, or its folder.
     """
-    from biodance.pipeline.dance_result import foresee_dance
+    from biodance.pipeline.dance_result import foresee_dance, plate_sentence
     from biodance.report.documents.diagnosis import foresight_document
     from biodance.report.files import refuse_page
     from biodance.report.pages.foresight import foresight_page
@@ -51,10 +51,11 @@ def foresee_command(
         tell("foreseeing what the dance will see")
         if out is not None:
             refuse_page(out, force=force)
-        found, protocol, seated = foresee_dance(dance)
-        document = foresight_document(found, seated=seated)
+        found, one = foresee_dance(dance)
+        seated = any(stance.seat for stance in one.stances)
+        document = foresight_document(found, seated=seated, plates=plate_sentence(one))
         if out is not None:
-            page = foresight_page(document, f"the dance “{protocol}”" if protocol else "the dance")
+            page = foresight_page(document, f"the dance “{one.protocol}”" if one.protocol else "the dance")
             out.write_text(page, encoding="utf-8", newline="\n")
     show(document, print_foresight, json=json)
     return DONE

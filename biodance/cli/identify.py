@@ -91,7 +91,7 @@ def identify_command(
     with progress() as tell:
         place = results.make_tables_folder(session)
         shown = None if dance is None else Dance.load(dance)
-        result, _, folder = examine_with_reference(session, reading, results, tell)
+        result, _, folder = examine_with_reference(session, reading, results, tell, dance=shown)
         found = front.identify(result, dance=shown)
         result = replace(result, identification=found)
         tell("checking units, signs, labels and clocks")

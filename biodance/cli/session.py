@@ -22,6 +22,7 @@ from biodance.cli.app import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from biodance.dance.dance import Dance
     from biodance.diagnosis.diagnosis import Diagnosis
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.movement import SessionMovement
@@ -91,14 +92,21 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
 
 
 def examine_with_reference(
-    session: Path, reading: Reading, results: Results, tell: "Callable[[str], None]"
+    session: Path,
+    reading: Reading,
+    results: Results,
+    tell: "Callable[[str], None]",
+    *,
+    dance: "Dance | None" = None,
 ) -> "tuple[SessionResult, SessionIdentification | None, Path]":
     """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the
     results' folder.
 
-    What cannot be read or written is said before the long work starts.
+    What cannot be read or written is said before the long work starts, and so is a ``dance`` for which the plates are
+    too small.
     """
     from biodance.lab.session.results_folder import results_folder
+    from biodance.pipeline.dance_result import plates_too_small
     from biodance.pipeline.front import identify
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.saved_results import known_body
@@ -108,6 +116,8 @@ def examine_with_reference(
     earlier = lab.corrected(reading.read(reading.reference, tell)) if reading.reference else None
     recording = lab.corrected(reading.read(session, tell))
     folder = results_folder(results.out, session, force=results.force)
+    if dance is not None and (why := plates_too_small(dance, recording)):
+        say(f"look: {why}")
     before = identify(earlier, tell=tell) if earlier else None
     return examine(recording, reference=before, known=known, tell=tell), before, folder
 

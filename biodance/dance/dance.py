@@ -70,6 +70,8 @@ class Dance(Sendable):
         (P) what each posture is called, where it is made of known ones; else empty.
     mirrored : tuple of int
         Postures that are the one before them with right and left exchanged.
+    plate : tuple of float or None
+        Force plate from side to side and ahead, m, on which all feet were set; None any.
 
     Examples
     --------
@@ -91,6 +93,7 @@ class Dance(Sendable):
     subject: Subject | None = None
     names: tuple[str, ...] = ()
     mirrored: tuple[int, ...] = ()
+    plate: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
@@ -231,7 +234,7 @@ class Dance(Sendable):
         if self.subject is not None:
             who = {name: getattr(self.subject, name) for name in _PERSON}
             words["subject"] = {name: value for name, value in who.items() if value == value}
-        words |= {"names": self.names, "mirrored": self.mirrored}
+        words |= {"names": self.names, "mirrored": self.mirrored, "plate": self.plate}
         words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(
@@ -274,6 +277,7 @@ class Dance(Sendable):
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
             who = Subject(**words["subject"]) if "subject" in words else None
             more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored")}
+            more["plate"] = tuple(words["plate"]) if words.get("plate") else None
             return cls(words["protocol"], body, seed=words["seed"], subject=who, **more, **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). {_GIVE}") from error

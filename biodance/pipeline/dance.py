@@ -111,6 +111,7 @@ def make_dance(
         reason = str(error)
     counted = expected = freely = None
     if dance is not None:
+        dance = replace(dance, plate=plan.plate)
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)

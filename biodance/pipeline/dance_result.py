@@ -13,8 +13,10 @@ from biodance.dance.expectation import Expectation
 from biodance.dance.limits import ForImprecise
 from biodance.dance.metrics import DanceMetrics, longest_alone
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
+from biodance.dance.problem.footprint import room_in_words, room_on_plates
 from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
+from biodance.records import Session
 
 if TYPE_CHECKING:
     from biodance.diagnosis.foresight import Foresight
@@ -144,6 +146,8 @@ class DanceResult:
         out = [f"For {self.plan.whom}."] if self.plan.whom else []
         if self.dance and (alone := longest_alone(self.dance)):
             out.append(f"One foot is off the ground for up to {alone:.0f} s at a time.")
+        if self.dance:
+            out.append(plate_sentence(self.dance))
         if self.reason_of_person:
             out.append(f"Made for one person's limits: {self.reason_of_person}.")
         if found := self._left:
@@ -174,13 +178,48 @@ def _names(segments: tuple[str, ...]) -> str:
     return ", ".join(name.replace("_", " ") for name in segments)
 
 
+def plate_sentence(dance: Dance) -> str:
+    """Return how much force plate a dance needs, and for which it was made."""
+    seated = any(stance.seat for stance in dance.stances)
+    needs = room_in_words(room_on_plates(dance.stances), seated=seated)
+    frame = ", and the legs of the frame stand on plates, too" * any(np.isfinite(s.hands).any() for s in dance.stances)
+    made = dance.plate and f" It is made for a plate of {dance.plate[0]:.2f} m by {dance.plate[1]:.2f} m (--plate)."
+    return f"{needs[:1].upper()}{needs[1:]}{frame}; mark their outlines.{made or ''}"
+
+
+_ALIKE = 0.001
+"""m by which sides of plates differ from what is written of them."""
+
+
+def plates_too_small(dance: Dance, session: Session) -> str:
+    """Return a sentence where the plates of a ``session`` cannot carry all feet of a ``dance``, whichever way the
+    person faces; "" where they can: several are taken for as large as what they enclose.
+    """
+    fits = [trial for trial in session if trial.role == "fit"]
+    corners = [plate.corners[:, :2] for trial in fits for plate in trial.plates if plate.placed]
+    if not corners:
+        return ""
+    side = corners[0][1] - corners[0][0]
+    along = side / np.linalg.norm(side)
+    points = np.concatenate(corners)
+    size = np.ptp(points @ np.column_stack([along, [-along[1], along[0]]]), axis=0)
+    room = room_on_plates(dance.stances)
+    if any(np.all(room <= one + _ALIKE) for one in (size, size[::-1])):
+        return ""
+    return (
+        f"{plate_sentence(dance)} The plates of {session.folder} cover {size[0]:.2f} m by {size[1]:.2f} m, and frames "
+        f"in which a foot may stand beside them are left out. Design the dance for these plates (biodance dance "
+        f"--plate), or use larger ones."
+    )
+
+
 TRIAL_SECONDS = 20.0
 """s: a designed dance is looked at as trials of about this length."""
 
 
-def foresee_dance(path: Path) -> tuple["Foresight", str, bool]:
-    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`; its
-    protocol, and whether it is danced sitting.
+def foresee_dance(path: Path) -> tuple["Foresight", Dance]:
+    """Return what the dance in a file of `biodance dance` will be able to see, as trials of about `TRIAL_SECONDS`, and
+    the dance.
 
     Raises
     ------
@@ -190,5 +229,4 @@ def foresee_dance(path: Path) -> tuple["Foresight", str, bool]:
     from biodance.diagnosis.foresight import foresee, session_of
 
     dance = Dance.load(path)
-    found = foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS))
-    return found, dance.protocol, any(stance.seat for stance in dance.stances)
+    return foresee(dance.body, session_of(dance.motion(50.0), TRIAL_SECONDS)), dance

@@ -1,6 +1,7 @@
 """What ``import biodance`` conducts before a visit: a dance to be recorded, or a laboratory to be simulated."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ def design_dance(
     *,
     limits: str | Path | None = None,
     own_limits: "Iterable[Limit | type[Limit]]" = (),
+    plate: tuple[float, float] | None = None,
     seed: int = 0,
     tell: Callable[[str, int, int], None] = lambda *_: None,
 ) -> "DanceResult":
@@ -42,6 +44,8 @@ def design_dance(
     own_limits : iterable of Limit, optional
         Limits of your own, kept beside those of the protocol or in place of one of the same name
         (`biodance.dance.limits`).
+    plate : tuple of float, optional
+        Force plate from side to side and ahead of the person, m, on which all feet are set; by default the protocol's.
     seed : int
         The same seed gives the same dance.
     tell : callable, optional
@@ -82,6 +86,7 @@ def design_dance(
     from biodance.pipeline.dance import dancer, designed_for, make_dance
 
     plan = read_plan(protocol)
+    plan = plan if plate is None else replace(plan, plate=plate)
     person = read_person(Path(limits)) if limits else HEALTHY
     made = make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
     return designed_for(made, subject)

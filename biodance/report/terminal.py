@@ -192,9 +192,9 @@ def print_foresight(found: dict[str, Any], console: Console) -> None:
             console.print(f"will confuse: {escape(pair['cause'])} with {escape(pair['other'])}")
     hidden = causes_by_effect((row["effect"], row["target"]) for row in found["unobservable"])
     _line(console, f"cannot see: {hidden or 'nothing of what it looks for'}")
-    _line(console, found["summary"])
-    if found["care"]:
-        _line(console, found["care"])
+    for sentence in (found["summary"], found["plates"], found["care"]):
+        if sentence:
+            _line(console, sentence)
     for one in found["changes"]:
         count = len({*one["unseen"], *one["confused"]})
         console.print(f"to change: {escape(one['do'])} ({count} cause{'s' * (count != 1)})", soft_wrap=True)

@@ -20,12 +20,27 @@ def room_on_plates(stances: Iterable[Stance]) -> Array:
     """Return how much plate (2,) m, from side to side and ahead as the person faces, all these feet need together:
     their soles with `AROUND` on every side, and the legs of a stool.
     """
-    corners = [np.empty((0, 2))]
+    low, high = _ends(stances)
+    return np.asarray((high - low)[::-1])
+
+
+def _ends(stances: Iterable[Stance]) -> tuple[Array, Array]:
+    """Return the least and the greatest place (2,) m of what must lie on plates."""
+    points = []
     for one in stances:
         soles = one.soles[list(one.planted), :, :2].reshape(-1, 2)
-        corners += [soles - AROUND, soles + AROUND, one.props]
-    points = np.concatenate(corners)
-    return np.asarray(np.ptp(points, axis=0)[::-1])
+        points += [soles - AROUND, soles + AROUND, one.props]
+    found = np.concatenate(points)
+    return found.min(axis=0), found.max(axis=0)
+
+
+def plate_corners(stances: Iterable[Stance], plate: tuple[float, float]) -> Array:
+    """Return the corners (4, 2) m, in order, of a ``plate`` (m from side to side and ahead) with all these feet in its
+    middle.
+    """
+    low, high = _ends(stances)
+    half = np.array(plate[::-1]) / 2
+    return (low + high) / 2 + half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
 
 
 def room_in_words(room: Array, *, seated: bool = False) -> str:

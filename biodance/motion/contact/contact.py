@@ -20,6 +20,7 @@ from biodance.motion.contact.footing import (
     find_surfaces,
     footing,
     inside,
+    overhang_notes,
     resting,
     speeds,
 )
@@ -177,6 +178,7 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: FeetOnGround) -> Conta
         + _unplaced(trial)
         + feet.belted
         + surfaces.notes
+        + overhang_notes(trial.plates, soles, feet.rests & touching & ~place.covered & (place.share > 0))
         + _cop_notes(trial, outside, measured, feet.rules)
     )
     told = measured[:, None] | _told(trial, place, touching, feet.rests, feet.load)

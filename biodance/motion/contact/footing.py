@@ -51,6 +51,20 @@ def inside(plate: Plate, points: Array) -> Array:
     return np.asarray(reduce(np.minimum, np.moveaxis(within, -1, 0)))
 
 
+def overhang_notes(plates: tuple[Plate, ...], soles: Soles, beside: Mask) -> tuple[str, ...]:
+    """Return a sentence for each foot that rests partly ``beside`` (T, 2) plates of known place: by how much."""
+    notes = []
+    for foot, side in enumerate(SIDES):
+        outline = soles.outline[beside[:, foot], foot]
+        if len(outline) and all(plate.placed for plate in plates):
+            within = np.max([inside(plate, outline) for plate in plates], axis=0).min(axis=1)
+            notes.append(
+                f"Where it rests partly beside the plates, the {side} foot reaches {-1000 * np.median(within):.0f} mm "
+                f"beyond their edge (median)."
+            )
+    return tuple(notes)
+
+
 def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touching: Mask) -> Footing:
     """Return which plates the touching feet (T, 2) are over, and whether they can touch anything else."""
     spread = _spread_over(plates, soles)

@@ -7,6 +7,7 @@ import numpy as np
 
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
+from biodance.dance.problem.footprint import room_on_plates
 from biodance.dance.rehearsal import Rehearsal
 from biodance.pipeline.dance_result import DanceResult
 from biodance.report.documents.plain import keyed
@@ -39,6 +40,8 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "for": result.plan.whom,
         "instructions": _counted(dance),
         "performers": result.performers,
+        "plate_m": dance.plate if dance else None,
+        "room_on_plates_m": room_on_plates(dance.stances) if dance else None,
         "simplicity_price": _price(result),
         "warnings": result.warnings,
         "notes": (*result.notes, *(dance.notes if dance else ())),

@@ -67,9 +67,10 @@ _SEATED = (
 )
 
 
-def foresight_document(found: Foresight, *, seated: bool = False) -> dict[str, Any]:
+def foresight_document(found: Foresight, *, seated: bool = False, plates: str = "") -> dict[str, Any]:
     """Return what a movement will be able to see; ``separation`` the smallest expected log Bayes factor between two
-    causes it sees; ``care`` what must not be asked of whoever dances ``seated``.
+    causes it sees; ``care`` what must not be asked of whoever dances ``seated``; ``plates`` a sentence on how much
+    plate the dance needs.
     """
     pairs = [
         {"cause": " ".join(p.cause).strip(), "other": " ".join(p.other).strip(), "log_bayes_factor": p.difference}
@@ -82,6 +83,7 @@ def foresight_document(found: Foresight, *, seated: bool = False) -> dict[str, A
         "separation": found.separation,
         "summary": foresight_summary(found),
         "care": _SEATED if seated else "",
+        "plates": plates,
         "changes": [
             {"do": one.do, **{key: [" ".join(c).strip() for c in getattr(one, key)] for key in ("unseen", "confused")}}
             for one in found.changes

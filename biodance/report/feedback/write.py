@@ -15,6 +15,7 @@ from biodance.body.solids import segment_solids
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
+from biodance.dance.problem.footprint import plate_corners
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
@@ -116,6 +117,8 @@ def _points(body: Body) -> list[dict[str, Any]]:
 
 _RATE = 15.0
 """Hz of the poses; the page turns and shifts evenly between two."""
+_SQUARE = (0.6, 0.6)
+"""m that is drawn where the plate is not known."""
 _FACTOR = 1e4
 """Steps a metre: positions are whole numbers of 0.1 mm."""
 
@@ -129,7 +132,8 @@ def scene_of(dance: Dance) -> dict[str, Any]:
         ``name``, ``duration_s``, ``rate_hz``, ``frames``; ``segments`` with ``name``, ``side``, ``vertices`` (V, 3)
         float32 m in the segment's frame and ``faces`` (F, 3) uint16; ``poses`` (frames, segments, 7) int16: position in
         0.1 mm of the lab, z up, and quaternion x, y, z, w in steps of 1/32767; arrays little-endian in base64;
-        ``cues``, one a posture (`_cues`).
+        ``plate`` (4, 2) m corners of the plate for which it was made, else of a square about the feet; ``cues``, one a
+        posture (`_cues`).
 
     Raises
     ------
@@ -162,6 +166,7 @@ def scene_of(dance: Dance) -> dict[str, Any]:
             for name in (dance.body.segments[k] for k in chosen)
         ],
         "poses": _packed(placed, "<i2"),
+        "plate": plate_corners(dance.stances, dance.plate or _SQUARE).round(4).tolist(),
         "cues": _cues(dance),
     }
 

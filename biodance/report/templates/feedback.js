@@ -50,7 +50,7 @@ function place(group, second) {
 const body = figure(1), ghost = figure(0.3);
 const lines = new THREE.Group();
 scene.add(lines);
-const PLATE = [[0.25, -0.3], [0.25, 0.3], [-0.35, 0.3], [-0.35, -0.3]]; // m, what is aligned with the plate's corners
+const PLATE = data.plate; // m, what is aligned with the plate's corners
 function outline(points, colour) {
   const loop = points.map(([x, y]) => new THREE.Vector3(x, y, 0.002));
   const geometry = new THREE.BufferGeometry().setFromPoints(loop);
