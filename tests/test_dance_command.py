@@ -56,6 +56,12 @@ def test_results_json_keeps_its_promise(made: tuple[Path, Path, int]) -> None:
     assert len(found["expected_sd"]) == 12
     assert all(0 < row["mass_kg"] <= row["mass_table_kg"] for row in found["expected_sd"])
     assert found["compute_s"] > 0
+    soles = np.concatenate([stance.soles.reshape(-1, 3) for stance in Dance.load(folder / "dance.npz").stances])
+    np.testing.assert_allclose(found["room_on_plates_m"], np.ptp(soles, axis=0)[[1, 0]] + 0.05)
+    assert found["plate_m"] == [0.4, 0.6]
+    assert all(
+        "made for a plate of 0.40 m by 0.60 m" in (folder / name).read_text() for name in ("cues.md", "cues.html")
+    )
     assert not (folder / UNFINISHED).exists()
 
 

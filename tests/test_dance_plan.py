@@ -58,6 +58,9 @@ def test_one_segment_counts_alone() -> None:
         ("budget_s = -3\n[postures]\nparallel = 3", "budget = -3"),
         ("other_weight = 0\n[postures]\nparallel = 3", "at least one of them positive"),
         ("postures = 3", "must be a table"),
+        ("plate_m = 0.4\n[postures]\nparallel = 3", "plate_m = 0.4; expected two lengths in m"),
+        ("plate_m = [0.4, 'x']\n[postures]\nparallel = 3", "plate_m = 'x'; expected a finite number"),
+        ("plate_m = [0.1, 0.6]\n[postures]\nparallel = 3", "plate = 0.1 by 0.6 m; legal are 0.2 to 3 m"),
         ("ranges = 'all'\n[postures]\nparallel = 3", "Legal: anatomical, comfortable"),
     ],
 )

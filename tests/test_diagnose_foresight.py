@@ -49,7 +49,8 @@ def test_what_to_change_is_in_the_words_of_the_causes_that_stay_unseen() -> None
     still = motion(1)
     frozen = type(still)(still.time, np.tile(still.q[0], (still.time.size, 1)), 0 * still.v, 0 * still.a)
     found = foresee(body(), (frozen,), tolerances=known(), effects=("plate_gain", "plate_offset"))
-    page = foresight_page(foresight_document(found), "standing")
+    page = foresight_page(foresight_document(found, plates="The feet need room."), "standing")
+    assert "The feet need room." in page
     (squats, *_) = [one for one in found.changes if one.do == effects()["plate_gain"].separated_by]
     assert {name for name, _ in squats.unseen} == {"plate_gain"}
     assert escape(squats.do, quote=True).replace("&#x27;", "&#39;") in page

@@ -64,6 +64,9 @@ def test_a_foot_half_on_the_edge_is_not_measured(heel: float, measured: bool) ->
     contact = ground_contact(trial, soles)
     assert contact.measured.all() == measured
     assert any("right foot may stand partly" in note for note in contact.notes) != measured
+    beyond = 1000 * max(0.0 - soles.outline[0, 0, :, 0].min(), soles.outline[0, 0, :, 0].max() - 0.5)
+    said = f"the right foot reaches {beyond:.0f} mm beyond their edge"
+    assert any(said in note for note in contact.notes) != measured
 
 
 def on_a_belt(speed: float) -> tuple:
