@@ -9,14 +9,13 @@ from small_dances import BODY, small_dance
 from walkers import Stand, plate, walker
 
 from biodance.body.human.human import human
-from biodance.dance.dance import Dance
 from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.problem.footprint import AROUND, plate_corners, room_on_plates
+from biodance.dance.problem.footprint import AROUND, room_on_plates
 from biodance.dance.problem.plan import LEAST_FORWARD, LEAST_WIDE, USUAL_PLATE, Plan, read_plan
 from biodance.dance.problem.stance import STOOL, seat
 from biodance.errors import BiodanceError
 from biodance.motion.contact.contact import ground_contact
-from biodance.pipeline.dance_result import plate_sentence, plates_too_small
+from biodance.pipeline.dance_result import plates_too_small
 from biodance.records import Array, Session, Subject
 
 TALL = human(Subject(110.0, 1.80, "M", 45.0))
@@ -43,10 +42,6 @@ def test_the_feet_of_a_tall_person_are_set_on_the_plate_with_room_around_them() 
     np.testing.assert_allclose(fitted, [0.40 - 2 * AROUND, free[1]], atol=1e-9)
     shallow = reach(replace(BOTH, plate=(0.60, free[1] + 2 * AROUND - 0.03)))
     np.testing.assert_allclose(shallow, [free[0], free[1] - 0.03], atol=1e-9)
-
-
-def test_feet_that_fit_stay_where_they_are() -> None:
-    np.testing.assert_array_equal(reach(replace(BOTH, plate=(0.6, 0.6))), reach(BOTH))
 
 
 @pytest.mark.parametrize(
@@ -84,27 +79,6 @@ def test_a_wrong_plate_in_a_protocol_is_refused(tmp_path: Path, given: str) -> N
 
 def test_a_stool_needs_the_place_of_its_legs() -> None:
     np.testing.assert_allclose(room_on_plates([seat(BODY)]), np.ptp(STOOL, axis=0)[::-1])
-
-
-def test_the_plate_is_drawn_around_the_feet() -> None:
-    corners, soles = plate_corners(small_dance().stances, (0.4, 0.6)), small_dance().stances[0].soles[..., :2]
-    np.testing.assert_allclose(np.ptp(corners, axis=0), [0.6, 0.4])
-    middle = (soles.min(axis=(0, 1)) + soles.max(axis=(0, 1))) / 2
-    np.testing.assert_allclose(corners.mean(axis=0), middle, atol=1e-9)
-    area = np.linalg.det([corners[1] - corners[0], corners[3] - corners[0]])
-    assert area == pytest.approx(0.24), "counter-clockwise or not, in order"
-
-
-def test_a_dance_keeps_its_plate_and_says_it(tmp_path: Path) -> None:
-    made = replace(small_dance(), plate=(0.4, 0.6))
-    made.save(tmp_path / "dance.npz")
-    assert Dance.load(tmp_path / "dance.npz").plate == (0.4, 0.6)
-    small_dance().save(tmp_path / "older.npz")
-    assert Dance.load(tmp_path / "older.npz").plate is None
-    room = room_on_plates(made.stances)
-    assert f"need {room[0]:.2f} m of force plate from side to side and {room[1]:.2f} m ahead" in plate_sentence(made)
-    assert "made for a plate of 0.40 m by 0.60 m" in plate_sentence(made)
-    assert "made for" not in plate_sentence(small_dance())
 
 
 def session(*spans: tuple[float, float], role: str = "fit") -> Session:
