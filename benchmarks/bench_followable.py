@@ -68,7 +68,7 @@ def found(name: str, protocol: str, folder: Path, price: bool) -> dict[str, Any]
         dance.save(path.with_suffix(".npz"))
         if not out["left"]:
             few = rehearse_imprecisely(dance, plan.limits, who=range(_FEW))
-            out["few"] = {room.limit: room.worst for room in few.rooms}
+            out["few"] = {room.limit: room.worst for room in few.least_margins}
         if price and np.isfinite(plan.instructions):
             free = expect(freer_dance(body, plan, seed=0), steps=1)
             out["free"] = [float(_rms(free.mass)[-1]), float(_rms(free.com)[-1])]
