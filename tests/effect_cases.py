@@ -1,13 +1,15 @@
 """Small cases on which every effect is tried, and what the docstring of an effect must say."""
 
+from pathlib import Path
+
 import numpy as np
 from human_cases import human_case
 from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
-from biodance.effects import Case
+from biodance.effects import Case, QualityCheck, Recorded
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Motion, Plate, Source, Trial, Wrench
+from biodance.records import Motion, Plate, Session, Source, Subject, Trial, Wrench
 
 SECTIONS = ("Signature:", "Look-alikes:", "Separated by")
 
@@ -32,6 +34,17 @@ def example(plates: int = 1) -> Case:
     )
     trial = Trial("t", "fit", None, made, Source(__file__, "", "test"))
     return Case(body, trial, motion, body.sip.phi, time / time[-1])
+
+
+def failed(found: tuple[QualityCheck, ...]) -> list[tuple[str, str]]:
+    """Return effect and target of the checks that failed."""
+    return [(quality.effect, quality.target) for quality in found if not quality.ok]
+
+
+def session_of(*cases: Case) -> Recorded:
+    """Return a session of a man of 70 kg with the trials of some cases."""
+    trials = tuple(case.trial for case in cases)
+    return Recorded(Session(Subject(70.0, 1.75, "M"), trials, Path()), cases)
 
 
 CASES = {1: example(1), 2: example(2), "human": human_case(120)}

@@ -27,6 +27,13 @@ def occupied(plan: Plan) -> np.ndarray:
     return np.ptp(np.concatenate(soles)[:, :2], axis=0)[::-1]
 
 
+def test_every_dance_of_people_is_made_for_the_usual_plate_unless_it_says_otherwise(tmp_path: Path) -> None:
+    assert read_plan("short").plate == read_plan("full").plate == (0.40, 0.60)
+    own = tmp_path / "own.toml"
+    own.write_text('name = "own"\nplate_m = [0.464, 0.508]\n[postures]\nparallel = 3\n')
+    assert read_plan(own).plate == (0.464, 0.508)
+
+
 def test_a_tall_mans_feet_fit_on_the_usual_plate_and_did_not_without_it() -> None:
     plan = read_plan("short")
     side, ahead = occupied(plan)

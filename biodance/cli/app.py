@@ -227,9 +227,9 @@ class PersonFacts:
     sex: Annotated[Literal["F", "M"] | None, Parameter(help="Sex of the person.")] = None
     height: Annotated[float | None, Parameter(help="Body height, m.")] = None
     mass: Annotated[float | None, Parameter(help="Body mass, kg.")] = None
-    age: Annotated[float, Parameter(validator=_lived, help="Age, 0 to 120 years; strength depends on it.")] = float(
-        "nan"
-    )
+    age: Annotated[
+        float, Parameter(validator=_lived, show_default=False, help="Age, 0 to 120 years; strength depends on it.")
+    ] = float("nan")
 
 
 NOBODY = PersonFacts()

@@ -4,7 +4,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,25 +30,44 @@ from biodance.cli.app import (
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
+    from biodance.dance.problem.plan import Plan
     from biodance.records import Subject
 
 FileOut = Annotated[Path, Parameter(name="--out", help="Output file, e.g. dance.html.")]
 
 
-@app.command(name="dance")
-def dance_command(
-    *,
-    person: PersonFacts = NOBODY,
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class DanceAsked:
+    """What is to be danced, within which limits and where."""
+
     protocol: Annotated[
         str, Parameter(help="Built-in protocol (easy, patient, chair, short, one_segment, full) or a TOML file.")
-    ] = "full",
+    ] = "full"
     limits: Annotated[
         Path | None, Parameter(help="TOML file with the joint, strength and other limits of the person.")
-    ] = None,
+    ] = None
     plate: Annotated[
         str | None,
         Parameter(help="Force plate, m from side to side and ahead as the person faces, e.g. 0.40,0.60 (usual)."),
-    ] = None,
+    ] = None
+
+    def plan(self) -> "Plan":
+        """Return the plan of the protocol, for the plate if one was named."""
+        from biodance.dance.problem.plan import read_plan
+
+        plan = read_plan(self.protocol)
+        return plan if self.plate is None else replace(plan, plate=_sides(self.plate))
+
+
+USUAL_DANCE = DanceAsked()
+
+
+@app.command(name="dance")
+def dance_command(
+    *,
+    asked: DanceAsked = USUAL_DANCE,
+    person: PersonFacts = NOBODY,
     robot: RobotFile = NO_ROBOT,
     seed: Annotated[
         int,
@@ -67,7 +86,6 @@ def dance_command(
     there. If no dance satisfies all limits, the violated limit is reported (exit code 1).
     """
     from biodance.dance.problem.person import HEALTHY, read_person
-    from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import (
         UNFINISHED,
         dance_folder,
@@ -79,10 +97,10 @@ def dance_command(
     )
     from biodance.report.dance_write import print_dance, write_dance
 
-    plan, able = read_plan(protocol), read_person(limits) if limits else HEALTHY
+    if robot.given and asked.plate is not None:
+        raise BiodanceError("--plate is for people: a robot's feet stand as far apart as its hips. Leave it out.")
+    plan, able = asked.plan(), read_person(asked.limits) if asked.limits else HEALTHY
     who = _who(person, robot)
-    if plate is not None:
-        plan = replace(plan, plate=_plate(plate, robot))
     if isinstance(who, RobotFile):
         body, make = robot_dancer(*who.named(), mend=who.mend), make_robot_dance
     else:
@@ -165,15 +183,13 @@ def play_command(
     return DONE if found.playback.stays_up else NEEDS_A_PERSON
 
 
-def _plate(text: str, robot: RobotFile) -> tuple[float, float]:
-    """Return the sides of the plate, m; BiodanceError if it is not two numbers, or for a robot."""
-    if robot.given:
-        raise BiodanceError("--plate is for people: the feet of a robot stand as far apart as its hips. Leave it out.")
+def _sides(plate: str) -> tuple[float, float]:
+    """Return the sides of a plate, m, named as SIDE,AHEAD."""
     try:
-        side, ahead = (float(one) for one in text.split(","))
+        side, ahead = (float(one) for one in plate.split(","))
     except ValueError as error:
         raise BiodanceError(
-            f"--plate {text}: expected two lengths in m, from side to side and ahead of the person, for example "
+            f"--plate {plate}: expected two lengths in m, from side to side and ahead of the person, for example "
             f"0.40,0.60."
         ) from error
     return side, ahead
