@@ -116,16 +116,15 @@ def _masses(found: Identification | None) -> list[dict[str, Any]] | None:
 
 
 def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
-    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen); ``doubt``
-    is why nothing can be told, "" where it can.
-    """
+    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen)."""
     one = found.diagnosis
     return {
         "attention": attention_document(one.attention),
         "judged": judged_document(one.judged),
         "verdict": one.verdict,
         "told": one.told,
-        "doubt": one.doubt,
+        "status": one.status,
+        "reasons": one.reasons,
         "findings": [_finding(finding) for finding in one.findings],
         "resembles": [_finding(finding) for finding in one.resembles],
         "within_tolerance": [_finding(finding) for finding in one.tolerated],
