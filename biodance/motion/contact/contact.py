@@ -12,19 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.contact.belts import belts
-from biodance.motion.contact.footing import (
-    Footing,
-    Surfaces,
-    cop_outside,
-    dilate,
-    find_surfaces,
-    footing,
-    overhang_notes,
-    resting,
-    speeds,
-)
+from biodance.motion.contact.belts import belts, dilate, resting, speeds
+from biodance.motion.contact.footing import Footing, cop_outside, footing, overhang_notes
 from biodance.motion.contact.soles import Soles
+from biodance.motion.contact.surfaces import Surfaces, find_surfaces
 from biodance.motion.contact.unmeasured import by_reason, unmeasured_frames, unmeasured_notes
 from biodance.motion.dynamics import distribute
 from biodance.records import SIDES, Array, LeftOut, Mask, Trial, Wrench
@@ -124,7 +115,7 @@ def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) ->
 def contact_with_plates(trial: Trial, soles: Soles, feet: FeetOnGround) -> Contact:
     """Return the ground contact of a prepared trial whose ``feet`` are known."""
     touching, surfaces = feet.touching, feet.surfaces
-    place = footing(trial.plates, soles, surfaces, touching)
+    place = footing(trial.plates, soles, surfaces, touching, feet.load)
     found = unmeasured_frames(trial, place, touching, feet.rests, feet.load, weight=feet.weight)
     measured = ~np.any([one.frames for one in found], axis=0)
     outside = cop_outside(trial.plates, soles, place, feet.pressed)
