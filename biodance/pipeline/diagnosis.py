@@ -137,10 +137,10 @@ def diagnose_session(
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
-    used = chosen_windows(result.trials) if found.examined else ()
+    looked_at = found.examined.naming.found.problem.looked_at if found.examined else frozenset[str]()
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
-    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
+    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, looked_at)))
 
 
 def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, str], SimulatedSize]:

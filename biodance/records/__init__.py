@@ -20,6 +20,7 @@ from biodance.records.arrays import (
     runs,
     spread_frames,
 )
+from biodance.records.left_out import LeftOut
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
 from biodance.records.session import ROLES, Role, Session, Source, Trial
@@ -35,6 +36,7 @@ __all__ = [
     "Array",
     "FootSizes",
     "Index",
+    "LeftOut",
     "Markers",
     "Mask",
     "Motion",

@@ -17,7 +17,7 @@ from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.effects import Case
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.motion.contact.contact import Contact
-from biodance.motion.contact.footing import inside
+from biodance.motion.contact.over import inside
 from biodance.motion.contact.soles import Soles
 from biodance.records import SIDES, Array, Motion, Trial, Wrench, runs
 from biodance.registration.pose import Forces, FramePose

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.still import is_still
-from biodance.motion.contact.footing import inside
+from biodance.motion.contact.over import inside
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point

@@ -32,8 +32,14 @@ def attention_document(found: Sequence[Attention]) -> list[dict[str, Any]]:
 
 
 def judged_document(found: Sequence[Judged]) -> list[dict[str, Any]]:
-    """Return what a verdict rests on, and of what it does not why; ``missed``: it should have."""
-    return [keyed(one, "trial seconds") | {"why_not": one.why_not or None, "missed": one.missed} for one in found]
+    """Return what a verdict rests on, and of what it does not why; ``missed``: it should have; ``left_out`` s by
+    reason.
+    """
+    return [
+        keyed(one, "trial seconds left_out_s")
+        | {"why_not": one.why_not or None, "missed": one.missed, "left_out": dict(one.left_out)}
+        for one in found
+    ]
 
 
 def _finding(one: Finding) -> dict[str, Any]:
