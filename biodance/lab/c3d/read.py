@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.layout import parameter_numbers, texts
+from biodance.lab.c3d.declared import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.markers.sets import recognise
@@ -68,7 +68,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     marker_set = recognise(markers.names) if markers is not None else None
     rate, worn = raw.rate if markers is not None else math.nan, marker_set.name if marker_set is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
-    history = (*_read(raw), *labels.history, *axes_history, *_gaps(markers), *measure_history)
+    history = (*_read(raw), *raw.history, *labels.history, *axes_history, *_gaps(markers), *measure_history)
     odd = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *axes_warnings)
     warnings = (*odd, *measure_warnings, *plate_warnings)
     return Trial(raw.path.stem, role, markers, plates, source, worn, measures, history, warnings)
