@@ -157,7 +157,8 @@ class RawC3d:
     ``analog_rate`` Hz, NaN = none; ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper
     case): arrays with the file's own dimensions, first dimension fastest, or lists of stripped strings. ``reader``
     names who agrees on the numbers, "biodance" or "biodance, ezc3d"; ``warnings`` say where the file contradicts itself
-    or smells of a misread, and how that was decided, ``history`` what was decided without doubt.
+    or smells of a misread, and how that was decided, ``history`` what was decided without doubt; ``layout`` says how
+    the numbers were stored (None = by no file).
     """
 
     path: Path
@@ -174,6 +175,7 @@ class RawC3d:
     parameters: Parameters
     warnings: tuple[str, ...] = ()
     history: tuple[str, ...] = ()
+    layout: Layout | None = None
 
 
 def read_raw(path: str | Path) -> RawC3d:
@@ -207,6 +209,7 @@ def read_raw(path: str | Path) -> RawC3d:
         parameters=parameters,
         warnings=(*layout.notes, *layout.remarks, *smells),
         history=history,
+        layout=layout,
     )
 
 

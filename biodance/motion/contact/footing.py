@@ -86,9 +86,9 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: "Surfaces", touch
 
 def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> Mask:
     """Return (P, T, 2, S) which points all over the soles are over each plate, seen from above; of a plate of unknown
-    place, all that are seen of a foot that presses it.
+    place, or whose foot is told, all that are seen of a foot that presses it.
     """
-    pressed = [None if plate.placed else _pressed(plate, soles)[..., None] for plate in plates]
+    pressed = [None if plate.placed and not plate.foot else _pressed(plate, soles)[..., None] for plate in plates]
     parts = []
     for start in range(0, soles.time.size, _BLOCK):
         part = slice(start, start + _BLOCK)
@@ -99,12 +99,15 @@ def _spread_over(plates: tuple[Plate, ...], soles: Soles) -> Mask:
 
 
 def _pressed(plate: Plate, soles: Soles) -> Mask:
-    """Return (T, 2) which soles carry what a plate of unknown place measures: its centre of pressure lies under this
-    foot, else under both.
+    """Return (T, 2) which soles carry what a plate measures: the foot that is told; else its centre of pressure lies
+    under this foot, else under both.
     """
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     known = np.isfinite(cop).all(axis=1)
     alone = np.zeros((len(cop), 2), dtype=bool)
+    if plate.foot:
+        alone[:, SIDES.index(plate.foot)] = known
+        return alone
     for feet in ([0], [1], [0, 1]):
         here = known & np.isfinite(soles.outline[:, feet]).all(axis=(1, 2, 3)) & ~alone.any(axis=1)
         points = np.concatenate([soles.outline[here, foot, :, :2] for foot in feet], axis=1)
