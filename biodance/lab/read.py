@@ -15,6 +15,7 @@ import numpy as np
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.markers.sets import MarkerSet, wearing
+from biodance.lab.plates.told import Told, as_told
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
 from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
@@ -142,6 +143,7 @@ def read_trial(
     subject: str | None = None,
     readers: Chosen[Reader] = None,
     markers: MarkerSet | None = None,
+    told: Told | None = None,
 ) -> Trial:
     """Read the trial in a file of any format.
 
@@ -160,6 +162,8 @@ def read_trial(
         Objects that read further formats (`biodance.lab.readers.Reader`), or names that limit the family to some.
     markers : MarkerSet, optional
         The set that was worn; by default the known set whose labels are there.
+    told : Told, optional
+        What the analyst says of the plates and of the body mass; it comes before what the file says.
 
     Returns
     -------
@@ -183,7 +187,7 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = without_frozen(reader.read(path, role=role, subject=subject))
+        trial = without_frozen(_read(reader, path, role, subject, told))
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise
@@ -192,6 +196,15 @@ def read_trial(
             f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are "
             f"not affected."
         ) from error
+
+
+def _read(reader: Reader, path: Path, role: Role, subject: str | None, told: Told | None) -> Trial:
+    """Return the trial as its reader reads it, with what is ``told``."""
+    if told is None:
+        return reader.read(path, role=role, subject=subject)
+    if getattr(reader, "FOLLOWS_TOLD", False):
+        return reader.read(path, role=role, subject=subject, told=told)  # type: ignore[call-arg]
+    return as_told(reader.read(path, role=role, subject=subject), told)
 
 
 def _subject_data(head: bytes) -> str:

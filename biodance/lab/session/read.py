@@ -142,7 +142,9 @@ def read_session(
         if tell:
             tell(file.name)
         try:
-            trial = read_trial(file, role=role, subject=subject_name, readers=readers, markers=marker_set)
+            trial = read_trial(
+                file, role=role, subject=subject_name, readers=readers, markers=marker_set, told=file_says.told
+            )
             trial = _with_strikes(replace(trial, settings=chosen), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)

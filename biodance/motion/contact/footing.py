@@ -72,9 +72,9 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: Surfaces, touchin
 
 def _spread_over(plates: tuple[Plate, ...], soles: Soles, touching: Mask, load: Mask) -> Mask:
     """Return (P, T, 2, S) which points all over the soles are over each plate, seen from above; of a plate of unknown
-    place, all that are seen of a foot that stands on it.
+    place, or whose foot is told, all that are seen of a foot that stands on it.
     """
-    unplaced = [index for index, plate in enumerate(plates) if not plate.placed]
+    unplaced = [index for index, plate in enumerate(plates) if not plate.placed or plate.foot]
     pressed = np.array([pressed_by(plates[i], soles) for i in unplaced])
     standing = _standing(pressed, load[:, unplaced], touching) if unplaced else None
     parts = []

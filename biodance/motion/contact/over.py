@@ -5,7 +5,7 @@ from functools import reduce
 import numpy as np
 
 from biodance.motion.contact.soles import Soles
-from biodance.records import Array, Mask, Plate
+from biodance.records import SIDES, Array, Mask, Plate
 from biodance.settings import COP_FORCE
 
 _UNDER = 0.03
@@ -26,19 +26,23 @@ def inside(plate: Plate, points: Array) -> Array:
 
 def standing_on(plates: tuple[Plate, ...], soles: Soles) -> Mask:
     """Return (T, 2, P) which soles are on each plate, as far as one frame tells: their middle lies over it; of a plate
-    of unknown place, whose rectangle is only drawn round its pressures, they press it.
+    of unknown place, whose rectangle is only drawn round its pressures, or whose foot is told, they press it.
     """
-    on = [inside(one, soles.centre) > 0 if one.placed else pressed_by(one, soles) for one in plates]
+    seen = [one.placed and not one.foot for one in plates]
+    on = [inside(p, soles.centre) > 0 if s else pressed_by(p, soles) for p, s in zip(plates, seen, strict=True)]
     return np.stack(on, axis=2)
 
 
 def pressed_by(plate: Plate, soles: Soles) -> Mask:
-    """Return (T, 2) which soles carry what a plate of unknown place measures: its centre of pressure lies under this
-    foot, else under both.
+    """Return (T, 2) which soles carry what a plate measures: the foot that is told; else its centre of pressure lies
+    under this foot, else under both.
     """
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     known = np.isfinite(cop).all(axis=1)
     alone = np.zeros((len(cop), 2), dtype=bool)
+    if plate.foot:
+        alone[:, SIDES.index(plate.foot)] = known
+        return alone
     for feet in ([0], [1], [0, 1]):
         here = known & np.isfinite(soles.outline[:, feet]).all(axis=(1, 2, 3)) & ~alone.any(axis=1)
         points = np.concatenate([soles.outline[here, foot, :, :2] for foot in feet], axis=1)
