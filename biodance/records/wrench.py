@@ -177,6 +177,8 @@ class Plate:
         (3,) N that the EMPTY plate read and that was subtracted, lab frame, as if it acted on the subject.
     placed : bool
         Whether the file says where the plate lies; False: ``corners`` only enclose the centres of pressure.
+    columns : str
+        What a table calls the plate, by which it is known again there; "" where the file numbers its plates.
 
     Examples
     --------
@@ -191,6 +193,7 @@ class Plate:
     decisions: tuple[str, ...] = ()
     zero: Array = field(default_factory=lambda: np.zeros(3))
     placed: bool = True
+    columns: str = ""
 
     def __post_init__(self) -> None:
         assign(self, decisions=tuple(self.decisions))
