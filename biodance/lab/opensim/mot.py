@@ -2,8 +2,8 @@
 a time column).
 
 A name, header rows ``key=value`` up to ``endheader``, a row of column labels (the first is ``time``), then numbers, one
-a cell or three (``x,y,z``, DataType=Vec3). What the columns mean is not said in the file, apart from ``inDegrees``; ``ground_forces.py`` knows the columns of force
-plates.
+a cell or three (``x,y,z``, DataType=Vec3). What the columns mean is not said in the file, apart from ``inDegrees``;
+``plate_columns.py`` knows the columns of force plates.
 """
 
 import re

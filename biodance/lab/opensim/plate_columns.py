@@ -158,8 +158,8 @@ def _rows(table: TimeTable, columns: dict[str, str], where: str) -> _Rows:
 def _in_newton_metres(rows: Mapping[str, _Rows]) -> tuple[dict[str, _Rows], tuple[str, ...]]:
     """Return the plates with torques in N·m, and the warning where they were written in N·mm.
 
-    The moment along the force (F·T over the size of F) is the same about any point, and no ground gives more than `_TURNED_BY`
-    times the force. A table is written by one program: its plates are judged together.
+    The moment along the force (F·T over the size of F) is the same about any point, and no ground gives more than
+    `_TURNED_BY` times the force. A table is written by one program: its plates are judged together.
     """
     turned = _turning_arm(rows.values())
     if not _TURNED_BY < turned <= 1000 * _TURNED_BY:
