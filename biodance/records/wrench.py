@@ -179,6 +179,8 @@ class Plate:
         Whether the file says where the plate lies; False: ``corners`` only enclose the centres of pressure.
     foot : {"", "left", "right"}
         The foot that stands on it, where the analyst says so; "" = the one that the markers show.
+    columns : str
+        What a table calls the plate, by which it is known again there; "" where the file numbers its plates.
 
     Examples
     --------
@@ -194,6 +196,7 @@ class Plate:
     zero: Array = field(default_factory=lambda: np.zeros(3))
     placed: bool = True
     foot: str = ""
+    columns: str = ""
 
     def __post_init__(self) -> None:
         assign(self, decisions=tuple(self.decisions))

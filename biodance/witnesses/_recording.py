@@ -150,9 +150,10 @@ class SeenTrial:
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
 
-    ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
+    ``mass`` kg as declared, NaN = unknown. Feet and pelvis are found by the trial's marker set, and by the known ones
+    where it has none. Without foot markers or plates there are no steps; nothing is raised.
     """
-    known = tuple(dict.fromkeys(filter(None, (trial.marker_set, *FAMILY.files()))))
+    known = (trial.marker_set,) if trial.marker_set else tuple(FAMILY.files())
     feet = feet_of(trial.markers, known)
     lowest = min((plate.height for plate in trial.plates), default=0.0)
     steps = tuple(
