@@ -16,7 +16,8 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Ve
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
-from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, is_beyond_usual, size_from_witnesses
+from biodance.diagnosis.witness_fit import is_beyond_usual
+from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
 from biodance.effects import Effect, causes
 
 _FAR = 3.0

@@ -108,7 +108,7 @@ def _step(
     near = (frames > time[0] - 0.2) & (frames < time[-1] + 0.1)
     if not (np.isfinite(heel[near]).all() and np.isfinite(toe[near]).all()):
         return None
-    path = FootPath(SIDES[foot], frames, heel, toe)
+    path = FootPath(SIDES[foot], frames, heel, toe, toe)
     ahead, beside, apart = path.in_foot(time, place[:, :2])
     behind, front = path.at(time)
     forwards = (front - behind) * np.array([1.0, 1.0, 0.0]) / apart[:, None]
