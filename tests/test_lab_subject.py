@@ -48,9 +48,9 @@ def test_mass_and_stature_are_estimated_last_and_said(folder):
     subject = read_session(folder).subject
     notes = said(read_session(folder))
     assert subject.mass == pytest.approx(MASS, rel=1e-3)
-    assert subject.stature == pytest.approx(STATURE, abs=0.01)
+    assert subject.stature == pytest.approx(STATURE, abs=0.025)  # places of markers on it are those of four people
     assert "read from quiet standing on the plates in static01" in notes
-    assert "guessed from the height of C7 in static01" in notes
+    assert "were guessed from the heights over the ankles of the head markers, the jugular notch, C7" in notes
     assert subject.guessed == ("mass", "stature", "sex")
 
 
@@ -67,7 +67,7 @@ def test_unknown_mass_and_stature_stay_nan_and_are_said(tmp_path):
 def test_without_plates_a_middling_mass_is_taken_and_said(tmp_path):
     write_trial(tmp_path, "static", mass=None)
     session = read_session(tmp_path)
-    assert session.subject.mass == pytest.approx(22.5 * STATURE**2, rel=0.02)
+    assert session.subject.mass == pytest.approx(22.5 * session.subject.stature**2, abs=0.06)
     assert "mass" in session.subject.guessed
     assert "the movement does not depend on it, forces and loads do" in said(session)
 

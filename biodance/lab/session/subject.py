@@ -7,11 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.markers.still import standing_mass
 from biodance.lab.session.file import SubjectEntry
+from biodance.lab.session.stature import stature_of_markers
 from biodance.records import Subject, Trial
 from biodance.settings import CheckLimits
 
@@ -21,20 +19,6 @@ _AGE_NAMES = ("age",)
 _SEX_NAMES = ("gender", "sex")
 _SAME_MASS = 0.01  # share by which two declared masses, or statures, may differ
 LEGAL_MASS, LEGAL_STATURE = (5.0, 400.0), (0.4, 2.6)
-_STATURE_OF = (
-    ("C7", ("c7",), 0.840),
-    ("the head markers", ("head_front", "head_back"), 0.942),
-    ("the acromia", ("right_acromion", "left_acromion"), 0.821),
-    ("the jugular notch", ("jugular_notch",), 0.802),
-    ("the anterior iliac spines", ("right_asis", "left_asis"), 0.556),
-)
-"""Height of markers in upright standing as a share of the declared stature, the surest first.
-
-Measured on recordings of four people of 1.48 to 1.74 m (C7, sd 0.003) and three of them (head, sd 0.006); the others on
-eight people of 1.30 to 1.74 m (acromia sd 0.006, notch 0.007, iliac spines 0.016, which is 3 cm of stature).
-"""
-FLOOR = (-0.05, 0.2)  # m, where the lowest marker of somebody who stands on the floor lies
-_OVER_SOLE = 0.04  # m, markers of heel and toes over the ground
 _TALLER_IS_MALE = 1.70  # m
 _MIDDLE_INDEX = 22.5
 """kg/m2, body mass over the square of the stature: between the women (20.6) and the men (24.1) of de Leva 1996."""
@@ -55,7 +39,7 @@ def identify_subject(
 
     ``typed`` is the table [subject] of session.toml and comes first; ``files`` are the measurements of .mp and .vsk
     files by file name, in m and kg; then come the measurements in the trials, the static one first. A mass that nobody
-    declared is read from quiet standing on the plates; a stature from the height of C7 or of the head markers. What
+    declared is read from quiet standing on the plates; a stature from heights of markers over the ankles. What
     cannot be known stays NaN and a note says what to do.
     """
     ordered = sorted(trials, key=lambda trial: trial.role != "static")
@@ -166,35 +150,20 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
 
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) from heights of markers over the floor or the feet; NaN if nobody stands there."""
+    """Return the stature (m) by the markers of a static trial; NaN if none tells it."""
     for trial in (t for t in trials if t.role == "static"):
-        feet = _height(trial, "right_heel", "left_heel", "right_toe", "left_toe")
-        step = 0.0 if FLOOR[0] <= feet <= FLOOR[1] else feet - _OVER_SOLE
-        for what, names, share in _STATURE_OF:
-            stature = (_height(trial, *names) - step) / share
-            if LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
-                on = f", whose feet stand at {step:.2f} m" if step else ""
-                notes.append(
-                    f"The stature was not declared: {stature:.2f} m were guessed from the height of {what} in "
-                    f"{trial.name}{on}."
-                )
-                return stature
+        stature, sd, told_by = stature_of_markers(trial)
+        if LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
+            notes.append(
+                f"The stature was not declared: {stature:.2f} m (standard deviation {sd:.2f} m) were guessed from the "
+                f"heights over the ankles of {told_by} in {trial.name}."
+            )
+            return stature
     notes.append(
         "The stature is not known: it is not declared and no upright static trial tells it. Set height_m in "
         "session.toml."
     )
     return math.nan
-
-
-def _height(trial: Trial, *landmarks: str) -> float:
-    """Return the median height (m) of the mean of some landmarks; NaN if one of them was not recorded."""
-    if trial.markers is None or not trial.marker_set:
-        return math.nan
-    marker_set = read_marker_set(trial.marker_set)
-    found = [landmark(trial.markers, marker_set, name) for name in landmarks]
-    heights = [points[:, 2][np.isfinite(points[:, 2])] for points in found if points is not None]
-    whole = len(heights) == len(found) and all(map(np.size, heights))
-    return float(np.mean([np.median(h) for h in heights])) if whole else math.nan
 
 
 def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:
