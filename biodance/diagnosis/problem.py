@@ -22,7 +22,7 @@ from biodance.effects import Case, Effect, effects
 from biodance.identification.posterior import prior_factor
 from biodance.identification.statistics import Fit, usable
 from biodance.motion.regressor import regressor_of
-from biodance.records import Array, Motion, Sip, Trial, runs
+from biodance.records import Array, Motion, Sip, Trial, Wrench, runs
 from biodance.uncertainty.caution import widened
 from biodance.uncertainty.sources import Errors, forward, of_clusters
 from biodance.uncertainty.tolerances import in_state
@@ -64,7 +64,22 @@ class TrialWindow:
     def case(self, body: Body, phi: Array) -> Case:
         """Return the trial as effects see it, at the rate of the markers, with the parameters ``phi`` (10N,)."""
         time = np.linspace(self.start, self.end, self.motion.time.size)
-        return Case(body, self.trial, self.motion, phi, time)
+        return Case(body, _bridged(self.trial), self.motion, phi, time)
+
+
+def _bridged(trial: Trial) -> Trial:
+    """Return the trial with straight lines where the force of a plate is unknown, so that effects can move it in time;
+    such frames are never compared.
+    """
+    plates = []
+    for plate in trial.plates:
+        time, value = plate.wrench.time, plate.wrench.value
+        known = np.isfinite(value).all(axis=1)
+        if known.any() and not known.all():
+            value = np.stack([np.interp(time, time[known], channel[known]) for channel in value.T], axis=1)
+            plate = replace(plate, wrench=Wrench(time, value))
+        plates.append(plate)
+    return replace(trial, plates=tuple(plates))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,31 @@
+"""The recording program or a filter repeated the first or last sample of all channels where it had none.
+
+Signature: for some ten milliseconds at an end of the recording all channels hold one sample to the last digit, while
+the person moves. Look-alikes: an amplifier at its end (one channel, at its extreme), a plate set to zero while unloaded
+(all channels at zero), a recording that hung (markers rest, too). Separated by a longer recording.
+"""
+
+from biodance.effects._base.left_out import checks_of_defects, without_defects
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.records import Trial
+
+
+class Padding(DiscreteEffect):
+    """Samples at an end of the recording that nobody measured; the reader leaves them out."""
+
+    name = "padding"
+    separated_by = "A recording that begins earlier and ends later than what is judged."
+    advice = "Start the recording earlier, or switch padding off where the forces are filtered and exported."
+
+    @classmethod
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
+        """Return what readers left out as padding."""
+        return checks_of_defects(recorded.session, cls.name, check="ends of the recordings", quantity="time")
+
+    @classmethod
+    def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
+        """Return the trial, which holds no padding any more."""
+        return without_defects(trial, cls.name)
+
+
+EFFECT = Padding
