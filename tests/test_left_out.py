@@ -51,7 +51,7 @@ def test_squats_whose_forces_come_late_are_not_judged(tmp_path: Path, monkeypatc
         assert row.left_out[LeftOut.FORCES_DIFFER] > 0.5 * long
         assert one.compared_s + row.left_out_s == pytest.approx(long, abs=0.015)
     slow = rows["slow_squat"]
-    assert 0.0 < slow.seconds == result["slow_squat"].compared_s < result["slow_squat"].motion.time.size / 100.0
+    assert 0.0 < slow.seconds == result["slow_squat"].compared_s
 
 
 def test_every_second_of_a_real_walk_is_judged_or_left_out_for_a_reason(data: Path) -> None:

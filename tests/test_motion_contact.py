@@ -10,6 +10,8 @@ from walkers import WEIGHT, Stand, plate, walker
 from biodance.body.human.human import human
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.prepare import prepare
+from biodance.lab.session.read import read_session
 from biodance.motion.contact.contact import foot_wrenches, ground_contact
 from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
 from biodance.records import Markers, Motion, Subject, Wrench
@@ -95,6 +97,74 @@ def test_soles_that_move_with_a_belt_stand_on_it() -> None:
     said = next(note for note in contact.notes if "a belt" in note)
     assert float(said.split(" at ")[1].split()[0]) == pytest.approx(1.2, abs=0.01)
     assert not any("a belt" in note for note in ground_contact(*on_a_belt(0.0)[:2], mass=MASS).notes)
+
+
+def on_split_belts(right: float, left: float, *, placed: bool) -> tuple:
+    """Return a walk on the spot over two belts of ``right`` and ``left`` m/s: a foot on each. With plates that are not
+    ``placed``, rectangles drawn round their pressures overlap, as those of the columns of a .mot do.
+    """
+    two = [plate("plate1", (-3.0, 6.0), (-0.3, 0.0)), plate("plate2", (-3.0, 6.0), (0.0, 0.3))]
+    rights = [Stand(k, k + 0.6, (right * k, -0.1, 0)) for k in range(4)]
+    lefts = [Stand(0.0, 0.1, (-0.5 * left, 0.1, 0))]
+    lefts += [Stand(k + 0.5, k + 1.1, (left * (k + 0.5), 0.1, 0)) for k in range(4)]
+    trial, _, true, _ = walker(rights, lefts, two, duration=3.5)
+    time, xyz, plates = trial.markers.time, trial.markers.xyz.copy(), []
+    for name, one, speed in zip("RL", trial.plates, (right, left), strict=True):
+        back = speed * time[:, None] * np.array([-1.0, 0, 0])
+        own = [label.startswith(name) for label in trial.markers.names]
+        xyz[:, own] += back[:, None]
+        value = one.wrench.value + np.hstack([0 * back, np.cross(back, one.wrench.force)])
+        wider = np.array([[0.0, 0.2, 0.0], [0.0, 0.2, 0.0], [0.0, -0.2, 0.0], [0.0, -0.2, 0.0]])
+        corners = one.corners if placed else np.clip(one.corners, -0.5, 0.8) + wider
+        plates.append(replace(one, wrench=Wrench(time, value), corners=corners, placed=placed))
+    trial = replace(trial, markers=Markers(trial.markers.names, time, xyz), plates=tuple(plates))
+    return trial, soles_from_markers(trial.markers, read_marker_set("plug_in_gait")), true
+
+
+@pytest.mark.parametrize("placed", [True, False])
+@pytest.mark.parametrize(("right", "left"), [(1.2, 1.2), (1.2, 0.6)])
+def test_a_split_belt_is_taken_off_once_and_by_the_plate_under_the_foot(
+    right: float, left: float, placed: bool
+) -> None:
+    trial, soles, true = on_split_belts(right, left, placed=placed)
+    contact = ground_contact(trial, soles, mass=MASS)
+    said = [float(note.split(" at ")[1].split()[0]) for note in contact.notes if "a belt" in note]
+    assert said == pytest.approx([right, left], abs=0.02)
+    assert np.all(contact.touching[true])
+    assert contact.touching.mean() < true.mean() + 0.25  # swings are still seen
+    assert contact.measured.mean() > 0.94  # taken off twice: 0.0 and 0.56; a made swing starts too slowly
+    assert (contact.on_plate.any(axis=0).sum(axis=0) > 0).all()
+    on = contact.on_plate[true.all(axis=1)]
+    assert on[:, 0, 0].all()
+    assert on[:, 1, 1].all()
+    assert not on[:, 0, 1].any()
+    assert not on[:, 1, 0].any()
+
+
+def test_nothing_is_lost_of_a_walk_on_a_real_split_belt(data: Path) -> None:
+    """Gait2354's subject01 on two belts at 1.15 m/s, whose rectangles overlap: 151 frames; taken off twice, a standing
+    foot moves at 1.15 m/s.
+    """
+    session = read_session(data / "opensim_models" / "gait10")
+    trial = prepare(next(one for one in session.trials if one.plates))
+    soles = soles_from_markers(trial.markers, read_marker_set(trial.marker_set))
+    contact = ground_contact(trial, soles, mass=72.6)
+    assert contact.measured.sum() == 151
+    assert sum("at 1.1" in note for note in contact.notes) == 2
+
+
+@pytest.mark.parametrize("name", ["runT25", "runT35"])
+def test_flights_of_a_runner_marked_on_the_legs_alone_are_measured(name: str, data: Path) -> None:
+    """A quarter of this run nobody touches the belt; the mean of markers on legs that swing falls at 0.1 to 0.6 g, the
+    pelvis at 1.0 to 1.1.
+    """
+    session = read_session(data / "rbds" / "S001")
+    trial = prepare(next(one for one in session.trials if one.name == name))
+    soles = soles_from_markers(trial.markers, read_marker_set(trial.marker_set))
+    contact = ground_contact(trial, soles, mass=70.0)
+    unloaded = trial.wrench.force[:, 2] < 50.0
+    assert 0.2 < unloaded.mean() < 0.4
+    assert contact.measured.mean() > 0.99
 
 
 @pytest.mark.parametrize(("falls", "measured"), [(1.0, True), (0.0, False)])

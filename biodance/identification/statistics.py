@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, maximum_filter1d
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
@@ -32,8 +32,8 @@ that only the slowest bands count.
 @dataclass(frozen=True, eq=False)
 class Fit:
     """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True
-    where both hold; ``outlier`` the share of body weight by which a frame may differ from the table's prediction
-    (`Settings.outlier`).
+    where both hold; ``outlier`` the share of the load by which a frame may differ from the table's prediction
+    (`Settings.outlier`, `believable`).
     """
 
     name: str
@@ -174,27 +174,33 @@ def _is_standing(position: Array) -> bool:
 _LEVER = 0.5
 """m: the same limit for moments about the standing point."""
 _AROUND = 0.5
-"""s before and after such a frame that are masked too."""
+"""s before and after such a frame that are masked too, and in which the largest load counts."""
 
 
 def believable(body: Body, fit: Fit, about: Array) -> tuple[Fit, str]:
-    """Return the trial without frames in which table and plates differ by more than ``fit.outlier``, and a sentence
-    or "".
+    """Return the trial without frames in which table and plates differ by more than ``fit.outlier`` of the load, and a
+    sentence or "".
+
+    The load is the weight m g, or the largest force that the plates show in the half second around, if that is more: a
+    runner's plates carry 2.7 weights. What a wrong body gets wrong, the sum of dm (g + a), grows with the accelerations
+    of its segments, and so does what soft tissue and filters smear in time: both are shares of the peak of a stance,
+    not of the weight. A chair, a wrong zero or a posture that jumps change the plates' own load little or not at all.
     """
-    limit = -fit.outlier * body.gravity[2] * body.sip.mass.sum()
+    weight = -float(body.gravity[2]) * float(body.sip.mass.sum())
     difference = wrench_about_point(fit.wrench.value - predict_wrench(body, fit.motion).value, about)
     size = np.maximum(np.linalg.norm(difference[:, :3], axis=1), np.linalg.norm(difference[:, 3:], axis=1) / _LEVER)
+    around = max(1, round(_AROUND * fit.motion.rate)) if np.isfinite(fit.motion.rate) else 1
+    carried = np.nan_to_num(np.linalg.norm(fit.wrench.force, axis=1))
+    limit = fit.outlier * np.maximum(weight, maximum_filter1d(carried, 2 * around + 1, mode="nearest"))
     wrong = fit.use & (size > limit)
     if not wrong.any():
         return fit, ""
-    wide = binary_dilation(wrong, iterations=max(1, round(_AROUND * fit.motion.rate)))
-    left = fit.use & ~wide
-    where = fit.motion.time[int(np.argmax(np.where(fit.use, size, -1.0)))]
+    left = fit.use & ~binary_dilation(wrong, iterations=around)
+    worst = int(np.argmax(np.where(wrong, size / limit, -1.0)))
     return replace(fit, use=left), (
         f"{fit.name}: {int((fit.use & ~left).sum())} of {int(fit.use.sum())} frames left out, the motion needs up to "
-        f"{size[fit.use].max():.0f} N more than the plates show (at {where:.2f} s, limit {limit:.0f} N): look for a "
-        f"posture that jumps or "
-        "a contact beside the plates."
+        f"{size[worst]:.0f} N more than the plates show (at {fit.motion.time[worst]:.2f} s, limit {limit[worst]:.0f} "
+        f"N): look for a posture that jumps or a contact beside the plates."
     )
 
 

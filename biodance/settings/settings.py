@@ -37,7 +37,8 @@ class Settings(Group):
     gravity : float
         m/s² in the laboratory, along -z.
     outlier : float
-        Share of body weight: frames in which table and plates differ by more are left out of the identification.
+        Share of the load that the plates carry around it, at least the body weight: frames in which table and plates
+        differ by more are left out of the identification.
     filter : FilterSettings
         The low-pass of joint coordinates and forces.
     gaps : GapSettings
@@ -77,7 +78,11 @@ class Settings(Group):
     )
     gravity: float = number_field(STANDARD_GRAVITY, 9.7, 9.9, "m/s²", "gravity in the laboratory, along -z")
     outlier: float = number_field(
-        0.3, 0.05, 5.0, "", "share of body weight by which frames may differ from the table's prediction"
+        0.3,
+        0.05,
+        5.0,
+        "",
+        "share of the load (weight, or peak force) by which frames may differ from the table's prediction",
     )
     filter: FilterSettings = FilterSettings()
     gaps: GapSettings = GapSettings()

@@ -4,12 +4,16 @@ them.
 
 import numpy as np
 
+from biodance.lab.markers.sets import read_marker_set
 from biodance.records import Array, Mask, Trial, runs
 
 _SHORTEST_FLIGHT = 0.05
 """s: in less the parabola of the markers cannot be seen."""
-_FALLS = (0.6, 1.4)
-"""Downward acceleration of the markers' mean, in g, that counts as free fall (limbs move, markers sit unevenly)."""
+_FALLS = 0.6
+"""Downward acceleration, in g, from which the markers fall freely. Whatever carries somebody makes the fall slower; the
+swing of the limbs leaves 0.95 to 1.1 for the mean of markers all over the body, 0.97 to 1.45 for those of the pelvis
+(legs that swing up push it down), which runners marked on the legs alone need: the mean of their markers is the legs'.
+"""
 _PARABOLA = 0.005
 """m, RMS, by which the mean of the markers may leave the parabola (limbs move)."""
 _STILL = 0.05
@@ -42,20 +46,27 @@ def flight(trial: Trial, touching: Mask, load: Mask) -> Mask:
 
 
 def _falls(trial: Trial, start: int, stop: int) -> bool:
-    """Return whether the markers' mean falls freely from frame ``start`` to before ``stop``: on a parabola of about
-    one g.
+    """Return whether the markers of the body, or those of the pelvis, fall freely from frame ``start`` to before
+    ``stop``: their mean on a parabola of about one g.
     """
     if trial.markers is None or trial.markers.time.size < 2:
         return False
     span = slice(max(0, start - 1), min(trial.markers.time.size, stop + 1))
     time, height = trial.markers.time[span], trial.markers.xyz[span, :, 2]
     whole = np.isfinite(height).all(axis=0)
-    if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4 or not whole.any():
+    if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4:
         return False
-    middle, mean = time - time.mean(), height[:, whole].mean(axis=1)
-    curve = np.polyfit(middle, mean, 2)
-    straight = np.sqrt(np.mean((np.polyval(curve, middle) - mean) ** 2)) < _PARABOLA
-    return bool(straight and _FALLS[0] <= -2 * curve[0] / trial.settings.gravity <= _FALLS[1])
+    own = read_marker_set(trial.marker_set).markers if trial.marker_set else ()
+    pelvis = np.isin(trial.markers.names, [one.label for one in own if one.segment == "pelvis"])
+    parts = [height[:, some].mean(axis=1) for some in (whole, whole & pelvis) if some.any()]
+    return any(_is_free_fall(time, mean, trial.settings.gravity) for mean in parts)
+
+
+def _is_free_fall(time: Array, height: Array, gravity: float) -> bool:
+    middle = time - time.mean()
+    curve = np.polyfit(middle, height, 2)
+    straight = np.sqrt(np.mean((np.polyval(curve, middle) - height) ** 2)) < _PARABOLA
+    return bool(straight and -2 * curve[0] >= _FALLS * gravity)
 
 
 def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
