@@ -37,6 +37,11 @@ from biodance.uncertainty.tolerances import Tolerances, shipped
 if TYPE_CHECKING:
     import pandas as pd
 
+_COPY = (
+    "The labels named were exchanged in a copy, and everything else was found in that copy. "
+    "The recordings themselves are as they were."
+)
+
 
 @dataclass(frozen=True, eq=False)
 class SessionDiagnosis:
@@ -133,8 +138,10 @@ def diagnose_session(
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
+    whole = _named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
     if mended is not None:
-        whole, found = _with_mended_labels(whole, mended.checks), replace(found, mended=mended)
+        whole, found = _named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
+        whole = replace(whole, checks=(*mended.checks, *whole.checks))
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
     looked_at = found.examined.naming.found.problem.looked_at if found.examined else frozenset[str]()
@@ -155,18 +162,17 @@ def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, st
     }
 
 
-def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...]) -> Diagnosis:
-    """Return the diagnosis of a copy with the labels exchanged, these named first."""
-    note = (
-        "The labels named were exchanged in a copy, and everything else was found in that copy. "
-        "The recordings themselves are as they were."
-    )
+def _named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
+    """Return the diagnosis with what was put right before all else was judged named first."""
+    named = {(one.effect, one.target) for one in diagnosis.findings}
+    found = tuple(failed_check(quality) for quality in checks if (quality.effect, quality.target) not in named)
+    if not found:
+        return diagnosis
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*(failed_check(quality) for quality in checks), *diagnosis.findings),
-        checks=(*checks, *diagnosis.checks),
-        notes=(note, *diagnosis.notes),
+        findings=(*found, *diagnosis.findings),
+        notes=(*notes, *diagnosis.notes),
     )
 
 
@@ -183,7 +189,7 @@ def _diagnosed(
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
     checks = check_quality(result.session, cases_of(result.body, all_windows(result.trials)), chosen=asked)
-    failed = tuple(quality for quality in checks if not quality.ok)
+    failed = tuple(quality for quality in checks if not quality.ok and not quality.mended)
     if result.body is None or not fitted:
         why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
         return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))

@@ -155,10 +155,11 @@ def _accepted(
     written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if made else ((), ())
     mended, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     labels = found.mended.checks if found.mended else ()
+    exchanged = dict.fromkeys(f"{one.text} Put right in a copy." for one in labels)
     others = {*((one.effect, one.target) for one in made), *((one.effect, one.target) for one in labels)}
     told = {
         "files": [*sorted(files), *mended],
-        "corrections": [*dict.fromkeys(f"{one.text} Put right in a copy." for one in labels), *(str(one) for one in made)],
+        "corrections": [*exchanged, *(str(one) for one in made)],
         "trials": written,
         "not_in_recordings": [f"{f.effect} {f.target}".strip() for f in findings if (f.effect, f.target) not in others],
         "refused": [*refused, *kept],

@@ -22,7 +22,7 @@ def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, st
     FileRefused
         The source is no C3D file or lacks a label, or the target exists or cannot be written.
     """
-    content, parameters, layout = open_c3d(source)
+    content, parameters, layout, _ = open_c3d(source)
     columns = {split_label(label)[1]: column for column, label in enumerate(point_labels(parameters, layout))}
     changed, names = bytearray(content), dict[str, str]()
     for pair, spans in exchanged.items():

@@ -4,19 +4,18 @@ three frames. Such frames count as not seen.
 
 from dataclasses import dataclass
 from enum import Enum
-from itertools import product
 
 import numpy as np
 
 from biodance.records import Array, Markers, Mask, runs
 
 _REPEATS = 5
-"""Frames that repeat the one before to the last bit. In 62 trials of 14 laboratories no marker of somebody who moves does
-so four times in a row: cameras see 0.01 to 0.5 mm of noise.
+"""Frames that repeat the one before to the last bit. In 62 trials of 14 laboratories no marker of somebody who moves
+does so four times in a row: cameras see 0.01 to 0.5 mm of noise.
 """
 _TRAVELLED = 0.01
-"""m that the other markers move in the median meanwhile: more than the coarsest numbers of a file hide (0.5 mm), and than
-somebody who stands for the static trial sways in that time.
+"""m that the other markers move in the median meanwhile: more than the coarsest numbers of a file hide (0.5 mm), and
+than somebody who stands for the static trial sways in that time.
 """
 _SLOWER = 0.5
 """Share of the step before it from which on a marker does not come to rest by and by, as computed movement does."""
@@ -25,14 +24,18 @@ _FELT = 1e-5
 _LONGEST = 3
 """Frames of a spike at most; what lasts longer may be another marker."""
 _OFF = 0.03
-"""m from where the frames on both sides expect the marker. Skin, wands and heads of markers swing by 4 to 9 mm after heel
-strikes of running at 2.5 and 3.5 m/s (10 people, 150 Hz), by 16 mm at most in runs, drop jumps and squats of 14
+"""m from where the frames on both sides expect the marker. Skin, wands and heads of markers swing by 4 to 9 mm after
+heel strikes of running at 2.5 and 3.5 m/s (10 people, 150 Hz), by 16 mm at most in runs, drop jumps and squats of 14
 laboratories.
 """
 _FASTER = 100.0
-"""m/s² by which a marker must leave its way from one frame to the next: ten times gravity. What limbs do below it shows in
-the frames on both sides; impacts reach 200, but move a marker by millimetres.
+"""m/s² by which a marker must leave its way from one frame to the next: ten times gravity. What limbs do below it shows
+in the frames on both sides; impacts reach 200, but move a marker by millimetres.
 """
+
+
+_TOLD = 8
+"""Times that are told one by one."""
 
 
 class Fault(Enum):
@@ -45,7 +48,7 @@ class Fault(Enum):
 @dataclass(frozen=True)
 class FaultyMarker:
     """A marker ``label`` with its ``fault`` in frames ``spans`` (start, stop), stop excluded; ``size`` m how far it is
-    off at most (how far the others moved meanwhile).
+    off at most (NaN where nobody knows).
     """
 
     label: str
@@ -53,16 +56,23 @@ class FaultyMarker:
     spans: tuple[tuple[int, int], ...]
     size: float
 
-    def sentence(self, time: Array) -> str:
-        """Return what was seen and when, for the frame times (T,) s."""
-        at = [f"{time[start]:.2f} to {time[stop - 1]:.2f}" for start, stop in self.spans]
+    def when(self, time: Array) -> str:
+        """Return the seconds of its frames among ``time`` (T,) s in words."""
+        long = self.fault is Fault.FROZEN
+        at = [f"{time[start]:.2f}" + f" to {time[stop - 1]:.2f}" * long for start, stop in self.spans]
+        return ", ".join(at[:_TOLD]) + (f" and {len(at) - _TOLD} times more" if len(at) > _TOLD else "") + " s"
+
+    def sentence(self, where: str) -> str:
+        """Return what was seen ``where`` (trials and seconds in words)."""
         if self.fault is Fault.FROZEN:
-            done = f"stands still to the last bit while the others move, at {_listed(at)} s: a gap that was filled by"
-            return f"{self.label} {done} holding it. These frames count as not seen."
-        at = [f"{time[start]:.2f}" for start, _ in self.spans]
-        often = f"{len(at)} times" if len(at) > 1 else "once"
-        done = f"jumps by up to {1000 * self.size:.0f} mm and back within {_LONGEST} frames {often}, at {_listed(at)} s"
-        return f"{self.label} {done}: no body does. These frames count as not seen."
+            seen = (
+                f"stands still to the last bit while the others move: {where}. A gap was filled by holding the marker"
+            )
+        else:
+            seen = (
+                f"jumps by up to {1000 * self.size:.0f} mm and back within {_LONGEST} frames: {where}. No body does so"
+            )
+        return f"{self.label} {seen}; these frames count as not seen."
 
 
 def faulty_markers(markers: Markers) -> tuple[FaultyMarker, ...]:
@@ -113,7 +123,7 @@ def _breaks_off(steps: Array, start: int, stop: int) -> bool:
     start so at ``stop``; unseen frames and the ends of the recording tell nothing.
     """
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
-        if 0 <= min(near, farther) and max(near, farther) < steps.size:
+        if min(near, farther) >= 0 and max(near, farther) < steps.size:
             slow = steps[near] < _SLOWER * steps[far] and steps[far] < steps[farther]
             if steps[near] > _FELT and not slow:
                 return True
@@ -180,7 +190,3 @@ def _spikes(path: Array, step: float) -> tuple[Mask, float]:
         farthest = max(farthest, float(off[frames][at]))
         spiky[at : at + frames] = True
         path[at : at + frames] = np.nan
-
-
-def _listed(times: list[str]) -> str:
-    return ", ".join(times[:8]) + (f" and {len(times) - 8} times more" if len(times) > 8 else "")
