@@ -14,8 +14,8 @@ from biodance.effects import Recorded
 from biodance.effects._base.wrists import back_of_hand, middle
 from biodance.effects.labels_swapped import exchanges, renamed
 from biodance.errors import FileRefused
+from biodance.lab.c3d.exchanged import write_exchanged
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.c3d.results import write_relabelled
 from biodance.lab.session.read import read_session
 from biodance.records import Markers, Session, Source, Subject, Trial
 
@@ -55,7 +55,7 @@ def visit(*, speed: float) -> tuple[Trial, Trial]:
 @pytest.mark.parametrize("wrong", [(), ("static",), ("fit",), ("static", "fit")])
 def test_every_copy_gives_the_right_set(pairs: tuple, wrong: tuple) -> None:
     found = found_in(*(swapped(one, pairs) if one.name in wrong else one for one in visit(speed=1.5)))
-    assert found == dict.fromkeys(wrong, {tuple(sorted(pair)) for pair in pairs})
+    assert found == {name: {tuple(sorted(pair)) for pair in pairs} for name in wrong}
 
 
 def test_markers_flung_about_say_nothing_of_names() -> None:
@@ -120,13 +120,13 @@ def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Pa
     points = np.concatenate([rng.normal(0, 500, (20, 3, 3)), np.zeros((20, 3, 1))], axis=2)
     source = tmp_path / "walk.c3d"
     source.write_bytes(File(points, parameters={"POINT": {"LABELS": text("S:LASI", "S:RASI", "S:C7")}}).bytes())
-    copy = write_relabelled(source, tmp_path / "mended" / "walk.c3d", {"LASI": "RASI", "RASI": "LASI", "C7": "C7"})
+    copy = write_exchanged(source, tmp_path / "mended" / "walk.c3d", {("LASI", "RASI"): [(0, 20)]})
     before, after = read_raw(source), read_raw(copy)
     assert after.labels == ("S:RASI", "S:LASI", "S:C7")
     np.testing.assert_array_equal(before.points, after.points)
     assert sum(a != b for a, b in zip(source.read_bytes(), copy.read_bytes(), strict=True)) == 2
     with pytest.raises(FileRefused, match="nothing is overwritten"):
-        write_relabelled(source, copy, {})
+        write_exchanged(source, copy, {})
 
 
 @pytest.mark.parametrize(
@@ -162,9 +162,9 @@ FRONT = (("LBHD", "LFHD"), ("RBHD", "RFHD"))
 def test_real_copies_with_exchanged_bytes_give_the_right_set(
     wrong: tuple, pairs: tuple, data: Path, tmp_path: Path
 ) -> None:
-    names = {one: other for pair in pairs for one, other in (pair, pair[::-1])}
     for number, path in enumerate(sorted((data / "biomechzoo/HC032A").glob("*.c3d"))):
-        write_relabelled(path, tmp_path / path.name, names if number in wrong else {})
+        whole = [(0, len(read_raw(path).points))]
+        write_exchanged(path, tmp_path / path.name, dict.fromkeys(pairs, whole) if number in wrong else {})
     session = read_session(tmp_path)
     right = {session.trials[number].name: set(pairs) for number in wrong}
     assert found_in(*session.trials) == right

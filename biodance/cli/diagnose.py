@@ -90,7 +90,6 @@ def diagnose_command(
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
         return diagnose_robot(session, results, robot, for_people)
     from biodance.pipeline import front
-    from biodance.pipeline.accepted import write_mended
     from biodance.pipeline.attention import is_well
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
@@ -102,9 +101,7 @@ def diagnose_command(
         place, carried = results.make_tables_folder(session), read_lab(reading.lab)
         result, before, folder = examine_with_reference(session, reading, results, tell)
         found = front.diagnose(result, reference=before, tolerances=carried.tolerances, accept=accept, tell=tell)
-        if found.mended is not None:
-            write_mended(result.session, found.mended.session, folder)
-            result = found.mended
+        result = found.mended.result if found.mended is not None else result
         result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)

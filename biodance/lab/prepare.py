@@ -1,5 +1,5 @@
-"""Make a trial ready for the model: the set's markers with their gaps dealt with, and every plate filtered and sampled
-at marker times.
+"""Make a trial ready for the model: the set's markers, frozen frames and spikes taken out, gaps dealt with, and every
+plate filtered and sampled at marker times.
 
 The markers are NOT low-passed: the joint coordinates are, later and with the same filter, so that motion and forces
 pass it exactly once.
@@ -14,6 +14,7 @@ from biodance.lab import filters
 from biodance.lab.filters import LowPass, force_filter
 from biodance.lab.markers.gaps import Gap, fill_gaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
+from biodance.lab.markers.signals import faulty_markers, without_faults
 from biodance.records import Array, Markers, Plate, Trial, Wrench
 from biodance.settings import GapSettings
 
@@ -97,7 +98,9 @@ def _fill(markers: Markers, set_name: str, rules: GapSettings) -> tuple[Markers,
         for gaps in report_gaps(markers)
         if gaps.percent > rules.often
     ]
-    filled, gaps = fill_gaps(markers, segments, short=rules.bridged)
+    faults = faulty_markers(markers)
+    history += [one.sentence(one.when(markers.time)) for one in faults]
+    filled, gaps = fill_gaps(without_faults(markers, faults), segments, short=rules.bridged)
     return filled, [*history, *_sentences(gaps, markers.time)], warnings
 
 

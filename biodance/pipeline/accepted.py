@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.effects import QualityCheck, Recorded, check_quality
-from biodance.effects.labels_swapped import exchanges, renamed
+from biodance.effects import Recorded
+from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError
+from biodance.lab.c3d.exchanged import write_exchanged
 from biodance.lab.c3d.ezc3d_object import write_trial
-from biodance.lab.c3d.results import write_relabelled
 from biodance.lab.corrections import (
     APPLIED,
     PARAMETER_OF,
@@ -22,14 +22,14 @@ from biodance.lab.corrections import (
     joined_corrections,
 )
 from biodance.pipeline.judged_trials import all_windows, cases_of
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import RightLabels, SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Session
 
 CORRECTED = "corrected"
 """Folder with the trials that were corrected."""
-_ROUNDS = 3
-"""How often exchanged labels are looked for again: a static trial that was wrong hides others."""
+MENDED = "mended"
+"""Folder with the copies of recordings whose exchanged labels were put right."""
 
 
 def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[PlateCorrection, ...]:
@@ -85,37 +85,36 @@ def _session_toml(session: Session) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_right_labels(
-    result: SessionResult, *, tell: Callable[[str], None]
-) -> tuple[SessionResult, tuple[QualityCheck, ...]]:
-    """Return the session examined again with its labels exchanged, until no two carry each other's names, and the
-    checks that named them; the same result and no check where none do.
+def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> RightLabels | None:
+    """Return the session examined again with those labels exchanged that carry each other's names; None where none do.
+
+    Proven before it is kept: a trial that the body follows clearly worse with other names (`WORSE`) keeps its own.
     """
-    checks = check_quality(
-        result.session, cases_of(result.body, all_windows(result.trials)), chosen=("labels_swapped",)
-    )
-    for _ in range(_ROUNDS):
-        found = exchanges(Recorded(result.session, cases_of(result.body, all_windows(result.trials))))
-        if not found:
-            break
+    found = exchanges(Recorded(result.session, cases_of(result.body, all_windows(result.trials))))
+    while found:
         tell("examining a copy with the labels exchanged")
-        trials = tuple(
-            renamed(trial, found[trial.name]) if trial.name in found else trial for trial in result.session.trials
-        )
-        result = examine(replace(result.session, trials=trials))
-    return result, tuple(quality for quality in checks if not quality.ok)
+        trials = tuple(renamed(trial, found.get(trial.name, {})) for trial in result.session.trials)
+        mended = examine(replace(result.session, trials=trials))
+        worse = {
+            after.name
+            for before, after in zip(result.trials, mended.trials, strict=True)
+            if before.fit and after.fit and after.fit.total_rms > WORSE * before.fit.total_rms
+        } & found.keys()
+        if not worse:
+            return RightLabels(mended, found, named_exchanges(result.session, found))
+        found = {name: pairs for name, pairs in found.items() if name not in worse}
+    return None
 
 
-def write_mended(session: Session, mended: Session, folder: Path) -> tuple[Path, ...]:
-    """Write a copy of every C3D file whose labels were exchanged into ``folder``/mended; return their paths.
-
-    Every other byte is as in the recording.
+def write_mended(session: Session, right: RightLabels, folder: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Write a copy of every C3D file with exchanged labels put right into ``folder``/mended; return their names there,
+    and why others could not be written. Every other byte is as in the recording.
     """
-    written = []
-    for trial, after in zip(session.trials, mended.trials, strict=True):
-        if trial.markers is None or after.markers is None or trial.source.format != "C3D":
-            continue
-        names = dict(zip(trial.markers.names, after.markers.names, strict=True))
-        if any(old != new for old, new in names.items()):
-            written.append(write_relabelled(trial.source.path, folder / "mended" / trial.source.path.name, names))
-    return tuple(written)
+    written, refused = [], []
+    for trial in session.trials:
+        pairs, file = right.exchanged.get(trial.name, {}), trial.source.path
+        if pairs and trial.source.format == "C3D":
+            written.append(f"{MENDED}/{write_exchanged(file, folder / MENDED / file.name, pairs).name}")
+        elif pairs:
+            refused.append(f"Trial {trial.name} was not written with its labels put right: only C3D files are copied.")
+    return tuple(written), tuple(refused)

@@ -29,13 +29,18 @@ from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import RightLabels, SessionResult
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_COPY = (
+    "The labels named were exchanged in a copy, and everything else was found in that copy. "
+    "The recordings themselves are as they were."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +59,7 @@ class SessionDiagnosis:
         What the body in use leaves of the kept trials, and what is left once the findings are accepted.
     failures : mapping
         What could not be computed ("what accepting changes"), with cause and cure.
-    mended : SessionResult or None
+    mended : RightLabels or None
         The copy with its labels exchanged, in which all else was found; None where no labels were mended.
     gain : Gain or None
         Of all findings together on the kept trials; each has its own.
@@ -71,7 +76,7 @@ class SessionDiagnosis:
     accepted: Identification | None = None
     left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
-    mended: SessionResult | None = None
+    mended: RightLabels | None = None
     gain: Gain | None = None
 
     def __repr__(self) -> str:
@@ -113,15 +118,15 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
-    mended: tuple[QualityCheck, ...] = (),
+    mended: RightLabels | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
-    (``[MyEffect()]``) join the family; ``mended`` are the checks of the recordings where ``result`` is of a copy
-    with its labels put right (`with_right_labels`): they are named first.
+    (``[MyEffect()]``) join the family; ``mended`` says which labels were put right where ``result`` is of a copy
+    (`with_right_labels`): they are named first.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
@@ -133,8 +138,10 @@ def diagnose_session(
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
-    if mended:
-        whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
+    whole = _named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
+    if mended is not None:
+        whole, found = _named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
+        whole = replace(whole, checks=(*mended.checks, *whole.checks))
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
     looked_at = found.examined.naming.found.problem.looked_at if found.examined else frozenset[str]()
@@ -155,18 +162,17 @@ def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, st
     }
 
 
-def _with_mended_labels(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...]) -> Diagnosis:
-    """Return the diagnosis of a copy with the labels exchanged, these named first."""
-    note = (
-        "The labels named were exchanged in a copy, and everything else was found in that copy. "
-        "The recordings themselves are as they were."
-    )
+def _named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
+    """Return the diagnosis with what was put right before all else was judged named first."""
+    named = {(one.effect, one.target) for one in diagnosis.findings}
+    found = tuple(failed_check(quality) for quality in checks if (quality.effect, quality.target) not in named)
+    if not found:
+        return diagnosis
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*(failed_check(quality) for quality in checks), *diagnosis.findings),
-        checks=(*checks, *diagnosis.checks),
-        notes=(note, *diagnosis.notes),
+        findings=(*found, *diagnosis.findings),
+        notes=(*notes, *diagnosis.notes),
     )
 
 
@@ -183,7 +189,7 @@ def _diagnosed(
     tell("checking units, signs, labels and clocks")
     asked = causes(effects)
     checks = check_quality(result.session, cases_of(result.body, all_windows(result.trials)), chosen=asked)
-    failed = tuple(quality for quality in checks if not quality.ok)
+    failed = tuple(quality for quality in checks if not quality.ok and not quality.mended)
     if result.body is None or not fitted:
         why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
         return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))

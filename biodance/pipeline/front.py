@@ -215,9 +215,10 @@ def diagnose(
     before = None if reference is None else _earlier(reference, tell)
     result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
     known = tolerances or read_lab(lab).tolerances
-    result, checks = with_right_labels(result, tell=tell) if accept else (result, ())
+    right = with_right_labels(result, tell=tell) if accept else None
+    result = result if right is None else right.result
     result = result if before is None else _beside(result, before)
-    return diagnose_session(result, reference=before, tolerances=known, effects=asked, mended=checks, tell=tell)
+    return diagnose_session(result, reference=before, tolerances=known, effects=asked, mended=right, tell=tell)
 
 
 def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:

@@ -13,6 +13,8 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.effects import QualityCheck
+from biodance.effects._base.exchange_spans import Pair, Spans
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import Check, ShownJoints, Step, TrialResult
@@ -200,6 +202,17 @@ class SessionResult:
             or bool(self.session.refused or self.doubts or self.slips)
             or any(not check.inside for check in self.all_checks)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class RightLabels:
+    """A session ``result`` with its labels put right in a copy: the pairs ``exchanged`` by trial, with their frames,
+    and the ``checks`` that name them.
+    """
+
+    result: SessionResult
+    exchanged: Mapping[str, Mapping[Pair, Spans]]
+    checks: tuple[QualityCheck, ...]
 
 
 def _row(one: TrialResult) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 from biodance.body.body_file import body_text
 from biodance.effects import QualityCheck
 from biodance.lab.corrections import PlateCorrection
-from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected
+from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected, write_mended
 from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
@@ -153,13 +153,16 @@ def _accepted(
     if text := lab_text(earlier, made):
         files[LAB] = text
     written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if made else ((), ())
-    others = {(one.effect, one.target) for one in made}
+    mended, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
+    labels = found.mended.checks if found.mended else ()
+    exchanged = dict.fromkeys(f"{one.text} Put right in a copy." for one in labels)
+    others = {*((one.effect, one.target) for one in made), *((one.effect, one.target) for one in labels)}
     told = {
-        "files": sorted(files),
-        "corrections": [str(one) for one in made],
+        "files": [*sorted(files), *mended],
+        "corrections": [*exchanged, *(str(one) for one in made)],
         "trials": written,
         "not_in_recordings": [f"{f.effect} {f.target}".strip() for f in findings if (f.effect, f.target) not in others],
-        "refused": refused,
+        "refused": [*refused, *kept],
     }
     return told, files
 

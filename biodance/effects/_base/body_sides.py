@@ -5,7 +5,7 @@ arms swing, and cross the middle.
 import numpy as np
 
 from biodance.lab.markers.sets import MarkerSet, landmark
-from biodance.records import Array, Markers
+from biodance.records import Array, Markers, Mask
 
 _ASIDE = 0.02
 """m by which a left marker must lie to the right of its right partner, or a front one behind its back one."""
@@ -26,7 +26,10 @@ def rightwards(markers: Markers, marker_set: MarkerSet) -> Array:
         return np.full((markers.time.size, 3), np.nan) if found is None else found
 
     across = [at(f"right_{place}") - at(f"left_{place}") for place in _ACROSS]
-    ahead = [(at("right_asis") + at("left_asis")) / 2 - at("mid_psis"), *(at(front) - at(back) for front, back in _AHEAD)]
+    ahead = [
+        (at("right_asis") + at("left_asis")) / 2 - at("mid_psis"),
+        *(at(front) - at(back) for front, back in _AHEAD),
+    ]
     votes = np.stack([*across, *(np.cross(way, [0.0, 0.0, 1.0]) for way in ahead)]) * [1.0, 1.0, 0.0]
     return _unit(np.nansum(_unit(votes), axis=0))
 
@@ -44,7 +47,7 @@ def sides(names: tuple[str, ...]) -> list[tuple[str, str]]:
     return [(spelt[name], spelt[partner(name)]) for name in left if partner(name) in spelt]
 
 
-def beyond(markers: Markers, pair: tuple[str, str], way: Array) -> Array:
+def lies_beyond(markers: Markers, pair: tuple[str, str], way: Array) -> Mask:
     """Return (T,) where the first marker of a ``pair`` lies `_ASIDE` farther along ``way`` (T, 3) than the second."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.sum((markers[pair[0]] - markers[pair[1]]) * way, axis=1) > _ASIDE)

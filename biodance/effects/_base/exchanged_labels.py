@@ -3,19 +3,25 @@ cannot tell (left or right, front or back, thumb or not), pelvis, trunk and fing
 contradicts.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
 
-from biodance.effects._base.body_sides import beyond, crossed_ends, crossed_sides, middle, rightwards, sides
-from biodance.effects._base.rigid_groups import Pair, RigidGroup, rigid_groups
+from biodance.effects._base.body_sides import crossed_ends, crossed_sides, lies_beyond, middle, rightwards, sides
+from biodance.effects._base.exchange_spans import (
+    LEAST_EXCHANGED,
+    Pair,
+    Spans,
+    alphabetical,
+    exchange_spans,
+    renamed_markers,
+)
+from biodance.effects._base.rigid_groups import RigidGroup, marking, rigid_groups
 from biodance.effects._base.wrists import BACK_OF_HAND, back_of_hand, mirrored, travels, turned_wrists
 from biodance.lab.markers.sets import MarkerSet, read_marker_set, recognise
-from biodance.records import Array, Markers, Mask, Trial, runs
+from biodance.records import Array, Index, Markers, Mask, Trial
 
-Spans = tuple[tuple[int, int], ...]
-"""Frames (start, stop), stop excluded."""
 _SPAN = 3.5
 """m between the outermost markers: more than a person's, arms and legs stretched."""
 _SPANNED = 0.05
@@ -32,14 +38,6 @@ _BETTER = 0.16
 trials: 0.00 to 0.06 where names are exchanged, 0.3 and more elsewhere)."""
 _SOME = 60
 """Worst frames, and as many spread over the trial, in which all names are tried."""
-_FEWEST = 4
-"""Frames of an exchange in a part of a trial; less is a spike."""
-_HOLE = 0.1
-"""s: shorter pauses of an exchange belong to it."""
-_WHOLE = 0.9
-"""Share of the frames from which on an exchange is one of the whole trial."""
-_NEAR = 3
-"""Frames about the end of a span within which the two markers must change places."""
 _ROUNDS = 6
 
 
@@ -57,19 +55,33 @@ def exchanged_labels(
     markers = markers.select(worn.match(markers.names).values())
     if not _on_a_person(markers):
         return {}
-    groups = rigid_groups(markers, static, worn) if static is not None else ()
-    found = dict(_by_shape(markers, groups))
+    found = dict(_by_shape(markers, static, worn)) if static is not None else {}
     rest = renamed_markers(markers, found)
     right = rightwards(rest, worn)
-    seen = {_sorted(pair) for pair in (*crossed_sides(rest, right), *crossed_ends(rest, right))}
-    hangs = arms_hang(trial)
-    if hangs:
-        seen |= {*turned_wrists(rest, worn, others)}
-    else:  # nothing tells a wrist in any posture, unless the finger's marker lies clearly on one side
-        seen |= {pair for pair in known if _is_wrist(pair) and not _tells(rest, pair)}
-    whole = _uncontradicted(rest, static, worn, seen)
-    parts = {pair: spans for pair, spans in _in_parts(rest, static, right, worn) if pair not in whole}
-    return found | parts | dict.fromkeys(whole, ((0, markers.time.size),))
+    whole = _uncontradicted(rest, static, worn, {*crossed_sides(rest, right), *crossed_ends(rest, right)})
+    rest = renamed_markers(rest, whole)
+    wrists = _wrists(rest, static, worn, others, None if arms_hang(trial) else known)
+    rest = renamed_markers(rest, wrists)
+    parts = dict(_by_shape(rest, rest, worn)) | dict(_on_other_side(rest, right, worn))
+    return parts | wrists | whole | found
+
+
+def _wrists(
+    markers: Markers, static: Markers | None, worn: MarkerSet, others: Iterable[Markers], follow: Iterable[Pair] | None
+) -> dict[Pair, Spans]:
+    """Return the wrists whose two markers carry each other's names, and when: as hanging arms show it, or where they do
+    anything (``follow`` the pairs exchanged in the static trial, None while they hang) the finger's marker; where
+    that lies on neither side, as in the static trial.
+    """
+    if follow is None:
+        seen = {*turned_wrists(markers, worn, others)}
+    else:
+        seen = {pair for pair in follow if _is_wrist(pair) and not _tells(markers, pair)}
+    whole = _uncontradicted(markers, static, worn, seen)
+    parts: dict[Pair, Spans] = {}
+    for reference in (static, markers) if static is not None else (markers,):
+        parts |= {pair: spans for pair, spans in _turned_hands(markers, reference) if pair not in {*whole, *parts}}
+    return whole | parts
 
 
 def set_of(trial: Trial) -> MarkerSet | None:
@@ -84,19 +96,6 @@ def arms_hang(trial: Trial) -> bool:
     return trial.markers is not None and (trial.role == "static" or travels(trial.markers))
 
 
-def renamed_markers(markers: Markers, found: Mapping[Pair, Spans]) -> Markers:
-    """Return the markers with the two of each pair ``found`` exchanged in its frames."""
-    if not found:
-        return markers
-    xyz = markers.xyz.copy()
-    for pair, spans in found.items():
-        columns = [markers.names.index(name) for name in pair]
-        for start, stop in spans:
-            xyz[start:stop, columns] = xyz[start:stop, columns[::-1]]
-    xyz.setflags(write=False)  # the record keeps it without a copy
-    return Markers(markers.names, markers.time, xyz)
-
-
 def _on_a_person(markers: Markers) -> bool:
     """Return whether the markers lie no farther apart than those on a person, but for a few frames."""
     xyz = markers.xyz[np.isfinite(markers.xyz).any(axis=(1, 2))]
@@ -106,71 +105,85 @@ def _on_a_person(markers: Markers) -> bool:
     return bool(np.mean(span.max(axis=1, initial=0.0) > _SPAN) <= _SPANNED)
 
 
-def _by_shape(markers: Markers, groups: tuple[RigidGroup, ...]) -> Iterator[tuple[Pair, Spans]]:
-    """Yield the pairs under whose exchange the distances within rigid ``groups`` are those of the static trial, and
-    when: the exchange that explains most first, then what is left.
+def _by_shape(markers: Markers, reference: Markers, worn: MarkerSet) -> Iterator[tuple[Pair, Spans]]:
+    """Yield the pairs under whose exchange the distances within rigid groups are those of a ``reference``, and when:
+    the exchange that explains most first, then what is left.
     """
+    groups = rigid_groups(markers, reference, worn)
     for _ in range(_ROUNDS):
-        pairs = _best_exchange(markers, groups)
-        wrong, told, _ = _explained(markers, groups, pairs, np.arange(markers.time.size))
-        spans = _spans(markers, pairs, wrong, told)
-        if not spans:
+        pairs, spans = _best_exchange(markers, groups)
+        if not pairs:
             return
         yield from ((pair, spans) for pair in pairs)
         markers = renamed_markers(markers, dict.fromkeys(pairs, spans))
 
 
-def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[Pair, ...]:
-    """Return the pairs that explain most if exchanged together, () where none do, or others explain it as well."""
-    named = {one: one.misfit(markers, {}, np.arange(markers.time.size)) for one in groups}
-    wrong = [one for one in groups if np.sum(named[one] > len(one.labels) * _MISFIT**2) >= _FEWEST]
+def _best_exchange(markers: Markers, groups: tuple[RigidGroup, ...]) -> tuple[tuple[Pair, ...], Spans]:
+    """Return the pairs that explain most if exchanged together, and when; () where none do, or others explain it
+    nearly as well.
+    """
+    every = np.arange(markers.time.size)
+    named = {one: one.misfit(markers, {}, every) for one in groups}
+    wrong = [one for one in groups if np.sum(named[one] > len(one.labels) * _MISFIT**2) >= LEAST_EXCHANGED]
     if not wrong:
-        return ()
+        return (), ()
     worst = np.argsort(np.max([np.nan_to_num(named[one]) for one in wrong], axis=0))[-_SOME:]
     frames = np.union1d(worst, np.linspace(0, markers.time.size - 1, _SOME).astype(int))
     gains = {}
     for pairs in _candidates(markers, groups, wrong):
         better, _, gain = _explained(markers, groups, pairs, frames)
-        if better.sum() >= _FEWEST:
+        if better.sum() >= LEAST_EXCHANGED:
             gains[pairs] = float(gain[better].sum() - 2 * len(pairs) * _NOISE**2 * better.sum())
-    best = max(gains, key=gains.__getitem__, default=())
-    others = [pairs for pairs in gains if not set(best) <= set(pairs)]
-    return best if best and _alone(markers, groups, best, others, frames) else ()
+    possible = {}
+    for pairs in sorted(gains, key=lambda pairs: -gains[pairs]):
+        better, told, _ = _explained(markers, groups, pairs, every)
+        if spans := exchange_spans(markers, pairs, better, told):
+            possible[pairs] = spans
+    if not possible:
+        return (), ()
+    best, *others = possible
+    alone = all(_better(markers, groups, best, other) for other in others if not set(best) <= set(other))
+    return (best, possible[best]) if alone else ((), ())
 
 
-def _alone(
-    markers: Markers, groups: tuple[RigidGroup, ...], best: tuple[Pair, ...], others: list[tuple[Pair, ...]], frames: Array
-) -> bool:
-    """Return whether no other names bring the groups that the ``best`` exchange touches nearly as near."""
+def _better(markers: Markers, groups: tuple[RigidGroup, ...], best: tuple[Pair, ...], other: tuple[Pair, ...]) -> bool:
+    """Return whether the ``best`` exchange leaves clearly less than an ``other`` of the groups that one of them
+    touches, where the best one explains something.
+    """
+    frames = np.linspace(0, markers.time.size - 1, 4 * _SOME).astype(int)
     better, _, _ = _explained(markers, groups, best, frames)
-    touched = [one for one in groups if set(_other_names(best)) & set(one.labels)]
-
-    def left(pairs: tuple[Pair, ...]) -> float:
-        return float(np.nansum([one.misfit(markers, _other_names(pairs), frames[better]) for one in touched]))
-
-    return all(left(best) < _BETTER * left(pairs) for pairs in others)
+    labels = {*_other_names(best), *_other_names(other)}
+    touched = [one for one in groups if labels & set(one.labels)]
+    left = [
+        float(np.nansum([one.misfit(markers, _other_names(pairs), frames[better]) for one in touched]))
+        for pairs in (best, other)
+    ]
+    return left[0] < _BETTER * left[1]
 
 
 def _candidates(
     markers: Markers, groups: tuple[RigidGroup, ...], wrong: list[RigidGroup]
 ) -> Iterator[tuple[Pair, ...]]:
-    """Yield what may be exchanged so that groups that look ``wrong`` are right: one or two pairs of one group, one, two
-    or all left and right partners of a group.
+    """Yield what may be exchanged so that groups that look ``wrong`` are right: one or two pairs of one group, one pair
+    with a group beside it, one, two or all left and right partners of a group.
     """
-    partners = [_sorted(pair) for pair in sides(markers.names)]
+    partners = [alphabetical(pair) for pair in sides(markers.names)]
     seen = set()
     for group in wrong:
-        within = [_sorted(pair) for pair in combinations(group.labels, 2)]
-        across = [pair for pair in partners if set(pair) & set(group.labels) and pair not in within]
+        own = set(group.labels)
+        within = [alphabetical(pair) for pair in combinations(group.labels, 2)]
+        beside = {label for one in groups if own & set(one.labels) for label in one.labels} - own
+        past = [alphabetical((a, b)) for a in group.labels for b in sorted(beside)]
+        across = [pair for pair in partners if set(pair) & own and pair not in within]
         doubles = [(a, b) for some in (within, across) for a, b in combinations(some, 2) if not set(a) & set(b)]
-        for pairs in (*((pair,) for pair in (*within, *across)), *doubles, tuple(across)):
+        for pairs in (*((pair,) for pair in (*within, *past, *across)), *doubles, tuple(across)):
             if pairs and (key := frozenset(pairs)) not in seen:
                 seen.add(key)
                 yield pairs
 
 
 def _explained(
-    markers: Markers, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...], frames: Array
+    markers: Markers, groups: tuple[RigidGroup, ...], pairs: tuple[Pair, ...], frames: Index
 ) -> tuple[Mask, Mask, Array]:
     """Return in which of the ``frames`` the groups that ``pairs`` touch fit clearly better with these exchanged (n,),
     where that can be told (n,), and by how many m² (n,).
@@ -190,70 +203,27 @@ def _other_names(pairs: Iterable[Pair]) -> dict[str, str]:
     return {one: other for pair in pairs for one, other in (pair, pair[::-1])}
 
 
-def _spans(markers: Markers, pairs: Iterable[Pair], wrong: Mask, told: Mask) -> Spans:
-    """Return the frames of an exchange: all where it is ``wrong`` (T,) in nearly all frames that tell, else the runs at
-    whose ends the markers change places.
+def _on_other_side(markers: Markers, right: Array, worn: MarkerSet) -> Iterator[tuple[Pair, Spans]]:
+    """Yield the pairs of left and right markers on pelvis and shoulders that are exchanged in a part of a trial: no
+    movement brings them there.
     """
-    if not wrong.any():
-        return ()
-    if wrong.sum() >= _WHOLE * told.sum():
-        return ((0, wrong.size),)
-    joined = wrong.copy()
-    for start, stop in runs(~wrong):
-        short = stop - start <= _HOLE * markers.rate or not told[start:stop].any()
-        joined[start:stop] = short and start > 0 and stop < wrong.size
-    changes = _changes(markers, pairs)
-    found = []
-    for start, stop in runs(joined):
-        ends = (_changed_at(changes, start), _changed_at(changes, stop))
-        if wrong[start:stop].sum() >= _FEWEST and ends[0] is not None and ends[1] is not None and ends[0] < ends[1]:
-            found.append((ends[0], ends[1]))
-    return tuple(found)
+    places = [f"{side}_{place}" for side in ("left", "right") for place in ("asis", "psis", "acromion")]
+    match, there = worn.match(markers.names), {label for place in places for label in marking(worn, [place])}
+    rigid = {match[label] for label in there if label in match}
+    for pair in (pair for pair in sides(markers.names) if set(pair) <= rigid):
+        told = np.asarray(np.isfinite((markers[pair[0]] - markers[pair[1]]) * right).all(axis=1))
+        if spans := exchange_spans(markers, [pair], lies_beyond(markers, pair, right), told):
+            yield alphabetical(pair), spans
 
 
-def _changes(markers: Markers, pairs: Iterable[Pair]) -> Array:
-    """Return (T + 1,) 1 where markers move less from one frame to the next if they change their names between the two,
-    0 where they move more, NaN where that is not seen, as before the first and behind the last frame.
+def _turned_hands(markers: Markers, reference: Markers) -> Iterator[tuple[Pair, Spans]]:
+    """Yield the wrists whose finger's marker lies as far towards the palm as it lies on the back of the hand in a
+    ``reference``, and when.
     """
-    ways = np.zeros(markers.time.size + 1)
-    ways[[0, -1]] = np.nan
-    for one, other in ((markers[a], markers[b]) for a, b in pairs):
-        straight = np.linalg.norm(np.diff(one, axis=0), axis=1) + np.linalg.norm(np.diff(other, axis=0), axis=1)
-        crossing = np.linalg.norm(other[1:] - one[:-1], axis=1) + np.linalg.norm(one[1:] - other[:-1], axis=1)
-        ways[1:-1] += straight - crossing
-    return np.where(np.isnan(ways), np.nan, np.where(ways > 0, 1.0, 0.0))
-
-
-def _changed_at(changes: Array, end: int) -> int | None:
-    """Return the frame near the ``end`` of a span at which the markers change places, the end itself where that is not
-    seen; None where they do not.
-    """
-    first = max(end - _NEAR, 0)
-    near = changes[first : end + _NEAR + 1]
-    there = np.flatnonzero(near == 1)
-    if there.size:
-        return first + int(there[np.argmin(np.abs(first + there - end))])
-    return end if np.isnan(near).any() else None
-
-
-def _in_parts(
-    markers: Markers, static: Markers | None, right: Array, worn: MarkerSet
-) -> Iterator[tuple[Pair, Spans]]:
-    """Yield the pairs that are exchanged where no rigid distance tells it, and when: left and right of the pelvis, the
-    two markers of a wrist by the side of the finger's marker in the static trial.
-    """
-    match = worn.match(markers.names)
-    pelvis = {match[one.label] for one in worn.markers if one.segment == "pelvis" and one.label in match}
-    seen = [
-        (_sorted(pair), beyond(markers, pair, right), np.isfinite((markers[pair[0]] - markers[pair[1]]) * right).all(axis=1))
-        for pair in sides(markers.names)
-        if set(pair) <= pelvis
-    ]
-    for side in "LR" if static is not None else "":
-        back, before = back_of_hand(markers, side), middle(back_of_hand(static, side))
-        seen.append(((f"{side}WRA", f"{side}WRB"), mirrored(back, before), np.isfinite(back)))
-    for pair, wrong, told in seen:
-        if spans := _spans(markers, [pair], wrong, told):
+    for side in "LR":
+        pair, back = (f"{side}WRA", f"{side}WRB"), back_of_hand(markers, side)
+        turned = mirrored(back, middle(back_of_hand(reference, side)))
+        if turned.any() and (spans := exchange_spans(markers, [pair], turned, np.isfinite(back))):
             yield pair, spans
 
 
@@ -266,25 +236,24 @@ def _tells(markers: Markers, pair: Pair) -> bool:
     return bool(abs(middle(back_of_hand(markers, pair[0][:1]))) > BACK_OF_HAND)
 
 
-def _uncontradicted(markers: Markers, static: Markers | None, worn: MarkerSet, seen: set[Pair]) -> set[Pair]:
-    """Return those of the pairs ``seen`` whose exchange makes no rigid group worse than noise: against the static
-    trial, else against its own median shape.
+def _uncontradicted(
+    markers: Markers, static: Markers | None, worn: MarkerSet, seen: Iterable[Pair]
+) -> dict[Pair, Spans]:
+    """Return those of the pairs ``seen`` in the whole trial whose exchange makes no rigid group worse than noise:
+    against the static trial, else against its own median shape.
     """
-    left = {pair for pair in seen if set(pair) <= set(markers.names)}
+    whole: Spans = ((0, markers.time.size),)
+    left = {alphabetical(pair): whole for pair in seen if set(pair) <= set(markers.names)}
     frames = np.unique(np.linspace(0, markers.time.size - 1, 2 * _SOME).astype(int))
     while left:
-        exchanged = renamed_markers(markers, dict.fromkeys(left, ((0, markers.time.size),)))
+        exchanged = renamed_markers(markers, left)
         before, after = (rigid_groups(one, static or one, worn) for one in (markers, exchanged))
         worse = set()
         for was, now in zip(before, after, strict=True):
             apart = middle(now.misfit(exchanged, {}, frames)) - middle(was.misfit(markers, {}, frames))
             worse |= set(was.labels) if apart > len(was.labels) * _NOISE**2 else set()
-        torn = {pair for pair in left if set(pair) & worse}
+        torn = [pair for pair in left if set(pair) & worse]
         if not torn:
             break
-        left -= torn
+        left = {pair: spans for pair, spans in left.items() if pair not in torn}
     return left
-
-
-def _sorted(pair: Pair) -> Pair:
-    return (min(pair), max(pair))

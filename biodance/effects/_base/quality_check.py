@@ -15,7 +15,8 @@ from biodance.records import Session
 class QualityCheck:
     """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not
     well the cause: ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN =
-    no number); ``advice`` how the effect is mended (filled in by `check_quality`).
+    no number); ``advice`` how the effect is mended (filled in by `check_quality`); ``mended`` where it was taken out
+    before anything was judged, so that the rest can be.
     """
 
     check: str
@@ -27,6 +28,7 @@ class QualityCheck:
     quantity: str = "size"
     unit: str = ""
     advice: str = ""
+    mended: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.lab.markers.sets import MarkerSet
-from biodance.records import Array, Markers
+from biodance.records import Array, Index, Markers
 from biodance.spatial import rigid_fit
 
-Pair = tuple[str, str]
-"""Two labels in alphabetical order."""
 _ABOVE = {"forearm_hand": "elbow", "shank": "knee", "foot": "ankle"}
 """The joint above a segment: markers on its axis keep their distances to those of the segment, too. A shoulder is none:
 its marker rides on the collar bone.
@@ -30,7 +28,7 @@ class RigidGroup:
     labels: tuple[str, ...]
     shape: Array
 
-    def misfit(self, markers: Markers, other: Mapping[str, str], frames: Array) -> Array:
+    def misfit(self, markers: Markers, other: Mapping[str, str], frames: Index) -> Array:
         """Return (n,) m² the sum of squared distances to the shape in some ``frames``, laid on each as well as a rigid
         body can be (Kabsch 1976, doi:10.1107/S0567739476001873: turned and moved, never mirrored), with the ``other``
         names of some labels; NaN where one is not seen.
@@ -70,24 +68,26 @@ def _members(marker_set: MarkerSet) -> Iterator[tuple[str, ...]]:
     for marker in marker_set.markers:
         on.setdefault(marker.segment, []).append(marker.label)
     yield tuple(on.get("pelvis", ()))
-    yield _marking(marker_set, ("head_front", "head_back"))
+    yield marking(marker_set, ("head_front", "head_back"))
     for segment, labels in on.items():
         side, _, part = segment.partition("_")
         if side not in ("left", "right"):
             continue
         joint = _ABOVE.get(part, "")
-        above = _marking(marker_set, (f"{side}_{joint}_lateral", f"{side}_{joint}_medial")) if joint else ()
+        above = marking(marker_set, (f"{side}_{joint}_lateral", f"{side}_{joint}_medial")) if joint else ()
         hand, wrist = (
-            _marking(marker_set, [f"{side}_{place}" for place in places])
+            marking(marker_set, [f"{side}_{place}" for place in places])
             for places in (("hand",), ("wrist_radial", "wrist_ulnar"))
         )
         yield tuple(dict.fromkeys((*above, *(label for label in labels if label not in hand))))
         yield (*hand, *wrist) if part == "forearm_hand" and hand else ()
 
 
-def _marking(marker_set: MarkerSet, places: Iterable[str]) -> tuple[str, ...]:
+def marking(marker_set: MarkerSet, places: Iterable[str]) -> tuple[str, ...]:
     """Return the labels that mark some landmarks of a set."""
-    return tuple(dict.fromkeys(label for place in places for way in marker_set.landmarks.get(place, ()) for label in way))
+    return tuple(
+        dict.fromkeys(label for place in places for way in marker_set.landmarks.get(place, ()) for label in way)
+    )
 
 
 def _often_seen(markers: Markers, label: str) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.effects._base.body_sides import middle, rightwards
 from biodance.lab.markers.sets import MarkerSet
-from biodance.records import Array, Markers
+from biodance.records import Array, Markers, Mask
 
 _OPPOSITE = -0.4
 """Cosine between one wrist and the mirrored other one from which on they contradict each other (19 real trials: -0.65
@@ -65,7 +65,7 @@ def travels(markers: Markers) -> bool:
     return bool(np.linalg.norm(last - first) > _FAR_AWAY)
 
 
-def mirrored(back: Array, before: float) -> Array:
+def mirrored(back: Array, before: float) -> Mask:
     """Return where a finger's marker lies towards the palm (``back`` (T,) of `back_of_hand`) as far as it lay towards
     the back of the hand ``before``, in the static trial.
     """

@@ -1,4 +1,4 @@
-"""Copies of a C3D recording: with results inside, so that they open beside the markers, or with other marker names."""
+"""Copies of a C3D recording with results inside, so that they open beside the markers."""
 
 import json
 import subprocess
@@ -13,41 +13,11 @@ import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.declared import texts
-from biodance.lab.c3d.parameters import read_header, text_rows
-from biodance.lab.c3d.raw import RawC3d, read_raw, split_label
+from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import write_new
 from biodance.records import Array, assign, frozen_array
-
-
-def write_relabelled(source: Path, target: Path, names: Mapping[str, str]) -> Path:
-    """Write ``source`` to ``target`` with the labels renamed as ``names`` say (without the subject's prefix, which
-    stays); return the path.
-
-    Raises
-    ------
-    FileRefused
-        The source is no C3D file, or the target exists or cannot be written.
-    """
-    content = bytearray(source.read_bytes())
-    header = read_header(bytes(content), str(source))
-    for start, width in text_rows(bytes(content), header, str(source), group="POINT", name="LABELS"):
-        row = content[start : start + width].decode("latin-1")
-        prefix, name = split_label(row.split("\0")[0])
-        new = names.get(name, name)
-        if new != name:
-            label = f"{prefix}:{new}" if prefix else new
-            content[start : start + width] = label.encode("latin-1").ljust(width)[:width]
-    if target.exists():
-        raise FileRefused(f"{target}: is there already and nothing is overwritten. Give another folder.")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
-    except OSError as error:
-        raise FileRefused(f"{target}: cannot be written ({error.strerror or error}).") from error
-    return target
-
 
 _PATIENCE = 300.0
 """s after which the child is given up."""
