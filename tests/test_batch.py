@@ -204,19 +204,19 @@ def test_what_moved_stands_beside_each_trial() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "doubt", "findings", "told"),
+    ("seconds", "status", "findings", "told"),
     [
-        (3.0, "", [], "unexplained"),
-        (3.0, "standing alone tells no cause", [], "cannot tell"),
-        (0.0, "", [], "not judged"),
-        (0.0, "", [{"effect": "clipping", "target": "Fz"}], "unexplained"),
+        (3.0, "unknown", [], "unexplained"),
+        (3.0, "cannot tell", [], "cannot tell"),
+        (0.0, "cannot tell", [], "not judged"),
+        (0.0, "named", [{"effect": "clipping", "target": "Fz"}], "unexplained"),
     ],
 )
-def test_plates_alone_have_no_verdict(seconds: float, doubt: str, findings: list, told: str) -> None:
+def test_plates_alone_have_no_verdict(seconds: float, status: str, findings: list, told: str) -> None:
     trial = dict.fromkeys(("name", "role", "status", "reason", "frames", "rate_hz", "gaps_percent", "wrench"))
     trial |= {"marker_rms_m": None, "marker_max_m": None, "warnings": []}
     judged = [{"trial": "stand", "seconds": seconds, "why_not": None if seconds else "it has no markers"}]
-    diagnosis = {"verdict": "unexplained", "doubt": doubt, "findings": findings, "judged": judged}
+    diagnosis = {"verdict": "unexplained", "status": status, "findings": findings, "judged": judged}
     document = {"mass_check": None, "diagnosis": diagnosis, "attention": [], "subject": {"mass_kg": 60.0}}
     (row,) = rows_of(document | {"refused": {}, "trials": [trial], "movement": None})
     assert row["verdict"] == told

@@ -8,18 +8,21 @@ from diagnosed_sessions import body
 from example_results import FOUND, VERDICTS, full_session
 
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.repairs import by_checks
+from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import QualityCheck, effects
 from biodance.pipeline.attention import (
-    headline,
     identified_attention,
     is_well,
     reconcile_with_checks,
     session_attention,
 )
 from biodance.pipeline.finding_words import EXPLAINS, in_words
+from biodance.pipeline.headline import headline
 from biodance.pipeline.trial_result import Check, Step
 from biodance.records.attention import Attention, Judged, strongest_first
+from biodance.witnesses import Observation
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
 
@@ -47,17 +50,15 @@ def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
         whole = check.inside and not any(row.missed for row in rows)
         count += 1
         assert one.verdict != "named, complete" or whole
+        assert said is one.attention[0]
         if one.verdict == "nothing wrong":
-            assert ("what could be judged" in said.text) == (not whole)
+            assert ("could not be judged" in said.text) == (not whole)
             assert (said.level == "note") == whole == is_well(one)
-        if not check.inside:
-            assert check.what in said.text
-        if WALK in rows:
-            assert "not judged: walk" in said.text
+        assert check.inside or check.what in [line.about for line in one.attention]
         if one.verdict == "unexplained":
             assert not one.findings
-            told_nothing = before.doubted or STATIC not in rows or not before.adequacy
-            assert said.text.startswith("Cannot tell") == told_nothing
+            assert said.text.startswith("Nobody can tell") == (one.status is DiagnosisStatus.CANNOT_TELL)
+            assert before.verdict == one.verdict or one.status is not DiagnosisStatus.UNKNOWN or not check.inside
         assert not is_well(one) or whole
         assert list(one.attention) == list(strongest_first(one.attention))
         assert one.judged == rows
@@ -71,8 +72,11 @@ def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     doubtful = replace(result, trials=trials, checks=(), body=odd)
     one = reconcile_with_checks(Diagnosis("nothing wrong", ()), doubtful, (STATIC,))
     assert one.verdict == "unexplained"
-    assert one.attention[0].text.startswith("Cannot tell")
-    assert "thigh is 38 mm shorter" in one.attention[0].text
+    assert one.status is DiagnosisStatus.CANNOT_TELL
+    assert one.attention[0].text == (
+        "Nobody can tell whether anything is wrong: the right thigh is 38 mm shorter than the left thigh. Mend it, and "
+        "run this again."
+    )
     assert (
         reconcile_with_checks(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict
         == "named, incomplete"
@@ -89,7 +93,7 @@ def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
     assert reconcile_with_checks(Diagnosis("nothing wrong", ()), result, (STATIC,)).verdict == "nothing wrong"
     one = reconcile_with_checks(Diagnosis("nothing wrong", ()), result, (replace(STATIC, seconds=0.0), WALK))
     assert one.verdict == "unexplained"
-    assert one.attention[0].text.startswith("Cannot tell")
+    assert one.attention[0].text.startswith("Nobody can tell whether anything is wrong: none of the movement")
     assert not is_well(one)
 
 
@@ -97,17 +101,24 @@ def test_a_unit_whose_factor_has_no_interval_is_told_in_words() -> None:
     said = "The plates carry 0.4536 times the declared weight: pounds declared as kilograms."
     quality = QualityCheck("weight on the plates", False, said, "unit_error", "", 0.4536, "factor", "1")
     one = by_checks((quality,))
-    assert f"Found: unit error. {said}" in headline(one, "", (), ()).text
+    assert (
+        headline(one, (), frozenset()).text == "A unit is mistaken by a factor of 0.45. Correct it, and run this again."
+    )
 
 
 def test_beside_a_refused_step_nothing_is_well() -> None:
-    """Exit code 1, as of report and identify: the declared mass of such a session was never checked."""
+    """Exit code 1, as of report and identify: the declared mass of such a session was never checked, unless strides
+    weighed it.
+    """
     full = full_session()
     calm = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=(), steps=())
     refused = replace(calm, steps=(Step("standing", "refused", "Nobody stands still."),))
     told = [reconcile_with_checks(Diagnosis("nothing wrong", ()), some, (STATIC,)) for some in (calm, refused)]
     assert [one.verdict for one in told] == ["nothing wrong", "nothing wrong"]
     assert [is_well(one) for one in told] == [True, False]
+    strides = Observation("stride_force", "mass", 60.0, 0.3, "kg", 60.0, 0.5, "walk")
+    weighed = Diagnosis("nothing wrong", (), witnesses=WitnessEvidence((strides,), {}, {}, {}))
+    assert is_well(reconcile_with_checks(weighed, refused, (STATIC,)))
 
 
 def test_a_check_points_to_the_cause_that_was_found() -> None:
@@ -132,9 +143,9 @@ def test_sentences_come_strongest_first_and_once() -> None:
 
 def test_a_size_that_is_hardly_known_says_so() -> None:
     shaky = replace(FOUND, parameters=(Estimate("gain", 0.06, 0.05, "1"),))
-    line = headline(Diagnosis("named, complete", (shaky,)), "80 s of movement", (STATIC,), ())
-    assert "hardly known" in line.text
-    assert "hardly known" not in headline(Diagnosis("named, complete", (FOUND,)), "80 s", (STATIC,), ()).text
+    assert "hardly known" in in_words(shaky)
+    assert "hardly known" not in in_words(FOUND)
+    assert "6 % too much (0 to 16)" in headline(Diagnosis("named, complete", (shaky,)), (STATIC,), frozenset()).text
 
 
 @pytest.mark.parametrize(("late", "told"), [(0.034, "forces late"), (-0.034, "forces early")])
@@ -152,6 +163,6 @@ def test_identify_says_first_what_the_checks_of_the_recordings_found() -> None:
     full = full_session()
     first, *others = identified_attention(full, [quality])
     assert (first.level, first.about) == ("fail", ABOUT)
-    assert first.text == "Found: labels swapped A/B. A and B carry each other's names in walk."
+    assert first.text == "A and B carry each other's names. Exchange them, or accept the correction."
     assert ABOUT not in [one.about for one in others]
     assert identified_attention(full, []) == session_attention(full)

@@ -186,7 +186,8 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     tell("writing")
     document = write_report(result, folder, diagnosis=found, movement=session_movement(result), drawn=task.pages)
     first = document["attention"][0]["text"] if document["attention"] else ""
-    status = SessionStatus.NEEDS_A_PERSON if result.needs_a_person else SessionStatus.DONE
+    well = all(row["level"] == "note" for row in document["attention"])
+    status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON
     tell(f"{status}: {first}")
     return status, first, rows_of(document)
 

@@ -20,7 +20,7 @@ from biodance.cli.app import (
     show,
 )
 from biodance.cli.identify import diagnose_robot
-from biodance.cli.session import examine_with_reference, tabled
+from biodance.cli.session import examine_with_reference, exit_code, tabled
 
 
 @app.command(name="foresee")
@@ -90,7 +90,6 @@ def diagnose_command(
         for_people = (*reading.given(), *(["--accept"] if accept else []), *(["--tables"] if results.tables else []))
         return diagnose_robot(session, results, robot, for_people)
     from biodance.pipeline import front
-    from biodance.pipeline.attention import is_well
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
@@ -109,4 +108,4 @@ def diagnose_command(
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
     results.show_page(folder)
     show(document, print_diagnosis, json=results.json, path=folder / "report.html")
-    return DONE if is_well(found.diagnosis) and not document["failures"] else NEEDS_A_PERSON
+    return NEEDS_A_PERSON if document["failures"] else exit_code(document)

@@ -18,7 +18,7 @@ from biodance.cli.app import (
     progress,
     show,
 )
-from biodance.cli.session import examine_with_reference, tabled
+from biodance.cli.session import examine_with_reference, exit_code, tabled
 
 if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult
@@ -114,5 +114,4 @@ def _told_identified(result: "SessionResult | RobotResult", folder: Path, found:
     from biodance.report.terminal import print_identification
 
     show(found, print_identification, json=json, path=folder / "report.html")
-    wrong = any(row["level"] == "fail" for row in found["attention"])
-    return NEEDS_A_PERSON if wrong or result.needs_a_person else DONE
+    return exit_code(found)

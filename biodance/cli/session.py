@@ -87,8 +87,12 @@ def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]
     if result.stopped:
         say(f"Stopped by Ctrl-C: {folder} holds the trials that were done, and names the others.")
         return STOPPED
-    verdict = found["diagnosis"]["verdict"] if found.get("diagnosis") else "nothing wrong"
-    return NEEDS_A_PERSON if result.needs_a_person or verdict != "nothing wrong" else DONE
+    return exit_code(found)
+
+
+def exit_code(found: "dict[str, Any]") -> int:
+    """Return the exit code of a document: whether somebody must act on anything that it says must be seen."""
+    return DONE if all(row["level"] == "note" for row in found["attention"]) else NEEDS_A_PERSON
 
 
 def examine_with_reference(

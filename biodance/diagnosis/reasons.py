@@ -48,6 +48,8 @@ class Reason(StrEnum):
     """The size of a cause is not constant, as that of a true one is."""
     MAY_NOT_MATTER = "may not matter"
     """A cause is known so poorly that what is there may be less than what matters."""
+    LIMIT_BROKEN = "limit broken"
+    """Forces, markers or weight are outside their limit, and no finding explains it."""
     FORCES_LEFT = "forces left"
     """What is left of the forces matters and is unlike sessions without fault."""
     LOUD_LABORATORY = "loud laboratory"
@@ -90,6 +92,8 @@ def status_of(reasons: Collection[Reason], *, named: bool, clean: bool) -> Diagn
     """
     if named or clean:
         return DiagnosisStatus.NAMED if named else DiagnosisStatus.CLEAN
+    if Reason.LIMIT_BROKEN in reasons:
+        return DiagnosisStatus.UNKNOWN
     left = not {Reason.FORCES_LEFT, Reason.OUTSIDE_EVERY_LABORATORY}.isdisjoint(reasons)
     strange = not left and not STRANGE.isdisjoint(reasons)
     return DiagnosisStatus.CANNOT_TELL if strange or not DOUBTS.isdisjoint(reasons) else DiagnosisStatus.UNKNOWN

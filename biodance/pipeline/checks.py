@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.identification.validation import TrialValidation
 from biodance.motion.quiet_standing import QuietStanding
-from biodance.pipeline.trial_result import Check, TrialResult
+from biodance.pipeline.trial_result import Check, TrialResult, WrenchComparison
 from biodance.records import Subject
 from biodance.settings import CheckLimits
 
@@ -93,10 +93,20 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
         least, inside = f"at least {limits.seconds:g} s", seconds >= limits.seconds
         found.append(Check("fully measured", name, f"{seconds:.2f} s", least, inside, advice))
     if comparison and comparison.used.any():
-        share = 100 * float(np.max(comparison.rms[:3])) / (mass * result.trial.settings.gravity)
+        weight = mass * result.trial.settings.gravity
+        share = 100 * float(np.max(comparison.rms[:3])) / weight
+        limit = np.ceil(max(limits.force, limits.force_moving * _moving(comparison, weight)))
         advice = "See the trial's wrench figure: is it an offset, a delay or a scale?"
-        found.append(_upper("force difference, worst axis", name, share, limits.force, "% of weight", advice))
+        found.append(_upper("force difference, worst axis", name, share, float(limit), "% of weight", advice))
     return found
+
+
+def _moving(comparison: WrenchComparison, weight: float) -> float:
+    """Return the RMS by which the measured force moves about the ``weight`` (N), as a share of it: the error of a
+    simulated force is that of its accelerations.
+    """
+    force = comparison.measured[comparison.used, :3] - [0.0, 0.0, weight]
+    return float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) / weight
 
 
 UNEXPLAINED = 0.5

@@ -1,6 +1,4 @@
-"""A finding in words, the same wherever it is told: its place or places, its size, what it cannot be told from, which
-checks it may explain.
-"""
+"""A finding in words, the same wherever it is told: its place or places, its size, which checks it may explain."""
 
 from collections.abc import Sequence
 
@@ -63,12 +61,6 @@ def _size(one: Estimate) -> str:
     """Return a parameter with its standard deviation as people say it: ``gain 6 ± 0.2 %``."""
     factor, unit = shown_unit(one.unit)
     return f"{one.name.replace('_', ' ')} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
-
-
-def alternatives_in_words(finding: Finding) -> str:
-    """Return the other causes that a finding cannot be told from, to go on its name with."""
-    others = [cause_in_words(a.effect, a.target) for a in finding.set[1:] if a.effect != finding.effect]
-    return f", not told from {listed(others)}" if others else ""
 
 
 def cause_of(checked: str, findings: Sequence[Finding]) -> str:

@@ -1,9 +1,11 @@
 """Why a diagnosis says no more than it does, in words: the one room in which a `Reason` becomes a sentence."""
 
+from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.reasons import Reason
+from biodance.pipeline.finding_words import in_words, listed
 
-_NOTES = {
+_SENTENCES = {
     Reason.UNUSUAL_BODY: (
         "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
         "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass "
@@ -37,48 +39,42 @@ _NOTES = {
         "{about} is only what this resembles: a true cause has one size in every trial, band and channel, under every "
         "load and at every place, and the size of this one hangs on {varies_with}."
     ),
-}
-STRANGE_IN_WORDS = {
-    Reason.UNUSUAL_BODY: f"w{_NOTES[Reason.UNUSUAL_BODY][1:-1]}",
-    Reason.OUTSIDE_TOLERANCES: (
-        "what the plates measured fits only if something that is small elsewhere is many times as large here"
-    ),
-    Reason.SEVERAL_CROSSTALKS: (
-        "what the plates measured fits only several cross-talks at once, as of a plate that lies elsewhere"
-    ),
-    Reason.WITHOUT_RESEMBLED: (
-        "nothing is left that matters and is unlike sessions without fault, with and without what it resembles"
+    Reason.NOT_COMPARED: "No movement could be compared with a body.",
+    Reason.MOVEMENT_NOT_JUDGED: "None of the movement could be judged, and standing still tells little.",
+    Reason.BODY_DOUBTFUL: "The forces fit this body, but {about}.",
+    Reason.LIMIT_BROKEN: "No cause was found for what is outside its limit: {about}.",
+    Reason.UNDESCRIBED_JOINTS: "The body moves at joints ({about}) for which nobody has learned yet what is usual.",
+    Reason.UNSEEN_JOINTS: "No marker shows what moves at {about}, and the plates measure it all the same.",
+    Reason.TOLERANCES_DO_NOT_HOLD: "Its markers move more on the body than where tolerances were learned.",
+    Reason.EXCLUDED_BY_WITNESSES: (
+        "What the simulation would explain by a {about} is none, as feet, clocks and weights show."
     ),
 }
-"""What is strange where nothing else is left, to go on a sentence with."""
 _EACH = (Reason.MAY_NOT_MATTER, Reason.SIZE_VARIES)
 """Reasons that are said of each cause on its own."""
-_DOUBTS = {
-    Reason.ONLY_STANDING: "standing alone tells no cause",
-    Reason.MOVEMENT_NOT_JUDGED: "none of the movement could be judged, and standing still tells little",
-    Reason.BODY_DOUBTFUL: "{about}",
-    Reason.UNDESCRIBED_JOINTS: "the body moves at joints ({about}) for which nobody has learned yet what is usual",
-    Reason.UNSEEN_JOINTS: "no marker shows what moves at {about}, and the plates measure it all the same",
-    Reason.TOLERANCES_DO_NOT_HOLD: "its markers move more on the body than where tolerances were learned",
-    Reason.EXCLUDED_BY_WITNESSES: (
-        "what the simulation would explain by a {about} is none, as feet, clocks and weights show"
-    ),
-}
 
 
 def reason_notes(one: Diagnosis) -> tuple[str, ...]:
-    """Return the reasons of a diagnosis as sentences for the reader."""
+    """Return why a diagnosis says no more, and what it only resembles, as sentences for the reader."""
     notes, varies = [], {_name(f.effect, f.target): f.varies_with for f in one.resembles}
     for reason, about in one.why.items():
-        for name in about if reason in _EACH else (", ".join(about),):
-            if reason in _NOTES:
-                notes.append(_NOTES[reason].format(about=name, varies_with=varies.get(name, "")))
+        for name in about if reason in _EACH else (listed(about),):
+            sentence = _left(one) if reason is Reason.FORCES_LEFT else _SENTENCES[reason]
+            notes.append(sentence.format(about=name, varies_with=varies.get(name, "")))
+    if one.resembles:
+        notes.append(f"It resembles {' and '.join(map(in_words, one.resembles))}, which is not enough.")
     return tuple(notes)
 
 
-def doubt_in_words(one: Diagnosis) -> str:
-    """Return why no cause can be told, to go on a sentence with; "" where one can."""
-    return next((_DOUBTS[why].format(about=", ".join(about)) for why, about in one.why.items() if why in _DOUBTS), "")
+def _left(one: Diagnosis) -> str:
+    """Return where what is left is largest, with its size."""
+    row = next((row for row in one.adequacy if row.matters and row.z > LIMIT), None)
+    if row is None:
+        return "What is left of the forces is unlike sessions without fault."
+    return (
+        f"{row.channel} at {row.band_hz[0]:g} to {row.band_hz[1]:g} Hz is {row.size:.2g} {row.unit} off "
+        f"({row.z:.1f} standard deviations of sessions without fault), most in {row.trial} around {row.second:.1f} s."
+    )
 
 
 def _name(effect: str, target: str) -> str:

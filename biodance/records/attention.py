@@ -1,5 +1,6 @@
 """What a person must see first, and what a verdict rests on: the same records on page, terminal and in JSON."""
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -11,6 +12,8 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+"""What may differ between two sentences of one wording."""
 _FEW = 4
 """Trials of one check that are told one by one."""
 LIMIT_TOLD = ", should be "
@@ -60,15 +63,13 @@ def without_path(reason: str, file: str) -> str:
 
 
 def told_together(found: Iterable[Attention]) -> tuple[Attention, ...]:
-    """Return the sentences with those of one check and limit put into one that names its trials, each in its order:
-    five lines that differ in a number say less than one.
+    """Return the sentences with those of one check and limit, or of one wording, put into one that names its trials,
+    each in its order: five lines that differ in a number say less than one.
     """
     alike: dict[tuple[str, str, str], list[Attention]] = {}
     for one in found:
-        said = one.text.partition(LIMIT_TOLD)[2]
-        alike.setdefault((one.level, one.about, said) if said and one.trial else ("", one.trial, one.text), []).append(
-            one
-        )
+        said = one.text.partition(LIMIT_TOLD)[2] or _NUMBER.sub("#", one.text)
+        alike.setdefault((one.level, one.about, said) if one.trial else ("", "", one.text), []).append(one)
     return tuple(_together(rows) for rows in alike.values())
 
 
@@ -76,6 +77,9 @@ def _together(rows: list[Attention]) -> Attention:
     """Return one sentence for all trials of ``rows``."""
     if len(rows) == 1:
         return rows[0]
+    if LIMIT_TOLD not in rows[0].text:
+        trials = list(dict.fromkeys(one.trial for one in rows[1:] if one.trial != rows[0].trial))
+        return replace(rows[0], text=f"{rows[0].text} Likewise: {', '.join(trials)}." if trials else rows[0].text)
     found = [(one.trial, one.text.partition(LIMIT_TOLD)[0]) for one in rows]
     values = _range(found) if len(rows) > _FEW else ""
     values = values or ", ".join(f"{trial} {value}" for trial, value in found)

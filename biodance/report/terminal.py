@@ -123,12 +123,6 @@ def print_session(result: SessionResult, found: dict[str, Any], console: Console
     console.print(table)
 
 
-def _judged_part(found: dict[str, Any]) -> str:
-    """Return what stands beside the verdict where it does not rest on all trials, or a check failed."""
-    said = [row["level"] for row in found["attention"] if row["about"] == ABOUT]
-    return " (in what could be judged)" if found["verdict"] == "nothing wrong" and said != ["note"] else ""
-
-
 def _print_failures(failures: dict[str, str], console: Console) -> None:
     for what, cause in failures.items():
         console.print(f"look: [bold]not solved, {escape(what)}[/]: {escape(cause)}", soft_wrap=True)
@@ -163,7 +157,7 @@ def print_robot_diagnosis(found: dict[str, Any], console: Console) -> None:
     console.print(f"verdict: {found['diagnosis']['verdict']}")
     for one in found["diagnosis"]["findings"]:
         size = f"{format_number(one['value'], 4)} ± {format_number(1.96 * one['sd'], 4)} {one['unit']}".rstrip()
-        others = f"; not told from {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
+        others = f"; it could also be {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
         text = f"{one['cause'].replace('_', ' ')}, {one['where']}: {size}, {one['evidence_nats']:.0f} nats{others}"
         _line(console, text)
 
@@ -213,9 +207,10 @@ def _print_accepted(found: dict[str, Any], console: Console) -> None:
 
 
 def print_diagnosis(found: dict[str, Any], console: Console) -> None:
-    """Print of `biodance diagnose`: the headline, the verdict, what was named with size and interval, what was left."""
+    """Print of `biodance diagnose`: the headline, what was found with size and interval, what was judged, what is
+    left.
+    """
     print_attention(found["attention"], console)
-    console.print(f"verdict: [bold]{found['verdict']}[/]{_judged_part(found)}")
     _print_failures(found["failures"], console)
     beside = " beside the others" if len(found["findings"]) > 1 else ""
     for finding in found["findings"]:
@@ -234,11 +229,24 @@ def print_diagnosis(found: dict[str, Any], console: Console) -> None:
         low, high = worst["band_hz"]
         where = f"{worst['channel']}, {low:g} to {high:g} Hz, trial {worst['trial']}"
         console.print(f"left unexplained: {escape(where)} ({worst['z']:.0f} times what sessions without fault vary)")
+    _print_judged(found["judged"], console)
     _print_witnesses(found, console)
     for note in found["notes"]:
         _line(console, f"note: {note}")
     if "accepted" in found:
         _print_accepted(found["accepted"], console)
+
+
+def _print_judged(rows: Sequence[dict[str, Any]], console: Console) -> None:
+    """Print what was judged, and of what was not why: one line for all trials of one reason."""
+    seconds = ", ".join(f"{row['trial']} {format_number(row['seconds'])} s" for row in rows if row["seconds"])
+    _line(console, f"judged: {seconds or 'nothing'}")
+    why: dict[str, list[str]] = {}
+    for row in rows:
+        if row["why_not"]:
+            why.setdefault(without_path(row["why_not"], row["trial"]), []).append(row["trial"])
+    for reason, trials in why.items():
+        _line(console, f"  {', '.join(trials)}: {reason}")
 
 
 def _print_witnesses(found: dict[str, Any], console: Console) -> None:
@@ -247,7 +255,7 @@ def _print_witnesses(found: dict[str, Any], console: Console) -> None:
         return
     seen, blind = (sum(bool(row["witnesses"]) is looked for row in found["witness_table"]) for looked in (True, False))
     text = f"witnesses (feet, clocks, empty plates) could see {seen} causes and are blind to {blind}: how small, and "
-    _line(console, f"{text}what is not told from what, stands in the page and in results.json")
+    _line(console, f"{text}what looks like what, stands in the page and in results.json")
 
 
 def print_findings(findings: Sequence[MachineFinding], console: Console) -> None:

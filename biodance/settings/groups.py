@@ -185,24 +185,29 @@ class StandingRules(Group):
 class CheckLimits(Group):
     """The limits of the quality table; what is outside needs a person, nothing is left out for it.
 
-    The RMS marker distance follows OpenSim's user guide, the force Hicks et al. 2015 (doi:10.1115/1.4029304); the
-    largest distance is a hand's breadth, the mass shoes, clothes and a meal; the others are the project's own.
+    The RMS marker distance follows OpenSim's user guide; the mass is shoes, clothes and a meal. Forces, the largest
+    marker distance and those of trunk and head are what clean real sessions leave, with a margin: 79 trials of 12
+    public laboratories (docs/decisions/2026-11-26-limits-of-clean-sessions.md). Hicks et al. 2015
+    (doi:10.1115/1.4029304) ask 5 % of the forces of a walk, of models with residual actuators at the pelvis.
     """
 
     name = "checks"
     mass: float = number_field(2.0, 0.1, 50.0, "%", "mass on the plates against the declared mass")
     marker_rms: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers to the model, RMS")
-    marker_largest: float = number_field(0.080, 0.002, 1.0, "m", "distance of the markers to the model, largest")
+    marker_largest: float = number_field(0.110, 0.002, 1.0, "m", "distance of the markers to the model, largest")
     marker_legs: float = number_field(0.015, 0.001, 0.2, "m", "distance of the markers of legs and pelvis, RMS")
-    marker_trunk: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers of the trunk, RMS")
+    marker_trunk: float = number_field(0.040, 0.001, 0.2, "m", "distance of the markers of the trunk, RMS")
     marker_arms: float = number_field(0.020, 0.001, 0.2, "m", "distance of the markers of the arms, RMS")
-    marker_head: float = number_field(0.025, 0.001, 0.2, "m", "distance of the markers of the head, RMS")
+    marker_head: float = number_field(0.030, 0.001, 0.2, "m", "distance of the markers of the head, RMS")
     gaps: float = number_field(5.0, 0.0, 100.0, "%", "marker samples not seen")
     open: float = number_field(1.0, 0.0, 100.0, "%", "frames in which the markers seen do not fix the posture")
     seconds: float = number_field(
         0.5, 0.0, 60.0, "s", "least time of a trial in which the plates measure all ground contact"
     )
-    force: float = number_field(5.0, 0.1, 100.0, "%", "RMS difference of measured and simulated force, of body weight")
+    force: float = number_field(8.0, 0.1, 100.0, "%", "RMS difference of measured and simulated force, of body weight")
+    force_moving: float = number_field(
+        40.0, 0.0, 100.0, "%", "or this share of the RMS by which the measured force moves about the weight, if more"
+    )
     standing: float = number_field(
         0.050, 0.001, 0.5, "m", "mean centre of mass against mean centre of pressure, standing"
     )

@@ -98,8 +98,11 @@ def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, 
 
 MARKER_DIAMETER = 0.014
 """m, where the file does not say: the usual marker of plug-in gait."""
-ASIS_TOLERANCE, LEG_TOLERANCE = 0.020, 0.040
-"""m: larger differences between a typed measure and the markers are warned about."""
+ASIS_BETWEEN, LEG_BETWEEN = (-0.024, 0.054), (-0.040, 0.040)
+"""m: how much farther apart markers are than a typed measure without a warning. The distance of the spines is typed of
+bone and marked on skin, which lies outside of it: 15 mm (sd 13) in 15 persons of 6 public laboratories, here with three
+standard deviations; of legs 0 mm (sd 15) in 16.
+"""
 LETTER = {"right": "R", "left": "L"}
 
 
@@ -171,14 +174,14 @@ def marker_leg(place: Mapping[str, Array], side: str) -> float:
 
 def _contradictions(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> list[str]:
     """Return a warning for every typed measure that the markers contradict."""
-    checks = [("InterAsisDistance", given.get("interasisdistance"), width, ASIS_TOLERANCE)]
+    checks = [("InterAsisDistance", given.get("interasisdistance"), width, ASIS_BETWEEN)]
     for side, letter in LETTER.items():
         checks.append(
-            (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), marker_leg(place, side), LEG_TOLERANCE)
+            (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), marker_leg(place, side), LEG_BETWEEN)
         )
     return [
         f"Warning: {name} was typed as {1e3 * typed:.0f} mm, the markers are {1e3 * seen:.0f} mm apart: check "
         f"both, measure again."
-        for name, typed, seen, tolerance in checks
-        if typed is not None and abs(typed - seen) > tolerance
+        for name, typed, seen, (low, high) in checks
+        if typed is not None and not low <= seen - typed <= high
     ]

@@ -28,8 +28,10 @@ from biodance.spatial import elementary_rotation, zxy_angles
 
 _ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
-TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 40.0}
-"""deg: larger constant tilts of a joint point to a misplaced marker."""
+TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 45.0}
+"""deg: larger constant tilts of a joint point to a misplaced marker. Of 60 ankles of 15 public laboratories without a
+fault there the largest stands 40 degrees away, of 60 elbows 24.
+"""
 LENGTH_RATIO = {
     "thigh": (0.19, 0.29),
     "shank": (0.19, 0.29),

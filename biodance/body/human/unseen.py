@@ -63,7 +63,7 @@ def with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> S
     unseen += [joint for side in hidden for joint in ARM_JOINTS[side]]
     if hidden:
         notes.append(
-            f"Warning: the {' and '.join(hidden)} arm{'s carry' if len(hidden) > 1 else ' carries'} no markers that "
+            f"The {' and '.join(hidden)} arm{'s carry' if len(hidden) > 1 else ' carries'} no markers that "
             "place elbow and wrist: taken as hanging straight and carried by the trunk as one piece, at the mass of "
             "the table. How arms swing is not in the simulated wrench."
         )
@@ -115,7 +115,7 @@ def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[s
     if len(thorax) >= 3:
         return [], [f"The acromia have no markers: shoulders placed by proportion from {', '.join(thorax)}."]
     return ["trunk"], [
-        "Warning: the trunk carries too few markers to be followed: trunk, head and arms are one piece of the table's "
+        "The trunk carries too few markers to be followed: trunk, head and arms are one piece of the table's "
         "size and mass that stays upright over the pelvis and faces where it goes. How they really lean and turn is "
         "not in the simulated wrench, so horizontal forces and moments prove little."
     ]

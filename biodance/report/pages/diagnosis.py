@@ -150,11 +150,6 @@ _CERTAIN = 14.0
 """Natural logarithm of a million: above it odds are no longer printed."""
 
 
-def answer(one: Diagnosis) -> str:
-    """Return the verdict as one or two plain sentences, with what it rests on."""
-    return next((said.text for said in one.attention if said.about == ABOUT), f"{one.told[:1].upper()}{one.told[1:]}.")
-
-
 def _short_answer(one: Diagnosis) -> str:
     """Return what the section begins with below the verdict, which stands at the top of the page."""
     if one.findings:
@@ -224,12 +219,11 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         sheet=Markup(print_sheet(f"Session {result.session.folder.name}", provenance.visit, made)),
         named=named,
         words_of=words_of,
-        verdict=": ".join([one.told.partition(":")[0], *filter(None, [_causes(one)])]),
         unseen=[(row, size) for row, size in unseen if size != NEVER],
         never=causes_by_effect((row.effect, row.target) for row, size in unseen if size == NEVER),
         result=result,
         one=one,
-        answer=answer(one),
+        headline=next((said for said in one.attention if said.about == ABOUT), None),
         others=[(trial_and_subject(said), said.text) for said in told_together(one.attention) if said.about != ABOUT],
         failures={**result.failures, **found.failures},
         provenance=provenance,
@@ -241,10 +235,6 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         gain=found.gain,
         witnesses=witnesses,
     )
-
-
-def _causes(one: Diagnosis) -> str:
-    return "; ".join(named(finding.effect, finding.target) for finding in one.findings)
 
 
 def _witnesses(evidence: WitnessEvidence | None) -> dict[str, Any] | None:

@@ -1,0 +1,135 @@
+"""What a session ends with, as a colleague says it: one sentence of at most `WORDS` words, and one thing to do."""
+
+from collections.abc import Iterator, Sequence
+
+from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
+from biodance.diagnosis.reasons import DiagnosisStatus, Reason
+from biodance.display import digits
+from biodance.pipeline.cause_words import alternatives, spoken
+from biodance.records.attention import LEVELS, Attention, Judged, Level
+
+WORDS = 30
+"""Words of a headline at most."""
+_UNTOLD = "Nobody can tell whether anything is wrong"
+_SQUATS = "Record a few squats with both feet on the plates."
+_REFERENCE = "Compare with another session of this person (--reference)."
+_MEND = "Mend what stands below, and run this again."
+_WHY: dict[Reason, tuple[str, str]] = {
+    Reason.MOVEMENT_NOT_JUDGED: ("none of the movement could be judged", _SQUATS),
+    Reason.BODY_DOUBTFUL: ("what is known of the body contradicts itself", _MEND),
+    Reason.NOT_COMPARED: ("no movement could be compared with a body", _MEND),
+    Reason.ONLY_STANDING: ("standing still tells little", _SQUATS),
+    Reason.UNDESCRIBED_JOINTS: ("what is usual of some joints of this body is not known yet", _REFERENCE),
+    Reason.UNSEEN_JOINTS: ("no marker shows how some joints move", "Put markers there, or compare two sessions."),
+    Reason.TOLERANCES_DO_NOT_HOLD: ("the markers move unusually much on the body", "Check how they are fixed."),
+    Reason.EXCLUDED_BY_WITNESSES: ("feet and clocks contradict the movement", _REFERENCE),
+    Reason.UNUSUAL_BODY: ("the forces fit only an unusual body, or a load or mass that nobody noted", _REFERENCE),
+    Reason.OUTSIDE_TOLERANCES: ("something that is small elsewhere is large here", _REFERENCE),
+    Reason.SEVERAL_CROSSTALKS: ("several channels would have to disturb each other", "Measure the plates' corners."),
+    Reason.WITHOUT_RESEMBLED: ("what is left of the forces is too little to say", _REFERENCE),
+}
+"""Why nobody can tell, and what to do about it; the first that holds is told."""
+
+
+def headline(
+    one: Diagnosis, judged: Sequence[Judged], static: frozenset[str], others: Sequence[Attention] = ()
+) -> Attention:
+    """Return what a session ends with in one sentence and one thing to do; ``static`` are its static trials,
+    ``others`` what else a person must see of it: no sentence is weaker than they are.
+    """
+    missed = [row.trial for row in judged if row.missed and not row.seconds > 0]
+    own: Level = "fail"
+    if one.status is DiagnosisStatus.NAMED:
+        sentences = _named(one)
+    elif one.status is DiagnosisStatus.UNKNOWN:
+        sentences = _unknown(one)
+    elif one.status is DiagnosisStatus.CANNOT_TELL:
+        own, sentences = "warn", _cannot_tell(one)
+    else:
+        own = "warn" if missed else "note"
+        well = all(other.level == "note" for other in others)
+        sentences = _clean(amount(judged, static), missed, well=well)
+    text = next(text for text in sentences if len(text.split()) <= WORDS)
+    return Attention(min((own, *(other.level for other in others)), key=LEVELS.index), text, about=ABOUT)
+
+
+def amount(judged: Sequence[Judged], static: frozenset[str]) -> str:
+    """Return what was judged in words: ``3 s of standing and 12 s of movement``, or of steps where the witnesses alone
+    judged them; "" for nothing.
+    """
+    totals: dict[str, float] = {}
+    for row in judged:
+        what = "standing" if row.trial in static else "steps" if row.missed else "movement"
+        totals[what] = totals.get(what, 0.0) + row.seconds
+    parts = [f"{digits(s, 2)} s of {what}" for what, s in totals.items() if s > 0]
+    return " and ".join(filter(None, (", ".join(parts[:-1]), *parts[-1:])))
+
+
+def _clean(seen: str, missed: Sequence[str], *, well: bool) -> Iterator[str]:
+    """Yield that nothing is wrong in what was ``seen``, and what was ``missed`` or needs somebody all the same."""
+    found = f"Nothing wrong was found in {seen}"
+    again = f'Record {"it" if len(missed) == 1 else "them"} again, or set role = "skip".'
+    if missed:
+        if len(missed) == 1:
+            yield f"{found}, but {missed[0]} could not be judged. {again}"
+        yield f"{found}, but {len(missed)} of the files could not be judged. {again}"
+    elif not well:
+        yield f"{found}, but something else needs you. {_MEND}"
+    else:
+        yield f"{found}."
+
+
+def _named(one: Diagnosis) -> Iterator[str]:
+    """Yield the first cause with its size, its alternatives and what to do, ever shorter."""
+    first = one.findings[0]
+    together = _together(first, one.findings[1:])
+    told, more = spoken(first, together), len(one.findings) - len(together)
+    start = "" if more == 1 else f"{more} things are wrong. First, "
+    also = alternatives(first)
+    rest = ", and more is wrong" if not {Reason.FORCES_LEFT, Reason.UNUSUAL_BODY}.isdisjoint(one.why) else ""
+    several = (_either(also), f"{also[0]} or something else", "something else") if also else ()
+    sets = [f", or it is {some}" for some in several] or [""]
+    for fact in (told.fact, told.plain):
+        for alike in sets:
+            yield _sentence(f"{start}{fact}{alike}{rest}. {told.do}")
+    yield _sentence(f"{start}{told.plain}{sets[-1]}. {told.do}")
+    yield _sentence(f"{len(one.findings)} things are wrong, the first: {first.effect.replace('_', ' ')}. {_MEND}")
+
+
+def _together(first: Finding, rest: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return the findings that are told in one breath with the first: labels that are exchanged as well."""
+    return tuple(one for one in rest if one.effect == first.effect == "labels_swapped")
+
+
+def _either(names: Sequence[str]) -> str:
+    return " or ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+def _unknown(one: Diagnosis) -> Iterator[str]:
+    """Yield where what nobody can name is largest."""
+    row = next((row for row in one.adequacy if row.matters and row.z > LIMIT), None)
+    start = "Something is wrong that no known cause explains"
+    for about in one.why.get(Reason.LIMIT_BROKEN, ()):
+        yield f"{start}: {about}. Look there."
+    if row is not None:
+        off = f"{row.channel} is {row.size:.2g} {row.unit} off"
+        yield f"{start}: {off}, most in {row.trial} at {row.second:.1f} s. Look there."
+        yield f"{start}: {off}. Look at the trials below."
+    yield f"{start}. Look at the trials below."
+
+
+def _cannot_tell(one: Diagnosis) -> Iterator[str]:
+    """Yield the first reason for which nobody can tell, and what to do about it."""
+    reason = next((reason for reason in _WHY if reason in one.why), Reason.NOT_COMPARED)
+    why, do = _WHY[reason]
+    about = one.why.get(reason, ())
+    if reason is Reason.BODY_DOUBTFUL and len(about) == 1:
+        yield f"{_UNTOLD}: {about[0]}. Mend it, and run this again."
+    if reason is Reason.UNDESCRIBED_JOINTS:
+        yield f"{_UNTOLD}: what is usual of {_either(about)} is not known yet. {do}"
+    yield f"{_UNTOLD}: {why}. {do}"
