@@ -87,17 +87,17 @@ class WitnessEvidence:
         away = np.array([abs(one.value - one.expected) if one.unit == "m" else 0.0 for one in self.observations])
         return away <= _REACH
 
-    def contacts(self, cause: tuple[str, str]) -> int:
-        """Return how many contacts of the person with the plates tell a cause: in how many its usual fault is larger
-        than what one observation errs by. Plates that nobody touches need none: 2 then.
+    def contacts(self, cause: tuple[str, str] | None = None) -> int:
+        """Return how many contacts of the person with the plates there are, or tell a cause: in how many its usual
+        fault is larger than what one observation errs by. Plates that nobody touches need none: 2 then.
         """
-        size = self.causes[cause].step * _FAULT
-        told = [
-            one
-            for one, trace, near in zip(self.observations, self.traces[cause], self.in_reach, strict=True)
-            if near and abs(size * trace) >= one.sd
-        ]
-        return 2 if any(one.witness in _UNTOUCHED for one in told) else len({one.contact for one in told})
+        told = np.ones(len(self.observations), dtype=bool)
+        if cause is not None:
+            own = np.array([one.sd for one in self.observations])
+            told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= own)
+        seen = [one for one, here in zip(self.observations, told, strict=True) if here]
+        touched = {one.contact for one in seen if one.witness not in _UNTOUCHED}
+        return 2 if cause and any(one.witness in _UNTOUCHED for one in seen) else len(touched)
 
     def strongest(self, index: int) -> tuple[str, str]:
         """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""

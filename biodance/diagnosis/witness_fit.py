@@ -115,11 +115,8 @@ def typical_size(effect: str, target: str) -> float:
 
 
 def is_told(evidence: WitnessEvidence, names: tuple[str, str], found: LaplaceFit) -> bool:
-    """Return whether the last cause of a fit is told by two contacts or more (one may be a misstep), significant, and
-    larger than laboratories have it without a fault.
-    """
-    size, sd = float(found.theta[-1]), float(found.covariance[-1, -1] ** 0.5)
-    return evidence.contacts(names) > 1 and is_beyond_usual(evidence, names, size, sd)
+    """Return whether the last cause of a fit is significant, and larger than laboratories have it without a fault."""
+    return is_beyond_usual(evidence, names, float(found.theta[-1]), float(found.covariance[-1, -1] ** 0.5))
 
 
 def is_beyond_usual(evidence: WitnessEvidence, names: tuple[str, str], size: float, sd: float) -> bool:

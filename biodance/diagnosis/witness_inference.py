@@ -36,6 +36,10 @@ _RARE = 3.0
 _RARER = {"plate_crosstalk": 1.0}
 """Natural logarithms: so much rarer than other faults are a channel of the wrong sign, and cross-talk that looks like a
 plate beside its place."""
+_MISSTEP = 3.0
+"""Natural logarithm of twenty: one contact in twenty is odd, so that a cause that one contact alone tells needs as much
+more; a session of a single contact tells none.
+"""
 _BROAD = 10.0
 """Typical sizes: that large ones are rare counts for a name; the size itself is told as the witnesses show it."""
 _AGAIN = 2
@@ -120,7 +124,8 @@ def _ranked(
             continue
         one = explain(evidence, value, (*named, names))
         bayes = one.log_evidence - before.log_evidence
-        score = bayes - float(np.log(max(1, count[names[0]]))) - _RARER.get(names[0], 0.0)
+        odd = _MISSTEP if evidence.contacts(names) == 1 else 0.0
+        score = bayes - float(np.log(max(1, count[names[0]]))) - _RARER.get(names[0], 0.0) - odd
         found.append(Hypothesis(names, bayes, score, one))
     for names, turned in evidence.turned.items() if signs else ():
         known = np.isfinite(turned)
@@ -145,12 +150,12 @@ def _fit_sizes(evidence: WitnessEvidence, value: Array, names: tuple[tuple[str, 
 
 
 def _is_told(evidence: WitnessEvidence, one: Hypothesis) -> bool:
-    """Return whether the last cause of a fit is told (`is_told`); the sign of a channel has no size, and every step
-    shows it.
+    """Return whether the last cause of a fit is told (`is_told`) by more than the only contact of a session; the sign
+    of a channel has no size.
     """
-    if one.names not in evidence.causes:
-        return len({step.contact for step in evidence.observations if step.plate}) > 1
-    return is_told(evidence, one.names, one.found)
+    signed = one.names not in evidence.causes
+    enough = evidence.contacts() > 1 or (not signed and evidence.contacts(one.names) > 1)
+    return enough and (signed or is_told(evidence, one.names, one.found))
 
 
 def _findings(

@@ -196,21 +196,25 @@ def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], 
         if len(on) != 1:
             continue
         others = [foot for foot in feet if foot not in on]
-        mixed = any(_treads(plate, foot, np.linspace(first, last, 30), belt) for foot in others)
+        mixed = plate.placed and any(_treads(plate, foot, np.linspace(first, last, 30), belt) for foot in others)
         if mixed and any(_treads(plate, foot, time, belt) for foot in others):
             continue
         near = _neighbours(plate, plates) if mixed or over[on[0].side] < 0 else []
         beside = tuple(one.name for one in near) if mixed or _carry(near, time) else ()
         if mixed and not beside:
             continue
-        overhang = 0.0 if beside else max(0.0, -over[on[0].side])
+        overhang = 0.0 if beside or not plate.placed else max(0.0, -over[on[0].side])
         heel_first = _heel_first(on[0], first)
         found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, heel_first, beside, mixed))
     return found
 
 
 def _neighbours(plate: Plate, plates: tuple[Plate, ...]) -> list[Plate]:
-    """Return the plates of the same height whose edges come so near to those of one that a foot stands on both."""
+    """Return the plates of the same height whose edges come so near to those of one that a foot stands on both; none
+    where the file says only where the pressure was, not where the plate lies.
+    """
+    if not plate.placed:
+        return []
     share = np.linspace(0.0, 1.0, 20)[:, None]
     sides = zip(plate.corners, np.roll(plate.corners, -1, axis=0), strict=True)
     edge = np.concatenate([a + share * (b - a) for a, b in sides])[None, :, :2]

@@ -47,6 +47,12 @@ class StepCourse:
         return float(here[known].mean()) if here.size and known.mean() >= _SEEN else float("nan")
 
 
+def is_recorded(seen: SeenTrial, step: FootStep) -> bool:
+    """Return whether a foot comes and goes within the recording, so that the shares of its stance are known."""
+    part = seen.stance(step)
+    return part is not None and 0 < part.start and part.stop < seen.plate(step.plate).wrench.time.size
+
+
 def walks(seen: SeenTrial, step: FootStep) -> bool:
     """Return whether a foot is down for as long as in walking."""
     part, time = seen.stance(step), seen.plate(step.plate).wrench.time
@@ -81,7 +87,7 @@ def step_course(seen: SeenTrial, step: FootStep, *, running: bool = False) -> St
     step, or it runs (with ``running``: walks). Of the last steps it is kept: several witnesses ask for it.
     """
     part = seen.stance(step)
-    if part is None or walks(seen, step) is running or not steps(seen, step):
+    if part is None or not is_recorded(seen, step) or walks(seen, step) is running or not steps(seen, step):
         return None
     wrench = seen.under(step)
     time, force, cop = wrench.time[part], wrench.force[part], seen.pressure(step, part)

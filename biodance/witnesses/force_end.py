@@ -1,14 +1,14 @@
 """When the force goes: its end against the instant in which the toe is pulled forwards.
 
-Coarser than the heel strike, but every step has it: stairs, runs and toes first, too. A foot that is only lifted has
-no such instant: its largest acceleration is anywhere.
+Coarser than the heel strike, but every walking step has it: stairs and toes first, too. A foot that is only lifted, or
+that runs, has no such instant: its largest acceleration is anywhere (40 ms apart from step to step in ten runners).
 """
 
 import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import by_step, steps
+from biodance.witnesses._stance import by_step, steps, walks
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves; what half as much more on either side shows larger
@@ -24,7 +24,7 @@ class ForceEnd(Witness):
 
     name = "force_end"
     sees = ("time_delay",)
-    needs = "Steps that leave an empty plate and swing off; markers at 100 Hz or more."
+    needs = "Walking steps that leave an empty plate and swing off; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
@@ -34,7 +34,7 @@ class ForceEnd(Witness):
     @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, time = seen.stance(step), seen.plate(step.plate).wrench.time
-        if part is None or part.stop >= time.size or not steps(seen, step):
+        if part is None or part.stop >= time.size or not (walks(seen, step) and steps(seen, step)):
             return []
         end, foot = float(time[part.stop - 1]), seen.foot(step.side)
         value, norms = end - toe_pulled(foot, step.middle, end), {"person toe off": _PERSON}

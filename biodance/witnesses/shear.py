@@ -1,7 +1,8 @@
 """Which way the shear points: a step brakes first and pushes then, and it turns with the plate.
 
 The direction of walking is that of the pelvis over the ground or belt under the standing foot, at each instant: in a
-turn the shear turns with it, and what pushes inwards there bends the way.
+turn the shear turns with it. What the pelvis is accelerated by over the step is taken off: it bends the way, and who
+slows down brakes more.
 """
 
 import numpy as np
@@ -11,12 +12,12 @@ from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import StepCourse, by_step, step_course
 
 _PARTS = {
-    "braking": (0.08, 0.35, 0, -0.145, 0.015, 0.030),
-    "pushing": (0.65, 0.92, 0, 0.150, 0.015, 0.035),
+    "braking": (0.08, 0.35, 0, -0.177, 0.022, 0.030),
+    "pushing": (0.65, 0.92, 0, 0.136, 0.022, 0.030),
     "inwards": (0.20, 0.80, 1, 0.010, 0.012, 0.012),
 }
-"""Start and stop as shares of stance, direction (0 ahead, 1 inwards, beyond what bends the way), expected share of the
-mean vertical force, sd of one step and of one person."""
+"""Start and stop as shares of stance, direction (0 ahead, 1 inwards), expected share of the mean vertical force beyond
+the pelvis' acceleration, sd of one step and of one person."""
 _SLANT = (0.025, 0.055, 0.025)
 """rad: expected direction in which shear goes from braking to pushing, its sd of one step and of one person's foot."""
 _GOES = 0.2
@@ -33,7 +34,7 @@ class Shear(Witness):
     name = "shear"
     sees = ("plate_rotation", "axis_error")
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
-    source = "45 steps of 10 persons of 5 public laboratories; Winter 2009, chapter 5"
+    source = "65 steps of 20 persons of 12 public laboratories; Winter 2009, chapter 5"
 
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return four observations of each step that begins with the heel."""
@@ -52,12 +53,11 @@ class Shear(Witness):
         ahead = velocity / np.linalg.norm(velocity, axis=1)[:, None]
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
         inwards, weight = (1 if step.side == "left" else -1), float(part.force[:, 2].mean())
-        bends = float(bending @ left[len(left) // 2]) / seen.trial.settings.gravity * inwards
         along = np.stack([np.sum(part.force[:, :2] * one, axis=1) for one in (ahead, left)])
+        gained = np.array([bending @ one[len(one) // 2] for one in (ahead, left)]) / seen.trial.settings.gravity
         found = []
         for what, (start, stop, axis, expected, sd, person) in _PARTS.items():
-            value = part.mean(along[axis], start, stop) / weight
-            value = value * inwards - bends if axis else value
+            value = (part.mean(along[axis], start, stop) / weight - gained[axis]) * (inwards if axis else 1)
             found.append(self._observation(seen, step, what, value, sd, expected, "1", {f"person {what}": person}))
         slant, (expected, sd, person) = float(np.arctan(_slope(along[1], along[0], part.force[:, 2]))), _SLANT
         norms = {f"person {step.side} slant": person}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import steps, walks
+from biodance.witnesses._stance import is_recorded, steps, walks
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
@@ -72,7 +72,7 @@ class StrideForce(Witness):
 
     def _alone(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
-        if part is None or not walks(seen, step):
+        if part is None or not is_recorded(seen, step) or not walks(seen, step):
             return []
         wrench, count = seen.under(step), part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
