@@ -134,7 +134,7 @@ def score(scenario: Scenario, found: Diagnosis, seconds: float, *, group: str, h
     worst = found.adequacy[0] if found.adequacy else None
     return Score(
         scenario.key, group, scenario.level, scenario.subject, scenario.hidden,
-        "cannot tell" if found.doubt else found.verdict, names, sets, exact, within, ratio, told,
+        "cannot tell" if found.status == "cannot tell" else found.verdict, names, sets, exact, within, ratio, told,
         error, covered, (f"{worst.channel} {worst.band_hz[0]:g}-{worst.band_hz[1]:g} Hz", worst.z) if worst else ("",
         0.0), seconds,
         gain=harm | _gain(found.findings),

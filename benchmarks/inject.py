@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d.layout import Layout, read_layout
-from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header, read_parameters
-from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.c3d.layout import Layout
+from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header
+from biodance.lab.c3d.raw import RawC3d, open_c3d, read_raw
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import PlateRecording
 from biodance.lab.plates.corners import plate_axes
@@ -65,8 +65,8 @@ def inject(path_in: Path, path_out: Path, fault: Fault) -> Path:
         raise BiodanceError(f"{path_out}: the file exists already and is not overwritten. Choose another name.")
     content = bytearray(path_in.read_bytes())
     raw = read_raw(path_in)
+    _, _, layout, _ = open_c3d(path_in)
     header = read_header(bytes(content), str(path_in))
-    layout = read_layout(len(content), header, read_parameters(bytes(content), header, str(path_in)), str(path_in))
     metres, turn = file_frame(raw)
     names = _names(raw)
     seen = Markers(names, np.arange(len(raw.points)) / raw.rate, metres * raw.points)

@@ -9,6 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.reasons import Reason
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.provenance import provenance
@@ -149,15 +150,16 @@ def refused_session() -> SessionResult:
 
 
 LEFT = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
+UNLIKE = {Reason.FORCES_LEFT: ()}
 FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
 WHOLE = Diagnosis("nothing wrong", ())
 VERDICTS = (
     WHOLE,
     replace(WHOLE, verdict="named, complete", findings=(FOUND,)),
-    replace(WHOLE, verdict="named, incomplete", findings=(FOUND,), adequacy=LEFT),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, resembles=(FOUND,)),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, doubt="standing alone tells no cause"),
+    replace(WHOLE, verdict="named, incomplete", findings=(FOUND,), adequacy=LEFT, why=UNLIKE),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, why=UNLIKE),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, resembles=(FOUND,), why=UNLIKE),
+    replace(WHOLE, verdict="unexplained", adequacy=LEFT, why={Reason.ONLY_STANDING: (), **UNLIKE}),
     replace(WHOLE, verdict="unexplained"),
 )
 """Every verdict, with what may stand beside it."""

@@ -8,9 +8,10 @@ from human_cases import with_tilted
 
 from biodance.body.body import Body
 from biodance.diagnosis.diagnosis import Verdict
-from biodance.diagnosis.engine import STANDING_ALONE, Examined, diagnose_trials
+from biodance.diagnosis.engine import Examined, diagnose_trials
+from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.another_body import beside_another_body, without_unplaced_markers
-from biodance.pipeline.diagnosis import _FAR, _measured
+from biodance.pipeline.diagnosis import _measured
 
 
 def gained(local, session):
@@ -46,17 +47,25 @@ def test_a_name_beside_what_is_left_of_another_body_is_only_resembled(
 ) -> None:
     before = replace(examined, diagnosis=replace(examined.diagnosis, verdict=verdict))
     one = beside_another_body(before, body() if arms else without_arms(), joints).diagnosis
-    assert bool(one.doubt) is doubted
+    assert one.doubted is doubted
     assert ([f.effect for f in one.findings], [f.effect for f in one.resembles]) == (
         ([], ["plate_gain"]) if doubted else (["plate_gain"], [])
     )
 
 
-@pytest.mark.parametrize(("doubt", "heard"), [("", True), ("a neck", True), (STANDING_ALONE, False), (_FAR, False)])
+@pytest.mark.parametrize(
+    ("reasons", "heard"),
+    [
+        ((), True),
+        ((Reason.UNDESCRIBED_JOINTS,), True),
+        ((Reason.ONLY_STANDING,), False),
+        ((Reason.TOLERANCES_DO_NOT_HOLD,), False),
+    ],
+)
 def test_a_movement_that_was_not_looked_through_or_believed_measures_no_weight(
-    examined: Examined, doubt: str, heard: bool
+    examined: Examined, reasons: tuple[Reason, ...], heard: bool
 ) -> None:
-    measured = _measured(examined.naming, doubt)
+    measured = _measured(examined.naming, reasons)
     assert (("plate_gain", "Fz") in measured) is heard
     assert not heard or measured["plate_gain", "Fz"].size == pytest.approx(0.06, abs=0.015)
 

@@ -193,3 +193,26 @@ def test_evidence_without_a_quantity_or_an_error_is_refused():
         PlateEvidence("gain", {"plate1": 1.0}, 0.0, 0.0, visit, "t")
     with pytest.raises(ValueError, match="not a quantity of a plate"):
         PlateEvidence("gian", {"plate1": 1.0}, 0.0, 1.0, visit, "t")
+
+
+def part_of_run(data: Path, to: Path, first: float, last: float) -> None:
+    """Copy a part of a real run on a split belt, from ``first`` to ``last`` s, as a session of its own."""
+    source = data / "opensim_models/raj_run"
+    to.mkdir(parents=True)
+    (to / "static.trc").write_text((source / "static.trc").read_text())
+    for name, head, column in (("run.trc", 5, 1), ("run.mot", 6, 0)):
+        rows = (source / name).read_text().splitlines()
+        kept = [
+            row for row in rows[head:] if row.count("\t") > column and first <= float(row.split("\t")[column]) <= last
+        ]
+        (to / name).write_text("\n".join([*rows[:head], *kept]) + "\n")
+
+
+def test_a_split_belt_is_two_plates_in_every_visit(data, tmp_path):
+    """Rectangles round the pressures of a run differ from second to second; the columns of its table do not."""
+    for k in range(3):
+        part_of_run(data, tmp_path / f"visit_{k}", 0.3 + 1.5 * k, 2.0 + 1.5 * k)
+    judged = judge_plates(tmp_path)
+    assert {card.plate for card in judged.judgement.plates} == {"R_ground_force", "L_ground_force"}
+    assert {one.visit.name for one in judged.observations} == {"visit_0", "visit_1", "visit_2"}
+    assert not any(one.quantity.startswith("place") for one in judged.observations)

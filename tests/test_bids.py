@@ -79,3 +79,13 @@ def test_nothing_is_overwritten_and_without_markers_there_is_nothing(dataset, tm
     bare = replace(session, trials=tuple(replace(trial, markers=None) for trial in session.trials))
     with pytest.raises(TrialRefused, match="no trial has markers"):
         write_bids_folder(bare, (), BODY, tmp_path / "none")
+
+
+def test_a_guess_is_not_told_to_others(dataset, tmp_path):
+    session, _ = dataset
+    write_bids_folder(
+        replace(session, subject=replace(session.subject, guessed=("sex", "stature"))), (), BODY, tmp_path / "b"
+    )
+    people = pd.read_csv(tmp_path / "b/participants.tsv", sep="\t", keep_default_na=False)
+    assert (people["sex"][0], people["height_m"][0]) == ("n/a", "n/a")
+    assert float(people["mass_kg"][0]) == session.subject.mass

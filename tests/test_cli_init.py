@@ -23,11 +23,36 @@ def test_init_writes_its_guesses_once(tmp_path: Path, capsys: pytest.CaptureFixt
     assert {trial["name"]: trial["role"] for trial in found["trials"]} == before
     after = read_session(folder)
     assert {trial.name: trial.role for trial in after.trials} == before
-    assert after.subject.mass == pytest.approx(found["subject"]["mass_kg"])
+    assert after.subject.mass == pytest.approx(found["subject"]["mass_kg"], rel=1e-3)
     text = (folder / "session.toml").read_text()
     with pytest.raises(SessionRefused, match="nothing of yours is overwritten"):
         init_session(folder)
     assert (folder / "session.toml").read_text() == text
+
+
+def test_what_init_guessed_stays_a_guess(tmp_path: Path) -> None:
+    """Nobody said mass, stature, sex or roles, so the file says nothing of them; a # less, and it does."""
+    folder = two_trials(tmp_path)
+    init_session(folder)
+    assert set(read_session(folder).subject.guessed) == {"mass", "stature", "sex"}
+    assert not any("session.toml says so" in note for note in read_session(folder).notes)
+    text = (folder / "session.toml").read_text()
+    (folder / "session.toml").write_text(text.replace("# sex = ", "sex = ").replace("# role = ", "role = "))
+    confirmed = read_session(folder)
+    assert set(confirmed.subject.guessed) == {"mass", "stature"}
+    assert sum("session.toml says so" in note for note in confirmed.notes) == 2
+
+
+def test_a_guessed_map_is_confirmed_by_taking_the_marks_away(tmp_path: Path) -> None:
+    write_trc(tmp_path / "static.trc", stand({place: f"own {place}" for place in OWN}))
+    found = init_session(tmp_path)
+    text = (tmp_path / "session.toml").read_text()
+    assert found["marker_map"]
+    assert read_session(tmp_path).trials[0].marker_set.startswith("guessed ")
+    head, map_, rest = text.partition("# [markers.map]")
+    assert map_
+    (tmp_path / "session.toml").write_text(head + "[markers.map]" + rest.replace('\n# "', '\n"'))
+    assert read_session(tmp_path).trials[0].marker_set.endswith("session.toml")
 
 
 def test_init_begins_a_map_where_none_can_be_guessed(tmp_path: Path) -> None:

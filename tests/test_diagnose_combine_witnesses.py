@@ -8,10 +8,12 @@ import pytest
 from biodance.diagnosis import witness_evidence
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY
+from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
+
+NECK = {Reason.UNDESCRIBED_JOINTS: ("neck",)}
 
 
 def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str, str]) -> Finding:
@@ -129,19 +131,19 @@ def test_two_sources_carry_a_name_together(lacking: float, named: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "witness", "note", "named"),
+    ("said", "witness", "why", "named"),
     [
-        (WEIGHT, "standing_force", UNUSUAL_BODY, False),
-        (WEIGHT, "standing_force", "", True),  # the body with that mass is as people are
-        (LATE, "force_onset", UNUSUAL_BODY, True),  # no mass that lies elsewhere makes forces late
+        (WEIGHT, "standing_force", (Reason.UNUSUAL_BODY,), False),
+        (WEIGHT, "standing_force", (), True),  # the body with that mass is as people are
+        (LATE, "force_onset", (Reason.UNUSUAL_BODY,), True),  # no mass that lies elsewhere makes forces late
     ],
 )
-def test_weighing_twice_is_one_opinion(said: Finding, witness: str, note: str, named: bool) -> None:
+def test_weighing_twice_is_one_opinion(said: Finding, witness: str, why: tuple[Reason, ...], named: bool) -> None:
     """2.4 kg on a forearm that nobody looks for weigh like a wrong declared mass, and make an arm that nobody has."""
     names, own = (said.effect, said.target), said.parameters[0]
     evidence = heard(names, witness, own.value, own.sd)
     limits = (Unobservable(*names, 0.6 * own.value, own.unit),)
-    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(said,), notes=(note,), doubt="a neck")
+    simulation = Diagnosis("unexplained", (), limits=limits, resembles=(said,), why=NECK | dict.fromkeys(why, ()))
     one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True)
     assert [f.effect for f in one.findings] == ([said.effect] if named else [])
 
@@ -169,7 +171,7 @@ def test_joints_that_nobody_knows_change_no_mean_wrench(
     said = replace(said, set=said.set[:1])
     evidence = heard(names, witness, own.value, own.sd)
     limits = (Unobservable(*names, 0.6 * own.value, own.unit),)
-    simulation = Diagnosis("unexplained", (), limits=limits, doubt="a neck")
+    simulation = Diagnosis("unexplained", (), limits=limits, why=NECK)
     measured = {names: moved} if moved else {}
     one = combine_findings(simulation, WitnessFindings((said,), evidence), evidence, judged=True, measured=measured)
     assert one.findings == ((said,) if named else ())
@@ -177,20 +179,22 @@ def test_joints_that_nobody_knows_change_no_mean_wrench(
     assert one.verdict == ("named, incomplete" if named else "unexplained")
 
 
-@pytest.mark.parametrize("note", [SEVERAL_CROSSTALKS, ""])
-def test_feet_name_no_crosstalk_of_several(note: str) -> None:
+@pytest.mark.parametrize("why", [(Reason.SEVERAL_CROSSTALKS,), ()])
+def test_feet_name_no_crosstalk_of_several(why: tuple[Reason, ...]) -> None:
     """A plate 30 mm beside its place, which nobody looks for, looks like two cross-talks at once."""
     crossed = finding("plate_crosstalk", "Fz->My", 0.033, "m", ("plate_offset", "My"))
     evidence = heard(("plate_crosstalk", "Fz->My"), "standing_place", 0.033, 0.009)
-    simulation = Diagnosis("unexplained", (), resembles=(crossed,), notes=(note,), doubt="a neck")
+    simulation = Diagnosis("unexplained", (), resembles=(crossed,), why=NECK | dict.fromkeys(why, ()))
     one = combine_findings(simulation, WitnessFindings((crossed,), evidence), evidence, judged=True)
-    assert bool(one.findings) is (note == "")
+    assert bool(one.findings) is (why == ())
 
 
 def test_standing_alone_excludes_no_size() -> None:
     """Forces are 62 ms late at every step; in the three seconds that could be compared nobody moved."""
     evidence = heard(("time_delay", ""), "force_onset", 0.062, 0.01)
-    simulation = Diagnosis("nothing wrong", (), limits=(Unobservable("time_delay", "", 0.03, "s"),), doubt="standing")
+    simulation = Diagnosis(
+        "nothing wrong", (), limits=(Unobservable("time_delay", "", 0.03, "s"),), why={Reason.ONLY_STANDING: ()}
+    )
     measured = {("time_delay", ""): SimulatedSize(0.002, 0.005, 0.0)}
     one = combine_findings(simulation, WitnessFindings((LATE,), evidence), evidence, judged=True, measured=measured)
     assert one.findings == (LATE,)

@@ -10,9 +10,10 @@ from scipy.interpolate import make_interp_spline
 from biodance.diagnosis import engine
 from biodance.diagnosis.adequacy import LIMIT, largest_z
 from biodance.diagnosis.consequence import LEAST_THAT_MATTERS
-from biodance.diagnosis.doubt import WITHOUT_RESEMBLED, may_not_matter
-from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES, diagnose_trials
+from biodance.diagnosis.doubt import may_not_matter
+from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.reasons import Reason
 from biodance.effects import effects
 from biodance.uncertainty.tolerances import shipped
 
@@ -57,7 +58,7 @@ def test_what_is_left_without_a_resembled_cause_is_what_alarms() -> None:
     assert (named.verdict, [one.effect for one in named.findings]) == ("named, complete", ["time_delay"])
     assert (like.verdict, like.findings) == ("unexplained", ())
     assert [one.effect for one in like.resembles] == ["time_delay"]
-    assert WITHOUT_RESEMBLED in like.notes
+    assert Reason.WITHOUT_RESEMBLED in like.reasons
     assert largest_z(like.adequacy) > LIMIT > largest_z(named.adequacy)
 
 
@@ -69,8 +70,8 @@ def test_a_resembled_cause_alone_leaves_nothing(monkeypatch: pytest.MonkeyPatch)
     like = delayed(0.0007, error=1.5)
     assert (like.verdict, len(like.resembles)) == ("unexplained", 1)
     assert largest_z(like.adequacy) <= LIMIT
-    assert WITHOUT_RESEMBLED in like.notes
-    assert OUTSIDE_TOLERANCES not in like.notes
+    assert Reason.WITHOUT_RESEMBLED in like.reasons
+    assert Reason.OUTSIDE_TOLERANCES not in like.reasons
 
 
 @pytest.mark.parametrize(("leak", "far"), [(0.004, False), (0.014, True)])
@@ -87,5 +88,5 @@ def test_a_tolerance_is_torn_beyond_what_a_louder_laboratory_has(leak: float, fa
     one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_offset",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert [like.effect for like in one.resembles] == ["plate_offset"]
-    assert {WITHOUT_RESEMBLED, OUTSIDE_TOLERANCES} <= set(one.notes)
-    assert (OUTSIDE_EVERY_LABORATORY in one.notes) == far
+    assert {Reason.WITHOUT_RESEMBLED, Reason.OUTSIDE_TOLERANCES} <= set(one.reasons)
+    assert (Reason.OUTSIDE_EVERY_LABORATORY in one.reasons) == far

@@ -38,7 +38,7 @@ def test_standing_alone_names_nothing_however_large() -> None:
     assert [one.effect for one in moving.diagnosis.findings] == ["plate_offset"]
     quiet = diagnose_trials(body(), standing_looks(40.0), tolerances=known(), effects=FAST).diagnosis
     assert (quiet.findings, quiet.resembles) == ((), ())
-    assert quiet.doubt
+    assert quiet.doubted
 
 
 def test_a_name_that_another_one_takes_back_is_taken_back() -> None:

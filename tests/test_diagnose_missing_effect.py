@@ -3,8 +3,8 @@
 import numpy as np
 from diagnosed_sessions import about_plate, body, gain, known, windows
 
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS
-from biodance.diagnosis.engine import OUTSIDE_TOLERANCES, diagnose_trials
+from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.reasons import Reason
 
 
 def shifted(local, session):
@@ -19,7 +19,7 @@ def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
     assert len(one.resembles) > 1
-    assert SEVERAL_CROSSTALKS in one.notes
+    assert Reason.SEVERAL_CROSSTALKS in one.reasons
 
 
 def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
@@ -27,4 +27,4 @@ def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
     some = windows(1, trials=2, hidden=gain(0.05))
     one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
-    assert OUTSIDE_TOLERANCES in one.notes
+    assert Reason.OUTSIDE_TOLERANCES in one.reasons

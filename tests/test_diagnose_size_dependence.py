@@ -16,9 +16,11 @@ from biodance.diagnosis.engine import _is_reportable, diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import build_model
 from biodance.diagnosis.problem import problem
+from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import changes_wrench, size_dependences
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effects
+from biodance.pipeline.reason_words import reason_notes
 from biodance.witnesses import Observation
 from biodance.witnesses._causes import Alteration
 
@@ -47,7 +49,7 @@ def test_a_zero_and_a_leak_of_the_load_do_not_stand_for_one_another(change, guil
     assert (wrong.diagnosis.verdict, wrong.diagnosis.findings) == ("unexplained", ())
     like = next(f for f in wrong.diagnosis.resembles if (f.effect, f.target) == innocent)
     assert like.varies_with
-    assert any("the size of this one hangs on" in note for note in wrong.diagnosis.notes)
+    assert any("the size of this one hangs on" in note for note in reason_notes(wrong.diagnosis))
     if innocent == ZERO:  # a leak is in proportion to the load: its size as a zero doubles with it
         by_load = next(one for one in size_dependences(wrong.naming.found) if (one.cause, one.over) == (ZERO, "load"))
         assert by_load.share == pytest.approx(1.0, abs=0.35)
@@ -129,7 +131,7 @@ def a_finding(value: float, varies_with: str = "") -> Finding:
 
 
 HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
-DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), doubt="its body moves otherwise")
+DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), why={Reason.TOLERANCES_DO_NOT_HOLD: ()})
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ import pytest
 from diagnosed_sessions import body, delay, known, nothing, windows
 
 from biodance.diagnosis.adequacy import CONFLICT_LIMIT, prior_data_conflict
-from biodance.diagnosis.doubt import UNUSUAL_BODY
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import Round
+from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.diagnosis.unusual_body import robust_causes, with_inflated_prior
 from biodance.effects import effects
@@ -29,7 +29,7 @@ def test_a_delay_is_named_however_strange_the_body_is_and_a_strange_body_alone_i
     strange = diagnosed(delay, unlike=4.0)
     assert prior_data_conflict(strange.naming.found) > CONFLICT_LIMIT
     assert strange.diagnosis.verdict == "named, incomplete"
-    assert UNUSUAL_BODY in strange.diagnosis.notes
+    assert Reason.UNUSUAL_BODY in strange.diagnosis.reasons
     (finding,) = strange.diagnosis.findings
     (size,) = finding.parameters
     assert finding.effect == "time_delay"

@@ -24,13 +24,12 @@ from biodance.identification.mismatch import (
 )
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import layout_for, statistics
-from biodance.motion.kinematics import chains, jacobian, poses
+from biodance.motion.kinematics import chains, jacobian, neighbours, poses
 from biodance.records import CHANNELS, Subject
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.joints import joint_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import PLATE_SOURCES, around_zero, plate_sources
-from biodance.uncertainty.response import neighbours
 from biodance.uncertainty.sources import deviations, of_markers
 
 BANDS = Bands((0.0, 1.0, 10.0), 25.0)

@@ -223,6 +223,67 @@ def damaged(numbers):
     }
 
 
+def test_a_parameter_that_nothing_needs_may_be_there_twice(tmp_path, numbers):
+    """A lab's model that ran twice leaves its output twice, once as 0.0 (a real static of a clinic)."""
+    sizes = {"PROCESSING": {"GOLEMTHORAXSIZE": real(205.186), "GOLEMTHORAXSIZF": real(0.0), "BODYMASS": real(63.9)}}
+    sizes["PROCESSING"] |= {"KNEEWIDTH": real(100.0), "KNEEWIDTI": real(101.0)}
+    points, analog = numbers
+    content = File(points, analog, parameters=sizes).bytes()
+    content = content.replace(b"GOLEMTHORAXSIZF", b"GOLEMTHORAXSIZE").replace(b"KNEEWIDTI", b"KNEEWIDTH")
+    raw = read_raw(save(tmp_path, content))
+    np.testing.assert_array_equal(raw.points, points[..., :3])
+    np.testing.assert_array_equal(raw.analog, analog)
+    assert raw.warnings == ()
+    taken, left = raw.history
+    assert taken == (
+        "Parameter PROCESSING:GOLEMTHORAXSIZE is there twice, as 205.18600463867188 and as 0.0; the one that is not "
+        "zero was taken."
+    )
+    assert left == (
+        "Parameter PROCESSING:KNEEWIDTH is there twice, as 100.0 and as 101.0; neither was taken, and the file is read "
+        "without it."
+    )
+    np.testing.assert_allclose(raw.parameters["PROCESSING"]["GOLEMTHORAXSIZE"], [205.186], rtol=1e-6)
+    assert "KNEEWIDTH" not in raw.parameters["PROCESSING"]
+
+
+def test_more_frames_than_16_bits_hold_are_all_read(tmp_path):
+    """Header, POINT:FRAMES and TRIAL of a recording of 70,000 frames stop at 65,535; a frame has 24 bytes, so that 21
+    of them would fit into the zeros of the last block.
+    """
+    frames = 70_000
+    points = np.ones((frames, 1, 4)) * np.array([1.0, 2.0, 3.0, 0.0]) + np.arange(frames)[:, None, None]
+    points[..., 3] = 0.0
+    analog = np.arange(2.0 * frames).reshape(-1, 1)
+    full = real(65535.0)
+    trial = {"ACTUAL_START_FIELD": whole(1, 0), "ACTUAL_END_FIELD": whole(65535, 0)}
+    changed = {"header": {"last": 65535}, "parameters": {"POINT": {"FRAMES": full}, "TRIAL": trial}}
+    raw = read_raw(save(tmp_path, File(points, analog, **changed)))
+    np.testing.assert_array_equal(raw.points, points[..., :3])
+    np.testing.assert_array_equal(raw.analog, analog)
+    (said,) = raw.warnings
+    assert said == (
+        "Header, POINT:FRAMES and TRIAL stop at 65535 frames, the most that 16 bits hold; the length of the file "
+        "decides: 70000 frames were read."
+    )
+    cut = File(points[:60_000], analog[: 2 * 60_000], **changed).bytes()
+    with pytest.raises(FileRefused, match="declares 65535 frames and holds 600"):
+        read_raw(save(tmp_path, cut))
+
+
+def test_segment_poses_are_called_what_they_are(tmp_path):
+    """A markerless export: a group ROTATION, no points, no channels; the file is sound."""
+    labels = text(*(f"segment{k}_4X4" for k in range(18)))
+    parameters = {"ROTATION": {"USED": whole(18), "LABELS": labels, "RATE": real(60.0), "DATA_START": whole(4)}}
+    parameters |= {"ANALOG": dict.fromkeys(("USED", "SCALE", "OFFSET", "LABELS", "UNITS", "RATE"))}
+    with pytest.raises(FileRefused) as refusal:
+        read_raw(save(tmp_path, File(np.empty((5, 0, 4)), parameters=parameters)))
+    said = str(refusal.value)
+    assert "holds 18 segment poses (segment0, segment1, segment2, segment3 ...)" in said
+    assert "no markers. The file is sound, but biodance follows markers and does not read poses" in said
+    assert "export the trial again" not in said
+
+
 @pytest.mark.parametrize("reason", list(damaged((np.ones((FRAMES, POINTS, 4)), np.ones((FRAMES * SAMPLES, CHANNELS))))))
 def test_a_damaged_file_is_refused_with_one_sentence(tmp_path, numbers, reason):
     path = save(tmp_path, damaged(numbers)[reason])
@@ -250,15 +311,19 @@ def test_what_a_step_does_not_need_never_refuses_the_file(tmp_path, numbers):
 
 def test_a_parameter_twice_with_the_same_value_is_one(tmp_path, numbers):
     points, _ = numbers
-    for second, good in ((70.0, True), (71.0, False)):
-        group = {"BODYMASS": real(70.0), "BODYMASX": real(second)}
-        content = File(points, parameters={"SUBJECTS": group}).bytes().replace(b"BODYMASX", b"BODYMASS")
-        path = save(tmp_path, content)
-        if good:
-            assert read_raw(path).parameters["SUBJECTS"]["BODYMASS"] == 70.0
-            continue
-        with pytest.raises(FileRefused, match=r"SUBJECTS:BODYMASS is there twice, as 70.0 and as 71.0"):
-            read_raw(path)
+    group = {"BODYMASS": real(70.0), "BODYMASX": real(70.0)}
+    content = File(points, parameters={"SUBJECTS": group}).bytes().replace(b"BODYMASX", b"BODYMASS")
+    raw = read_raw(save(tmp_path, content))
+    assert raw.parameters["SUBJECTS"]["BODYMASS"] == 70.0
+    assert raw.history == ()
+
+
+def test_a_needed_parameter_with_two_values_stops_the_file(tmp_path, numbers):
+    points, analog = numbers
+    group = {"SCALE": real(2.0, 2.0), "SCALF": real(3.0, 3.0)}
+    content = File(points, analog, parameters={"ANALOG": group}).bytes().replace(b"SCALF", b"SCALE")
+    with pytest.raises(FileRefused, match=r"ANALOG:SCALE is there twice, as 2.0, 2.0 and as 3.0, 3.0, and the file"):
+        read_raw(save(tmp_path, content))
 
 
 def test_a_parameter_of_an_undefined_group_is_kept_aside(tmp_path, numbers):

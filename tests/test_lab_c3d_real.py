@@ -34,7 +34,7 @@ def test_the_judge_in_its_child_process_confirms_every_file(data):
     assert len(files) >= 14
     for file in files:
         raw, content = read_raw(file), file.read_bytes()
-        layout = read_layout(len(content), read_header(content, str(file)), raw.parameters, str(file))
+        layout = read_layout(content, read_header(content, str(file)), raw.parameters, str(file))
         assert second_opinion(file, (raw.points, raw.analog), layout) == "confirmed", file
 
 

@@ -1,5 +1,6 @@
 """What was accepted as wrong with a plate is taken off the recordings exactly: the faults are made here, by hand."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -114,3 +115,12 @@ def test_corrected_trials_are_a_session_that_is_not_corrected_twice(tmp_path: Pa
     once = corrected_session(session, made)
     assert corrected_session(once, made).trials[0].history == once.trials[0].history
     assert (tmp_path / "t.c3d").stat().st_mtime <= (tmp_path / "corrected" / "t.c3d").stat().st_mtime
+
+
+def test_a_corrected_copy_says_no_more_of_the_person_than_was_known(tmp_path: Path) -> None:
+    person = Subject(66.0, 1.7, "F", 30.0, guessed=("mass", "sex"))
+    own = replace(trial(), role="fit", marker_set=str(tmp_path / "own.toml"))
+    write_corrected(Session(person, (own,), tmp_path), (), (), tmp_path / "corrected")
+    said = tomllib.loads((tmp_path / "corrected/session.toml").read_text())
+    assert said["subject"] == {"height_m": 1.7, "age": 30.0}
+    assert said["markers"] == {"file": str((tmp_path / "own.toml").resolve())}

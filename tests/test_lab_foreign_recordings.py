@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from lab_sessions import person, roles, said, write_trial
 
+from biodance.errors import SessionRefused
 from biodance.lab.c3d.write import write_c3d
 from biodance.lab.session.read import read_session
 
@@ -56,3 +57,13 @@ def test_what_session_toml_says_is_believed_of_every_recording(tmp_path: Path) -
     assert list(read_session(tmp_path).refused) == ["walk.c3d"]
     (tmp_path / "session.toml").write_text(TYPED)
     assert not read_session(tmp_path).refused
+
+
+def test_what_session_toml_says_is_believed_of_every_part(tmp_path: Path) -> None:
+    for part, mass, stature in (("Straight", 62.0, 1.7), ("Turn", 46.0, 1.5)):
+        (tmp_path / part).mkdir()
+        recorded(tmp_path / part, f"walk_{part}", mass, stature)
+    with pytest.raises(SessionRefused, match="hold several people"):
+        read_session(tmp_path)
+    (tmp_path / "session.toml").write_text(TYPED)
+    assert len(read_session(tmp_path).trials) == 2

@@ -41,7 +41,7 @@ def test_the_wrench_that_went_in_comes_out(kind, reaction, z_up):
     for metres in (0.001, 1.0):
         plate = made(kind, rng, reaction=reaction, z_up=z_up)
         truth, _ = step(rng, plate)
-        plates, warnings = read_plates(raw_file([plate], [channels(plate, truth)], metres=metres), metres=metres)
+        plates, warnings, *_ = read_plates(raw_file([plate], [channels(plate, truth)], metres=metres), metres=metres)
         assert ["shear may have the wrong sign" in w for w in warnings] == [True] * (z_up and kind in (3, 7))
         assert largest_error(plates, truth) < 1e-6
         assert plates[0].type == kind
@@ -55,7 +55,7 @@ def test_the_centre_of_pressure_lies_where_the_person_stood():
     plate = made(2, rng)
     plate.rotation = yaw(0.7) @ np.diag([1.0, -1.0, -1.0])
     truth, point = step(rng, plate)
-    plates, _ = read_plates(raw_file([plate], [channels(plate, truth)]), metres=0.001)
+    plates, _, *_ = read_plates(raw_file([plate], [channels(plate, truth)]), metres=0.001)
     cop = plates[0].wrench.cop(height=plates[0].height, threshold=100)
     loaded = np.isfinite(cop[:, 0])
     assert loaded.sum() > 500
@@ -69,7 +69,7 @@ def test_kistlers_polynomial_is_taken_off():
     truth, _ = step(rng, plate)
     recorded = channels(plate, truth)
     assert largest_error(read_plates(raw_file([plate], [recorded]), metres=0.001)[0], truth) < 1e-6
-    uncorrected, _ = read_plates(raw_file([plate], [recorded], FPCOPPOLY=None), metres=0.001)
+    uncorrected, _, *_ = read_plates(raw_file([plate], [recorded], FPCOPPOLY=None), metres=0.001)
     assert largest_error(uncorrected, truth) > 1.0
 
 
@@ -78,7 +78,7 @@ def test_several_plates_of_different_types_add_up():
     plates = [made(kind, rng, reaction=kind != 3) for kind in (2, 3, 4)]
     truths = [step(rng, plate)[0] for plate in plates]
     raw = raw_file(plates, [channels(p, t) for p, t in zip(plates, truths, strict=True)])
-    read, warnings = read_plates(raw, metres=0.001)
+    read, warnings, *_ = read_plates(raw, metres=0.001)
     assert [said[:29] for said in warnings] == ["Two signs in one laboratory: "]
     assert "plate 2 holds the force" in warnings[0]
     assert "plates 1, 3 hold the force" in warnings[0]
@@ -98,7 +98,7 @@ def test_a_treadmills_origin_from_the_surface_to_the_sensor_is_turned(seen):
     time = np.arange(0, 4, 0.01)
     point = truths[0][1][:: len(truths[0][1]) // time.size]
     feet = np.stack([point + np.array([0.05, 0.02, 0.03]), point - [0.05, 0.02, -0.03]], axis=1)
-    read, warnings = read_plates(raw, metres=0.001, markers=Markers(("A", "B"), time, feet) if seen else None)
+    read, warnings, *_ = read_plates(raw, metres=0.001, markers=Markers(("A", "B"), time, feet) if seen else None)
     assert largest_error(read, sum(truth for truth, _ in truths)) < 1e-6
     assert sum("they were turned" in said for said in warnings) == 2
 
@@ -122,7 +122,7 @@ def test_an_origin_with_the_wrong_sign_of_z_is_mended(kind, z_up):
     truth, _ = step(rng, plate)
     raw = raw_file([plate], [channels(plate, truth)])
     raw.parameters["FORCE_PLATFORM"]["ORIGIN"][2] *= -1
-    read, _ = read_plates(raw, metres=0.001)
+    read, _, *_ = read_plates(raw, metres=0.001)
     assert largest_error(read, truth) < 1e-6
     assert any("its sign was turned" in said for said in read[0].decisions)
 
@@ -137,7 +137,7 @@ def test_units_are_read_per_channel():
         ([1, 1000, 1, 1, 1e-3, 1e-3], ["N", "kN", "Newton", "N.m", "N-mm", "ntmm"]),
     ):
         raw = raw_file([plate], [channels(plate, truth)], units=[(scale, text)])
-        read, warnings = read_plates(raw, metres=0.001)
+        read, warnings, *_ = read_plates(raw, metres=0.001)
         assert warnings == ()
         assert largest_error(read, truth) < 1e-6
 
@@ -147,7 +147,7 @@ def test_missing_units_are_taken_as_the_files_own_and_said():
     plate = made(2, rng)
     truth, _ = step(rng, plate)
     raw = raw_file([plate], [channels(plate, truth)], units=[([1, 1, 1, 1e-3, 1e-3, 1e-3], [""] * 3 + ["V"] * 3)])
-    read, _ = read_plates(raw, metres=0.001)
+    read, _, *_ = read_plates(raw, metres=0.001)
     assert largest_error(read, truth) < 1e-6
     assert sum("says nothing" in said for said in read[0].decisions) == 2
 
@@ -158,7 +158,7 @@ def test_moments_in_another_unit_than_declared_are_found_and_warned_about(scale,
     plate = made(2, rng)
     truth, _ = step(rng, plate)
     raw = raw_file([plate], [channels(plate, truth)], units=[([1, 1, 1] + [scale] * 3, ["N"] * 3 + [text] * 3)])
-    read, warnings = read_plates(raw, metres=0.001)
+    read, warnings, *_ = read_plates(raw, metres=0.001)
     assert largest_error(read, truth) < 1e-6
     assert any("Check the units" in warning for warning in warnings)
 
@@ -168,7 +168,7 @@ def test_corners_and_origin_in_another_unit_than_the_points():
     plate = made(2, rng)
     truth, _ = step(rng, plate)
     raw = raw_file([plate], [channels(plate, truth)], metres=0.001)
-    read, _ = read_plates(raw, metres=1.0)
+    read, _, *_ = read_plates(raw, metres=1.0)
     assert largest_error(read, truth) < 1e-6
     assert any("the only unit that fits a plate" in said for said in read[0].decisions)
 
@@ -178,7 +178,7 @@ def test_time_runs_on_the_clock_of_the_markers():
     plate = made(2, rng)
     raw = raw_file([plate], [channels(plate, step(rng, plate)[0])])
     markers = Markers(("A",), 5.0 + np.arange(400) / 100, np.ones((400, 1, 3)))
-    read, _ = read_plates(raw, metres=0.001, markers=markers)
+    read, _, *_ = read_plates(raw, metres=0.001, markers=markers)
     assert read[0].wrench.time[0] == 5.0
 
 
@@ -198,7 +198,7 @@ def test_an_unloaded_plate_takes_the_sign_of_the_others():
     light = np.random.default_rng(1).normal(0, 0.5, (len(truth), 6))
     light[500:800] += [0, 0, 8, 0, 0, 0]
     raw = raw_file([stood, empty], [channels(stood, truth), channels(empty, light)])
-    read, _ = read_plates(raw, metres=0.001)
+    read, _, *_ = read_plates(raw, metres=0.001)
     np.testing.assert_allclose(read[1].wrench.force[500:800, 2].mean(), 8, atol=0.5)
     assert "Never loaded" in read[1].decisions[-1]
 

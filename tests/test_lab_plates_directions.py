@@ -63,7 +63,7 @@ def test_sway_is_not_seen_where_nobody_sways():
 def test_sway_confirms_a_sound_plate(reaction):
     plate = Emulated(3, half=np.array([0.3, 0.45]), origin=np.array([0.21, 0.35, -0.058]), reaction=reaction)
     truth, _, _ = standing(plate)
-    plates, warnings = read_plates(file_of(plate, truth, [0, 1, 2, 3]), metres=0.001)
+    plates, warnings, *_ = read_plates(file_of(plate, truth, [0, 1, 2, 3]), metres=0.001)
     assert warnings == ()
     np.testing.assert_allclose(plates[0].wrench.value, truth, atol=1e-6)
     assert any("confirms" in said for said in plates[0].decisions)
@@ -76,7 +76,7 @@ def test_corners_listed_the_wrong_way_round_without_markers_give_a_mirrored_lab(
         3, centre=np.zeros(3), half=np.array([0.3, 0.45]), origin=np.array([0.21, 0.35, -0.058]), reaction=reaction
     )
     truth, point, _ = standing(plate)
-    plates, warnings = read_plates(file_of(plate, truth, order), metres=0.001)
+    plates, warnings, *_ = read_plates(file_of(plate, truth, order), metres=0.001)
     assert "the corners run the wrong way round" in warnings[0]
     wrench = plates[0].wrench
     np.testing.assert_allclose(wrench.force, truth[:, :3] * mirror, atol=1e-6)
@@ -92,7 +92,7 @@ def test_the_foot_markers_say_which_axis_to_turn(order):
     truth, _, markers = standing(plate)
     truth[:, 3:] += np.cross([0.12, -0.2, 0], truth[:, :3])
     markers = Markers(markers.names, markers.time, markers.xyz + np.array([0.12, -0.2, 0.0]))
-    plates, warnings = read_plates(file_of(plate, truth, order), metres=0.001, markers=markers)
+    plates, warnings, *_ = read_plates(file_of(plate, truth, order), metres=0.001, markers=markers)
     np.testing.assert_allclose(plates[0].wrench.value, truth, atol=1e-6)
     assert "which puts the load under the feet" in warnings[0]
 
@@ -101,7 +101,7 @@ def test_without_a_verdict_of_the_markers_the_plate_is_left_out():
     plate = Emulated(2, centre=np.array([1.0, 2.0, 0.0]))
     truth, _, markers = standing(plate)
     away = Markers(markers.names, markers.time, markers.xyz + np.array([5.0, 0, 0]))
-    plates, warnings = read_plates(file_of(plate, truth, [3, 2, 1, 0]), metres=0.001, markers=away)
+    plates, warnings, *_ = read_plates(file_of(plate, truth, [3, 2, 1, 0]), metres=0.001, markers=away)
     assert plates == ()
     assert "do not tell which axis" in warnings[0]
 
@@ -120,10 +120,10 @@ def test_corners_counted_from_another_one_are_found_by_the_markers(turns):
     markers = Markers(("HEEL", "TOE", "TOE2"), at, feet)
     order = list(np.roll(range(4), turns))
     raw = raw_file([plate], [channels(plate, truth)])
-    sound, warnings = read_plates(raw, metres=0.001, markers=markers)
+    sound, warnings, *_ = read_plates(raw, metres=0.001, markers=markers)
     assert warnings == ()
     assert any("from the feet that the markers show" in said for said in sound[0].decisions)
-    found, warnings = read_plates(file_of(plate, truth, order), metres=0.001, markers=markers)
+    found, warnings, *_ = read_plates(file_of(plate, truth, order), metres=0.001, markers=markers)
     assert f"turned by {90 * turns} degrees" in warnings[0] or f"turned by {360 - 90 * turns} degrees" in warnings[0]
     np.testing.assert_allclose(found[0].wrench.value, truth, atol=1e-6)
 
@@ -132,7 +132,7 @@ def test_load_far_from_the_feet_is_warned_about():
     plate = Emulated(2, centre=np.zeros(3), half=np.array([0.4, 0.4]), rotation=np.diag([1.0, -1.0, -1.0]))
     truth, _, markers = standing(plate)
     elsewhere = Markers(markers.names, markers.time, markers.xyz + np.array([0.25, -0.3, 0.0]))
-    _, warnings = read_plates(file_of(plate, truth, [0, 1, 2, 3]), metres=0.001, markers=elsewhere)
+    _, warnings, *_ = read_plates(file_of(plate, truth, [0, 1, 2, 3]), metres=0.001, markers=elsewhere)
     assert "from the feet that the markers show" in warnings[0]
 
 
@@ -142,5 +142,5 @@ def test_shear_of_the_wrong_sign_is_warned_about():
     truth, _, _ = standing(plate)
     signals = channels(plate, truth)
     signals[:, :2] *= -1
-    _, warnings = read_plates(raw_file([plate], [signals]), metres=0.001)
+    _, warnings, *_ = read_plates(raw_file([plate], [signals]), metres=0.001)
     assert "wrong sign" in warnings[0]

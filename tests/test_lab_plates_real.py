@@ -29,11 +29,14 @@ def test_an_eight_channel_plate_agrees_with_its_makers_export(data, name, larges
     truth = makers_text(data / "biomdp" / f"{name}.txt")
     plate = read_c3d(data / "biomdp" / f"{name}.c3d").plates[0]
     at = np.round(truth["abs time"] * plate.wrench.rate).astype(int)
+    measured = np.isfinite(plate.wrench.value[at, 2])  # 20 ms at both ends of one file are padding
+    at, truth = at[measured], {name: values[measured] for name, values in truth.items()}
+    assert measured.mean() > 0.99
     along_plate = -(
         plate.wrench.cop(threshold=50)[at, :2] - plate.centre[:2]
     )  # its x, y point along -x, -y of the file
     error = along_plate - np.column_stack([truth["Ax"], truth["Ay"]])
-    error = error[truth["Fz"] > 51]
+    error = error[(truth["Fz"] > 51)]
     assert np.abs(error.mean(axis=0)).max() < 1e-3
     assert np.sqrt((error**2).mean(axis=0)).max() < typical
     assert np.abs(error).max() < largest

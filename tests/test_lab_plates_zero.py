@@ -18,7 +18,7 @@ def recorded(*, zero, noise=1.0, offset=OFFSET, seed=0, **arguments):
     plate = Emulated(**arguments)
     truth, _ = step(rng, plate)
     signals = channels(plate, truth) + offset + noise * rng.normal(size=truth.shape) * [1, 1, 1, 0.1, 0.1, 0.1]
-    plates, warnings = read_plates(raw_file([plate], [signals], zero=zero), metres=0.001)
+    plates, warnings, *_ = read_plates(raw_file([plate], [signals], zero=zero), metres=0.001)
     return plates[0], truth, warnings
 
 

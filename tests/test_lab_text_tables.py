@@ -7,8 +7,8 @@ import pytest
 from lab_sessions import table_of
 
 from biodance.errors import FileRefused, TrialRefused, UnknownName
-from biodance.lab.opensim.ground_forces import has_plates, plates_of
 from biodance.lab.opensim.mot import TimeTable, read_mot, write_mot
+from biodance.lab.opensim.plate_columns import has_plates, plates_of
 from biodance.records import Plate, Wrench
 
 G = 9.81
@@ -40,7 +40,7 @@ def plates(frames=200, rate=1000.0):
 def test_wrench_survives_the_table_and_the_file(tmp_path):
     truth = plates()
     table = read_mot(write_mot(tmp_path / "f.mot", table_of(truth)))
-    read, _ = plates_of(table, where="f.mot")
+    read, _, _ = plates_of(table, where="f.mot")
     assert [p.name for p in read] == ["plate1", "plate2"]
     for plate, true in zip(read, truth, strict=True):
         np.testing.assert_allclose(plate.wrench.value, true.wrench.value, atol=1e-6)
@@ -94,7 +94,7 @@ def test_force_goes_up_along_y_in_the_file():
 def test_column_names_of_real_writers(columns):
     labels = tuple(part.format(a=a) for part in columns for a in "xyz")
     row = [10.0, 700.0, 5.0, 0.4, 0.0, 0.1, 0.0, 2.0, 0.0]
-    (plate,), said = plates_of(TimeTable("t", labels, [0.0, 0.01], [row, row]), where="f")
+    (plate,), said, _ = plates_of(TimeTable("t", labels, [0.0, 0.01], [row, row]), where="f")
     np.testing.assert_allclose(plate.wrench.force[0], [10, -5, 700])
     np.testing.assert_allclose(plate.wrench.cop()[0], [0.4, -0.1, 0.0])
     assert plate.wrench.moment[0, 2] == pytest.approx(0.4 * -5 - -0.1 * 10 + 2.0)
@@ -109,19 +109,19 @@ def one_plate(row, time=(0.0, 0.01, 0.02, 0.03)):
 
 
 def test_load_on_the_plate_is_turned_to_reaction_and_said():
-    (plate,), said = plates_of(one_plate([0.0, -700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0]), where="f")
+    (plate,), said, _ = plates_of(one_plate([0.0, -700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0]), where="f")
     assert plate.wrench.force[0, 2] == pytest.approx(700)
     assert plate.wrench.cop()[0, 0] == pytest.approx(0.4)
     assert any("sign was turned" in sentence for sentence in said)
 
 
 def test_z_up_table_is_taken_as_it_is():
-    (plate,), _ = plates_of(one_plate([0.0, 0.0, 700.0, 0.4, 0.1, 0.0, 0.0, 0.0, 0.0]), where="f")
+    (plate,), _, _ = plates_of(one_plate([0.0, 0.0, 700.0, 0.4, 0.1, 0.0, 0.0, 0.0, 0.0]), where="f")
     np.testing.assert_allclose(plate.wrench.force[0], [0, 0, 700])
 
 
 def test_nan_point_without_force_is_no_fault():
-    (plate,), _ = plates_of(
+    (plate,), _, _ = plates_of(
         TimeTable("t", LABELS, [0.0, 0.01], [[0, 700, 0, 0.4, 0, 0.1, 0, 0, 0], [0, 0, 0, *[np.nan] * 3, 0, 0, 0]]),
         where="f",
     )
@@ -130,13 +130,13 @@ def test_nan_point_without_force_is_no_fault():
 
 
 def test_plate_that_is_never_loaded_is_left_out_and_said():
-    found, said = plates_of(one_plate([0.0, 3.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0]), where="f")
+    found, said, _ = plates_of(one_plate([0.0, 3.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0]), where="f")
     assert found == ()
     assert any("never loaded" in sentence for sentence in said)
 
 
 def test_unequal_steps_are_interpolated_and_said():
-    (plate,), said = plates_of(
+    (plate,), said, _ = plates_of(
         one_plate([0.0, 700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0], time=(0.0, 0.01, 0.02, 0.05, 0.06)), where="f"
     )
     np.testing.assert_allclose(np.diff(plate.wrench.time), 0.01)
@@ -146,7 +146,9 @@ def test_unequal_steps_are_interpolated_and_said():
 
 def test_time_that_is_rounded_still_has_equal_steps():
     time = np.round(np.arange(600) / 600, 4)
-    (plate,), said = plates_of(one_plate([0.0, 700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0], time=tuple(time)), where="f")
+    (plate,), said, _ = plates_of(
+        one_plate([0.0, 700.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0], time=tuple(time)), where="f"
+    )
     assert plate.wrench.rate == pytest.approx(600, rel=1e-4)
     np.testing.assert_allclose(np.diff(plate.wrench.time), 1 / 600, rtol=1e-3)
     assert not any("not equal" in sentence for sentence in said)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lab_sessions import person
 from perfect_recordings import PLATE, SUBJECT, arm_swing, recorded
 from second_package import renamed_set
 
@@ -16,9 +17,12 @@ from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS, segment_of
 from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.opensim.trc import write_trc
+from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
 from biodance.pipeline.session import examine
 from biodance.records import Markers
+from biodance.witnesses import recording
 
 SUBJECT_TOML = '[subject]\nmass_kg = 62.0\nheight_m = 1.70\nsex = "F"\nage = 30\n'
 PLUG_IN_GAIT = read_marker_set("plug_in_gait")
@@ -151,3 +155,38 @@ def test_every_landmark_has_its_segment(landmark: str) -> None:
     assert not (
         side in ("left", "right") and any(limb in segment_of(landmark) for limb in ("thigh", "arm", "foot"))
     ) or segment_of(landmark).startswith(side)
+
+
+RUNNER = {
+    f"{side[0]}.{label}": f"{side.lower()}_{place}"
+    for side in ("Right", "Left")
+    for label, place in {
+        "ASIS": "asis", "PSIS": "psis", "Knee": "knee_lateral", "Knee.Medial": "knee_medial", "Ankle": "ankle_lateral",
+        "Ankle.Medial": "ankle_medial", "Heel.Bottom": "heel", "MT1": "toe_medial", "MT5": "toe_lateral",
+    }.items()
+}  # fmt: skip
+"""A runner's labels in the static trial; the runs lack those of knees and ankles."""
+
+
+def test_a_set_of_ones_own_is_worn_by_trials_that_lack_what_only_the_static_has(data: Path, tmp_path: Path) -> None:
+    """Dropped in silence it was: no set in the runs, and witnesses without feet."""
+    for file in ("static.c3d", "runT25.c3d"):
+        (tmp_path / file).symlink_to(data / "rbds/S003" / file)
+    required = ", ".join(f'"{label}"' for label in RUNNER)
+    rows = "\n".join(f'"{label}" = "{place}"' for label, place in RUNNER.items())
+    (tmp_path / "own.toml").write_text(f'name = "own"\nrequired = [{required}]\n[map]\n{rows}\n')
+    (tmp_path / "session.toml").write_text('[markers]\nfile = "own.toml"\n')
+    static, run = (read_session(tmp_path)[name] for name in ("static", "runT25"))
+    assert {trial.marker_set for trial in (static, run)} == {str(tmp_path.resolve() / "own.toml")}
+    assert not any("chosen set" in warning for warning in (*static.warnings, *run.warnings))
+    assert {step.side for step in recording(run).steps} == {"right", "left"}
+
+
+def test_witnesses_look_for_feet_by_the_set_of_the_user_alone(tmp_path: Path) -> None:
+    """Who says that LTOE is no toe has no feet, though plug-in gait would know them."""
+    markers = person()
+    said = "\n".join(f'{label} = "{segment}"' for label, segment in (("LASI", "left_asis"), ("LTOE", "left_foot")))
+    (tmp_path / "session.toml").write_text(f"[markers.map]\n{said}\n")
+    write_trc(tmp_path / "static.trc", markers)
+    assert len(recording(read_trial(tmp_path / "static.trc")).feet) == 2
+    assert recording(read_session(tmp_path).trials[0]).feet == ()

@@ -7,8 +7,8 @@ import pytest
 from squatting import BODY, squat
 
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.lab.opensim.ground_forces import plates_of
 from biodance.lab.opensim.mot import read_mot
+from biodance.lab.opensim.plate_columns import plates_of
 from biodance.pipeline.program_folders import write_opensim_folder
 from biodance.pipeline.trial_result import TrialResult
 
@@ -37,7 +37,7 @@ def test_opensim_s_inverse_dynamics_finds_our_torques_within_one_percent(folder,
 
 
 def test_the_forces_of_both_feet_are_what_the_plate_measured(folder):
-    plates, _ = plates_of(read_mot(folder / "squat_forces.mot"), where="squat_forces.mot")
+    plates, _, _ = plates_of(read_mot(folder / "squat_forces.mot"), where="squat_forces.mot")
     total = np.sum([plate.wrench.value for plate in plates], axis=0)
     np.testing.assert_allclose(total, squat().trial.plates[0].wrench.value, atol=1e-6)
 

@@ -133,7 +133,7 @@ def test_a_real_recording_without_fault_gets_no_name(name: str, recording: Recor
     assert named == {("labels_swapped", pair) for pair in EXCHANGED.get(name.removeprefix("biomechzoo/"), ())}
     assert named or "what could be judged" in said.text or said.text.startswith("Cannot tell")
     assert not is_well(found)
-    assert any(row.missed for row in found.judged) or found.doubt
+    assert any(row.missed for row in found.judged) or found.doubted
 
 
 def test_identify_finds_the_exchanged_wrist_that_the_diagnosis_finds(recording: Recording) -> None:

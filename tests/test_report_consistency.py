@@ -9,14 +9,13 @@ from dataclasses import replace
 from io import StringIO
 
 import pytest
-from example_results import FOUND, LEFT, VERDICTS, WHOLE, full_session
+from example_results import FOUND, LEFT, UNLIKE, VERDICTS, WHOLE, full_session
 from rich.console import Console
 
 from biodance.cli.app import DONE, NEEDS_A_PERSON
 from biodance.cli.session import print_reported
 from biodance.diagnosis.diagnosis import Diagnosis
-from biodance.diagnosis.doubt import UNUSUAL_BODY, WITHOUT_RESEMBLED
-from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES
+from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, headline, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.judged_trials import TOO_SHORT
@@ -75,7 +74,7 @@ def surfaces(verdict: Diagnosis, check: Check, judged: tuple[Judged, ...]) -> di
     return {"page": plain[0], "page of the diagnosis": plain[1], "terminal": screen.getvalue(), "JSON": whole}
 
 
-@pytest.mark.parametrize("verdict", VERDICTS, ids=lambda one: f"{one.verdict} {one.doubt[:8]}{len(one.resembles)}")
+@pytest.mark.parametrize("verdict", VERDICTS, ids=lambda one: f"{one.verdict} {one.doubted}{len(one.resembles)}")
 def test_nothing_says_all_is_well_beside_a_failed_check_or_an_unjudged_trial(verdict: Diagnosis) -> None:
     inside, rows = replace(CHECKS[2], inside=True), ((STATIC, MISSED), (MISSED,))
     for check, judged in (*itertools.product(CHECKS, ((STATIC,),)), *itertools.product((inside, CHECKS[0]), rows)):
@@ -94,17 +93,22 @@ def test_diagnose_begins_with_its_headline() -> None:
 
 
 @pytest.mark.parametrize(
-    "notes",
-    [(UNUSUAL_BODY,), (OUTSIDE_TOLERANCES,), (UNUSUAL_BODY, OUTSIDE_TOLERANCES), (WITHOUT_RESEMBLED,)],
+    "reasons",
+    [
+        (Reason.UNUSUAL_BODY,),
+        (Reason.OUTSIDE_TOLERANCES,),
+        (Reason.UNUSUAL_BODY, Reason.OUTSIDE_TOLERANCES),
+        (Reason.WITHOUT_RESEMBLED,),
+    ],
     ids=("body", "tolerance", "both", "resembled"),
 )
-def test_what_is_strange_alone_is_no_alarm_and_something_left_beside_it_is(notes: tuple[str, ...]) -> None:
-    quiet = (replace(LEFT[0], z=1.0),)
-    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, notes=notes, resembles=(FOUND,))
+def test_what_is_strange_alone_is_no_alarm_and_something_left_beside_it_is(reasons: tuple[Reason, ...]) -> None:
+    quiet, why = (replace(LEFT[0], z=1.0),), dict.fromkeys(reasons, ())
+    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, why=why, resembles=(FOUND,))
     for one, level, begins in (
         (strange, "warn", "Cannot tell whether anything is wrong"),
-        (replace(strange, notes=(*notes, OUTSIDE_EVERY_LABORATORY)), "fail", "Something is wrong"),
-        (replace(strange, adequacy=LEFT), "fail", "Something is wrong"),
+        (replace(strange, why=why | {Reason.OUTSIDE_EVERY_LABORATORY: ()}), "fail", "Something is wrong"),
+        (replace(strange, adequacy=LEFT, why=why | UNLIKE), "fail", "Something is wrong"),
     ):
         first = reconcile_with_checks(one, replace(FULL, checks=()), (STATIC,)).attention[0]
         assert (first.level, first.text[: len(begins)]) == (level, begins)
@@ -118,7 +122,7 @@ def test_what_is_strange_alone_is_no_alarm_and_something_left_beside_it_is(notes
         (replace(WHOLE, verdict="unexplained"), (STATIC, replace(MISSED, why_not=TOO_SHORT)), "record some seconds"),
         (VERDICTS[5], (STATIC,), "compare with another session of the same person"),
         (
-            replace(VERDICTS[3], adequacy=(replace(LEFT[0], z=1.0),), notes=(UNUSUAL_BODY,)),
+            replace(VERDICTS[3], adequacy=(replace(LEFT[0], z=1.0),), why={Reason.UNUSUAL_BODY: ()}),
             (STATIC,),
             "compare with anoth",
         ),

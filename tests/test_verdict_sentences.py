@@ -56,7 +56,7 @@ def test_no_verdict_contradicts_a_check_or_an_unjudged_trial() -> None:
             assert "not judged: walk" in said.text
         if one.verdict == "unexplained":
             assert not one.findings
-            told_nothing = bool(before.doubt) or STATIC not in rows or not before.adequacy
+            told_nothing = before.doubted or STATIC not in rows or not before.adequacy
             assert said.text.startswith("Cannot tell") == told_nothing
         assert not is_well(one) or whole
         assert list(one.attention) == list(strongest_first(one.attention))

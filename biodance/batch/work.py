@@ -206,7 +206,7 @@ def _verdict(diagnosis: dict[str, Any]) -> str:
     """
     if not diagnosis or not (diagnosis["findings"] or any(row["seconds"] > 0 for row in diagnosis["judged"])):
         return "not judged"
-    return "cannot tell" if diagnosis["doubt"] else str(diagnosis["verdict"])
+    return "cannot tell" if diagnosis["status"] == "cannot tell" else str(diagnosis["verdict"])
 
 
 def _vertical(wrench: dict[str, Any] | None, body: str) -> float | None:

@@ -13,18 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY
+from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
-from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, is_beyond_usual, size_from_witnesses
+from biodance.diagnosis.witness_fit import is_beyond_usual
+from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
 from biodance.effects import Effect, causes
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause from which they contradict each other."""
 _PLAIN = 3.0
 """Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
-_EXCLUDED = "what the simulation would explain by a {} is none, as feet, clocks and weights show"
-"""Why nothing can be told where the only cause of the simulation is excluded by the witnesses."""
 _WEIGHING = {"standing_force", "stride_force"}
 """Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
 _STANDING = {*_WEIGHING, "standing_place"}
@@ -94,7 +93,7 @@ def combine_findings(
     names = {_names(alias) for finding in kept_findings for alias in finding.set}
     rest = tuple(f for f in checked.findings if _names(f) not in names)
     verdict: Verdict = "named, incomplete"
-    if judged and not rest and one.verdict in ("nothing wrong", "named, complete") and not one.doubt:
+    if judged and not rest and one.verdict in ("nothing wrong", "named, complete") and not one.doubted:
         verdict = "named, complete"
     kept = tuple(f for f in checked.resembles if _names(f) not in names)
     return replace(checked, verdict=verdict, findings=(*kept_findings, *rest), resembles=(*kept, *doubtful))
@@ -122,15 +121,15 @@ def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvi
     hanging = [other for other in same if other.varies_with]
     if hanging:
         return not _weighing_agrees(finding, hanging[0], evidence)
-    if same and UNUSUAL_BODY in one.notes and _is_shown_by(finding, evidence, _WEIGHING):
+    if same and Reason.UNUSUAL_BODY in one.why and _is_shown_by(finding, evidence, _WEIGHING):
         return True
-    if same and SEVERAL_CROSSTALKS in one.notes and _is_believed_alone(finding):
+    if same and Reason.SEVERAL_CROSSTALKS in one.why and _is_believed_alone(finding):
         return True
     labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
     if not finding.parameters or one.verdict == "nothing wrong" or labels:
         return False
     times = _size_over_limit(finding, one)
-    if one.doubt:
+    if one.doubted:
         return times > _PLAIN and _evidence(finding, one) <= 0.0
     return times > 1.0
 
@@ -176,7 +175,7 @@ def _movement_shows_none(
     Two sources of one cause add up their evidence. Where the movement measures it better than the witnesses, theirs
     must make up what is lacking for a name there.
     """
-    heard = _is_shown_by(finding, evidence, _STANDING) if one.doubt else one.verdict == "nothing wrong"
+    heard = _is_shown_by(finding, evidence, _STANDING) if one.doubted else one.verdict == "nothing wrong"
     if not heard or not finding.parameters or _size_over_limit(finding, one) <= 1.0:
         return False
     own = finding.parameters[0]
@@ -257,14 +256,14 @@ def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
     sentence = "{} {} was taken back: feet and weight on the plates exclude its size."
     notes = tuple(sentence.format(finding.effect.replace("_", " "), finding.target) for finding in gone)
     verdict: Verdict = "named, incomplete" if left else "unexplained"
-    doubt = one.doubt or ("" if left or one.verdict != "named, complete" else _EXCLUDED.format(gone[0].effect))
+    doubted = one.doubted or left or one.verdict != "named, complete"
     return replace(
         one,
         verdict=verdict,
         findings=left,
         resembles=(*gone, *one.resembles),
         notes=(*one.notes, *notes),
-        doubt=doubt.replace("_", " "),
+        why=one.why if doubted else {**one.why, Reason.EXCLUDED_BY_WITNESSES: (gone[0].effect.replace("_", " "),)},
     )
 
 

@@ -4,6 +4,7 @@ be seen.
 SI units; six channels are Fx Fy Fz (N) and Mx My Mz (N·m) about the middle of where the person stands.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from biodance import display
 from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.reasons import DOUBTS, DiagnosisStatus, Reason, status_of
 from biodance.identification.knowledge import SIGMAS
 from biodance.records import Array, freeze
 from biodance.records.attention import Attention, Judged
@@ -30,9 +32,7 @@ ABOUT = "diagnosis"
 
 @dataclass(frozen=True)
 class Alias:
-    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` against "nothing wrong" (natural
-    logarithm).
-    """
+    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` (natural) against "nothing wrong"."""
 
     effect: str
     target: str
@@ -190,8 +190,8 @@ class Diagnosis:
         Sentences for a person, the verdict's first.
     judged : tuple of Judged
         What the verdict rests on.
-    doubt : str
-        Why no cause can be told from what was judged (only standing, markers too far from the body); "" where one can.
+    why : mapping of Reason to tuple of str
+        Why it says no more (only standing, an unusual body), each with what it concerns.
     witnesses : WitnessEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
 
@@ -213,7 +213,7 @@ class Diagnosis:
     tolerated: tuple[Finding, ...] = ()
     attention: tuple[Attention, ...] = ()
     judged: tuple[Judged, ...] = ()
-    doubt: str = ""
+    why: Mapping[Reason, tuple[str, ...]] = field(default_factory=dict)
     witnesses: "WitnessEvidence | None" = None
 
     def __repr__(self) -> str:
@@ -221,6 +221,21 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), self.notes)
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """The reasons alone."""
+        return tuple(self.why)
+
+    @property
+    def doubted(self) -> bool:
+        """Whether no cause can be told from what was judged, whatever is left (`DOUBTS`)."""
+        return not DOUBTS.isdisjoint(self.why)
+
+    @property
+    def status(self) -> DiagnosisStatus:
+        """What it ends with."""
+        return status_of(self.why, named=bool(self.findings), clean=self.verdict == "nothing wrong")
 
     @property
     def told(self) -> str:
@@ -246,24 +261,13 @@ class Diagnosis:
         """
         import pandas as pd
 
-        columns = "effect target parameter value sd low high unit"
-        rows = [
-            (
-                f.effect,
-                f.target,
-                p.name,
-                p.value,
-                p.sd,
-                *p.interval,
-                p.unit,
-                f.visible_fraction,
-                f.log_bayes_factor,
-                f.advice,
-            )
-            for f in self.findings
-            for p in (f.parameters or (Estimate("", float("nan"), float("nan"), ""),))
-        ]
-        return pd.DataFrame(rows, columns=[*columns.split(), "visible fraction", "log Bayes factor", "advice"])
+        columns = ["effect", "target", "parameter", "value", "sd", "low", "high", "unit"]
+        rows = []
+        for f in self.findings:
+            own = f.visible_fraction, f.log_bayes_factor, f.advice
+            for p in f.parameters or (Estimate("", float("nan"), float("nan"), ""),):
+                rows.append((f.effect, f.target, p.name, p.value, p.sd, *p.interval, p.unit, *own))
+        return pd.DataFrame(rows, columns=[*columns, "visible fraction", "log Bayes factor", "advice"])
 
     def plot_adequacy(self, *, axes: "Axes | None" = None) -> "Axes":
         """Draw how far what is left is from sessions without fault, per channel and band.

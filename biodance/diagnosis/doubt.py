@@ -1,31 +1,14 @@
-"""Which of the causes found are no names but only what the session resembles, and what is said of them."""
+"""Which of the causes found are no names but only what the session resembles, and why."""
 
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import SURE
+from biodance.diagnosis.reasons import Reason
 from biodance.uncertainty.tolerances import Tolerances
 
 NamedFinding = tuple[NamedCause, Finding]
 """A named cause with what is told of it."""
-
-SEVERAL_CROSSTALKS = (
-    "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is turned "
-    "otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
-)
-UNUSUAL_BODY = (
-    "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
-    "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass hides "
-    "in it."
-)
-WITHOUT_RESEMBLED = "What is only resembled explains nothing: what is left is judged without it."
-_VARIES = (
-    "is only what this resembles: a true cause has one size in every trial, band and channel, under every load and at "
-    "every place, and the size of this one hangs on"
-)
-_MAY_NOT_MATTER = (
-    "is only what this resembles: such a cause is known so poorly that what is there may be less than what matters."
-)
 
 
 def only_resembled(causes: list[NamedFinding], named: tuple[NamedCause, ...], known: Tolerances) -> list[NamedFinding]:
@@ -41,17 +24,16 @@ def only_resembled(causes: list[NamedFinding], named: tuple[NamedCause, ...], kn
     return _with_less_evidence(doubted, causes)
 
 
-def doubt_notes(causes: list[NamedFinding], named: tuple[NamedCause, ...], known: Tolerances) -> tuple[str, ...]:
-    """Return why some of the ``causes`` are only resembled, as sentences."""
-    several = any(is_one_of_several(cause, named) for cause, _ in causes)
-    varying = (f"{_name(one)} {_VARIES} {one.varies_with}." for _, one in causes if one.varies_with)
-    small = (f"{_name(one)} {_MAY_NOT_MATTER}" for cause, one in causes if may_not_matter(cause, known))
-    return (*((SEVERAL_CROSSTALKS,) if several else ()), *varying, *small)
-
-
-def is_doubt(note: str) -> bool:
-    """Return whether a note is one of `doubt_notes` or `WITHOUT_RESEMBLED`."""
-    return note in (SEVERAL_CROSSTALKS, WITHOUT_RESEMBLED) or _VARIES in note or _MAY_NOT_MATTER in note
+def doubt_reasons(
+    causes: list[NamedFinding], named: tuple[NamedCause, ...], known: Tolerances
+) -> dict[Reason, tuple[str, ...]]:
+    """Return why some of the ``causes`` are only resembled, each reason with their names."""
+    found = {
+        Reason.SEVERAL_CROSSTALKS: [one for cause, one in causes if is_one_of_several(cause, named)],
+        Reason.SIZE_VARIES: [one for _, one in causes if one.varies_with],
+        Reason.MAY_NOT_MATTER: [one for cause, one in causes if may_not_matter(cause, known)],
+    }
+    return {why: tuple(map(_name, some)) for why, some in found.items() if some}
 
 
 def is_one_of_several(one: NamedCause, named: tuple[NamedCause, ...]) -> bool:

@@ -23,12 +23,13 @@ from biodance.diagnosis.adequacy import (
 )
 from biodance.diagnosis.consequence import matters, unit_at
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
-from biodance.diagnosis.doubt import UNUSUAL_BODY, WITHOUT_RESEMBLED, doubt_notes, is_doubt, only_resembled
+from biodance.diagnosis.doubt import doubt_reasons, only_resembled
 from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, cause_key, causes_of, name_causes, passes_threshold, without_cause
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.plate_axes import in_plate_axes
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
+from biodance.diagnosis.reasons import OF_RESIDUAL, Reason
 from biodance.diagnosis.size_dependence import changes_wrench, significant_dependences
 from biodance.diagnosis.transient_contact import with_transient_contact
 from biodance.diagnosis.unusual_body import robust_causes
@@ -38,25 +39,6 @@ from biodance.effects import effects as family
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, key_of, shipped
-
-OUTSIDE_TOLERANCES = (
-    "What the plates measured fits only if something that is small in every laboratory is many times as large here, "
-    "and none of the causes looked for is it."
-)
-OUTSIDE_EVERY_LABORATORY = (
-    "It is so large that it would be none of what is small even where all of that is twice as large."
-)
-_OF_ASSESSMENT = (UNUSUAL_BODY, OUTSIDE_TOLERANCES, OUTSIDE_EVERY_LABORATORY)
-NOISY_LABORATORY = (
-    "What no cause explains is {:.1f} times as large as where tolerances were learned, in most bands and channels "
-    "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
-)
-STANDING_ALONE = "standing alone tells no cause"
-"""Doubt of a session in which nothing but quiet standing could be compared: no cause was looked for."""
-ONLY_STANDING = (
-    "Only quiet standing could be compared with the whole body: sway, soft tissue and a plate's zero look alike there, "
-    "so this comparison names no cause that has a size. A few squats on the plates tell them apart."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +85,11 @@ def diagnose_trials(
     asked = family(effects)
     posed = problem(body, windows, prior=prior, chosen=asked)
     standing = not any(is_moving(case) for case, picks in zip(posed.cases, posed.spectrum.picks, strict=True) if picks)
-    naming, noise_note = _named_at_own_noise(posed, known, asked, search=search and not standing, standing=standing)
+    naming, scale = _named_at_own_noise(posed, known, asked, search=search and not standing, standing=standing)
     rows = detection_limits(visibility(naming.first, naming.first_causes), body, known.threshold)
+    why: dict[Reason, tuple[str, ...]] = {Reason.ONLY_STANDING: ()} if standing else {}
+    if scale > LOUDER:
+        why[Reason.LOUD_LABORATORY] = (f"{scale:.1f}",)
     bare = Diagnosis(
         verdict="nothing wrong",
         findings=(),
@@ -112,19 +97,17 @@ def diagnose_trials(
         unobservable=hidden(rows),
         limits=tuple(sorted(rows, key=_relative)),
         notes=posed.notes,
-        doubt=STANDING_ALONE if standing else "",
+        why=why,
         candidates=tuple(one.alias for one in naming.screening.suspects),
     )
-    found = assess(Examined(bare, naming))
-    notes = (*found.diagnosis.notes, *([ONLY_STANDING] if standing else []), *noise_note)
-    return replace(found, diagnosis=replace(found.diagnosis, notes=notes))
+    return assess(Examined(bare, naming))
 
 
 def _named_at_own_noise(
     posed: Problem, known: Tolerances, asked: Mapping[str, Effect], *, search: bool, standing: bool
-) -> tuple[Naming, tuple[str, ...]]:
-    """Return the naming with tolerances scaled to the noise of this laboratory, and a note on the scaling. The scale is
-    `residual_scale` of the residual left by a first naming; quiet ``standing`` does not determine it.
+) -> tuple[Naming, float]:
+    """Return the naming with tolerances scaled to the noise of this laboratory where it exceeds `LOUDER`, and the
+    scale: `residual_scale` of the residual left by a first naming; quiet ``standing`` does not determine it.
     """
     every = causes_of(posed, known, asked)
 
@@ -136,11 +119,9 @@ def _named_at_own_noise(
     naming = named(known)
     scale = 1.0 if standing else residual_scale(naming.found)
     if scale <= LOUDER:
-        return naming, ()
+        return naming, scale
     del naming  # no two of them at once: they are the largest that a diagnosis keeps
-    return named(replace(known, noise=scale**2 * known.noise, zeros=scale**2 * known.zeros)), (
-        NOISY_LABORATORY.format(scale),
-    )
+    return named(replace(known, noise=scale**2 * known.noise, zeros=scale**2 * known.zeros)), scale
 
 
 def assess(examined: Examined) -> Examined:
@@ -154,12 +135,12 @@ def assess(examined: Examined) -> Examined:
         for cause, r in zip(named, naming.accepted, strict=True)
     ]
     reportable = [pair for pair in every if _is_reportable(naming.found, pair[0])]
-    conflicts = _conflict_notes(naming.found, named=bool(reportable))
+    conflicts = _conflicts(naming.found, named=bool(reportable))
     outcome = verdict(len(reportable), largest_z(remaining), one.checks, in_conflict=bool(conflicts))
     doubted = only_resembled(reportable, named, known)
     if (
         outcome == "unexplained"
-        and conflicts == (UNUSUAL_BODY,)
+        and conflicts == (Reason.UNUSUAL_BODY,)
         and largest_z(remaining) <= LIMIT
         and len(doubted) < len(reportable)
     ):
@@ -172,15 +153,16 @@ def assess(examined: Examined) -> Examined:
         outcome = "named, incomplete" if trusted else "unexplained"
     if doubted and not (trusted or conflicts) and largest_z(remaining) <= LIMIT:
         bare = naming.bare
-        remaining, conflicts = adequacy(bare), (WITHOUT_RESEMBLED, *_conflict_notes(bare, named=False))
+        remaining, conflicts = adequacy(bare), (Reason.WITHOUT_RESEMBLED, *_conflicts(bare, named=False))
     if outcome == "named, complete" and any(row.z > LIMIT for row in remaining):
         outcome = "named, incomplete"
-    earlier = (note for note in one.notes if note not in _OF_ASSESSMENT and not is_doubt(note))
-    notes = (*conflicts, *doubt_notes(reportable, named, known))
+    left = [Reason.FORCES_LEFT] if largest_z(remaining) > LIMIT else []
+    why = {reason: about for reason, about in one.why.items() if reason not in OF_RESIDUAL}
+    why |= dict.fromkeys((*left, *conflicts), ()) | doubt_reasons(reportable, named, known)
     found = replace(
         one,
         verdict=outcome,
-        notes=(*earlier, *notes),
+        why=why,
         findings=tuple(finding for _, finding in trusted),
         resembles=tuple(finding for pair in reportable if pair not in trusted for finding in pair[1:]),
         tolerated=tuple(pair[1] for pair in every if pair not in reportable),
@@ -229,15 +211,19 @@ def without_name(examined: Examined, index: int) -> Examined:
     return replace(found, diagnosis=replace(found.diagnosis, resembles=resembles))
 
 
-def _conflict_notes(found: Model, *, named: bool) -> tuple[str, ...]:
-    """Say what had to be unlike people or laboratories for the rest to fit; where a cause is ``named``, it has to fit
-    without any excuse but how loud the session is.
+def _conflicts(found: Model, *, named: bool) -> tuple[Reason, ...]:
+    """Return what had to be unlike people or laboratories for the rest to fit; where a cause is ``named``, it has to
+    fit without any excuse but how loud the session is.
     """
     once = with_strides_once(found)
     body = (conflict_at_loudness(once) if named else conflict_at_own_noise(once)) > CONFLICT_LIMIT
     far = stretch(found)
-    said = (UNUSUAL_BODY, body), (OUTSIDE_TOLERANCES, far > STRETCHED), (OUTSIDE_EVERY_LABORATORY, far > TORN)
-    return tuple(note for note, holds in said if holds)
+    strange = {
+        Reason.UNUSUAL_BODY: body,
+        Reason.OUTSIDE_TOLERANCES: far > STRETCHED,
+        Reason.OUTSIDE_EVERY_LABORATORY: far > TORN,
+    }
+    return tuple(reason for reason, holds in strange.items() if holds)
 
 
 def _relative(row: Unobservable) -> float:

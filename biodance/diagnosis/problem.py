@@ -91,6 +91,12 @@ class Problem:
     shown: tuple[tuple[str, str], ...] = ()
 
     @property
+    def looked_at(self) -> frozenset[str]:
+        """Names of the trials that give rows."""
+        pairs = zip(self.cases, self.spectrum.picks, strict=True)
+        return frozenset(case.trial.name for case, picks in pairs if picks)
+
+    @property
     def wrench_rows(self) -> int:
         """Number of rows that come from the plates: six per coefficient."""
         return 6 * self.spectrum.band.size

@@ -13,6 +13,7 @@ from biodance.body.parts import JointError
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.reasons import DOUBTS
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck, effects
 from biodance.motion.ik.joint_unknowns import centre_sd
@@ -145,6 +146,7 @@ def by_checks(
         unobservable=left.unobservable if left else (),
         limits=left.limits if left else (),
         notes=(note, *(left.notes if left else ())),
+        why={reason: about for reason, about in left.why.items() if reason not in DOUBTS} if left else {},
     )
 
 

@@ -72,19 +72,26 @@ def with_transient_contact(naming: Naming, chosen: Chosen[Effect] = None) -> Nam
     leaves a smaller one; otherwise unchanged.
 
     The contact is tried in place of the named causes, if it is more probable than all of them, and in addition to them;
-    the naming with the smallest residual is kept.
+    the more probable of both namings is kept, under one noise: more causes leave less, true or not.
     """
-    if largest_z(adequacy(naming.found)) <= LIMIT:
+    worst = largest_z(adequacy(naming.found))
+    if worst <= LIMIT:
         return naming
-    best, bare = naming, naming.bare.under(naming.found.tolerances)
+    bare = naming.bare.under(naming.found.tolerances)
     steady = log_bayes_factor_between(naming.found, bare)
-    for base, accepted, than in ((naming.bare, (), steady), (naming.found, naming.accepted, 0.0)):
-        tried = _with(naming, base, accepted, chosen, than=than)
-        if tried is not None and largest_z(adequacy(tried.found)) < largest_z(adequacy(best.found)):
-            best = tried
-        if not naming.found.named:
-            break
-    return best
+    tried = [(_with(naming, naming.bare, (), chosen, than=steady), bare, 0.0)]
+    if naming.found.named:
+        tried += [(_with(naming, naming.found, naming.accepted, chosen, than=0.0), naming.found, steady)]
+    best = [(one, base, bayes) for one, base, bayes in tried if one and largest_z(adequacy(one.found)) < worst]
+    if len(best) > 1:
+        best.sort(key=lambda pair: -pair[2] - _log_bayes_factor_of_contact(pair[1], pair[0]))
+    return best[0][0] if best else naming
+
+
+def _log_bayes_factor_of_contact(base: Model, naming: Naming) -> float:
+    """Return the log Bayes factor of the contact named last, against the model ``base`` without it."""
+    sized = _best_size(base, naming.accepted[-1].suspects[0].effect)
+    return sized.log_bayes_factor if sized else -np.inf
 
 
 def _with(

@@ -16,10 +16,9 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import neighbours, poses
 from biodance.motion.track import track
 from biodance.records import Array, Markers
-from biodance.uncertainty.response import neighbours
 
 
 class MarkerMisplaced(Effect):

@@ -214,7 +214,7 @@ def usable(body: Body, fits: tuple[Fit, ...]) -> tuple[tuple[Fit, ...], Array, t
         )
     blind = [fit.name for fit in fits if not fit.use.any()]
     about = standing_point(some)
-    gated = tuple(believable(body, fit, about) for fit in some)
+    gated = tuple(believable(body, fit, standing_point((fit,))) for fit in some)
     notes = [f"Left out, no usable frame: {', '.join(blind)}."] if blind else []
     notes += [sentence for _, sentence in gated if sentence]
     used = tuple(fit for fit, _ in gated if fit.use.any())

@@ -15,6 +15,7 @@ from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.markers.still import standing_mass
+from biodance.lab.plates.told import Told
 from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
@@ -51,7 +52,7 @@ def inspect_paths(
     if not paths:
         raise BiodanceError("There is nothing to inspect: name files, or folders with recordings.")
     worn = read_marker_set(markers) if markers is not None else None
-    said: dict[Path, tuple[MarkerSet | None, str]] = {}
+    said: dict[Path, tuple[MarkerSet | None, Told, str]] = {}
     records = []
     for path in map(Path, paths):
         files = recordings_below(path) if path.is_dir() else [path]
@@ -60,22 +61,21 @@ def inspect_paths(
         for file in files:
             if tell:
                 tell(file.name)
-            if worn is not None:
-                records.append(inspect_file(file, subject=subject, markers=worn))
-                continue
-            chosen, fault = said.setdefault(file.parent, _said_in(file.parent))
-            record = inspect_file(file, subject=subject, markers=chosen)
+            chosen, told, fault = said.setdefault(file.parent, _said_in(file.parent))
+            record = inspect_file(file, subject=subject, markers=worn or chosen, told=told)
             records.append(_warned(record, fault) if fault else record)
     return records
 
 
-def _said_in(folder: Path) -> tuple[MarkerSet | None, str]:
-    """Return the marker set that the session.toml of a folder names, None without one, and what is wrong with it."""
+def _said_in(folder: Path) -> tuple[MarkerSet | None, Told, str]:
+    """Return the marker set that the session.toml of a folder names, None without one, what it says of the plates, and
+    what is wrong with it.
+    """
     try:
-        name = read_session_file(folder).marker_set
-        return (read_marker_set(name) if name else None), ""
+        said = read_session_file(folder)
+        return (read_marker_set(said.marker_set) if said.marker_set else None), said.told, ""
     except BiodanceError as error:
-        return None, str(error)
+        return None, Told(), str(error)
 
 
 def _warned(record: dict[str, Any], warning: str) -> dict[str, Any]:
@@ -86,7 +86,9 @@ def _warned(record: dict[str, Any], warning: str) -> dict[str, Any]:
     return {**record, "status": "warning", "reason": warnings[0], "warnings": warnings}
 
 
-def inspect_file(path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None) -> dict[str, Any]:
+def inspect_file(
+    path: str | Path, *, subject: str | None = None, markers: MarkerSet | None = None, told: Told | None = None
+) -> dict[str, Any]:
     """Return what is in one recording; a file that cannot be read gives the status "refused" and the reason.
 
     Keys: ``file``; ``status`` "ok", "warning" or "refused"; ``reason`` (None if ok); ``format``; ``frames``,
@@ -100,7 +102,7 @@ def inspect_file(path: str | Path, *, subject: str | None = None, markers: Marke
     """
     path = Path(path)
     try:
-        trial = read_trial(path, subject=subject, markers=markers)
+        trial = read_trial(path, subject=subject, markers=markers, told=told)
     except BiodanceError as error:
         return _refused(path, str(error))
     trial, guessed = _guessed(trial)

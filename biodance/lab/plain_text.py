@@ -1,10 +1,11 @@
 """Read text as laboratories write it: UTF-8 with or without a mark, UTF-16, or the Windows code page, with any line
-ends; and write files where none are yet.
+ends, decimal points or commas; and write files where none are yet.
 """
 
 import codecs
 import hashlib
 import math
+import re
 from pathlib import Path
 
 from biodance.errors import FileRefused
@@ -98,6 +99,23 @@ def decode(content: bytes, path: Path) -> str:
 def read_text(path: Path) -> str:
     """Return the text of a file; FileRefused if it is missing, empty or binary."""
     return decode(read_bytes(path), path)
+
+
+COMMAS_READ = "Numbers are written with decimal commas and were read so."
+_COMMA = re.compile(r"(?<![^\s;])([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)(?![^\s;])")
+_POINT = re.compile(r"(?<![^\s;])[-+]?\d*\.\d+(?:[eE][-+]?\d+)?(?![^\s;])")
+
+
+def with_points(text: str) -> tuple[str, bool]:
+    """Return the text with decimal commas turned into points, and whether it has any.
+
+    A comma is one where tabs, blanks or semicolons part the cells of a row, it is the only comma of its cell, and no
+    row with one has a decimal point as well (a comma may part thousands there, and the text stays as it is).
+    """
+    rows = [line for line in text.split("\n") if "," in line and _COMMA.search(line)]
+    if not rows or any(_POINT.search(row) or len(re.split(r"[\s;]+", row.strip())) < 2 for row in rows):
+        return text, False
+    return _COMMA.sub(r"\1.\2", text), True
 
 
 def cells(line: str) -> list[str]:

@@ -1,6 +1,7 @@
 """One door for every recording: look at its head, then at the extension, and hand the file to the reader of its
 format.
 
+Markers at (0, 0, 0) were not seen, whatever the format: no marker of a person lies on the origin to the last digit.
 Frames that carry the markers of the frame before to the last digit count as unseen, whatever the format: the recording
 hung, or a gap of all markers was filled by holding them. Nobody stands so still, noise alone moves markers more, and
 what hangs begins or ends abruptly: a computed movement that rests comes to it by and by.
@@ -14,7 +15,9 @@ import numpy as np
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.sets import MarkerSet, wearing
+from biodance.lab.plates.told import Told, as_told
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
 from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
@@ -54,6 +57,14 @@ def _abrupt(steps: Array, start: int, stop: int) -> bool:
         pair.size == 2 and pair[near] > _FELT and pair[near] >= _ABRUPT * pair[1 - near]
         for pair, near in ((before, 1), (behind, 0))
     )
+
+
+def without_origin(trial: Trial) -> Trial:
+    """Return the trial with markers unseen where they lie on the lab's origin, and how many samples in its history."""
+    if trial.markers is None:
+        return trial
+    xyz, said = unseen_at_origin(trial.markers.xyz)
+    return replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said)) if said else trial
 
 
 def without_frozen(trial: Trial) -> Trial:
@@ -142,6 +153,7 @@ def read_trial(
     subject: str | None = None,
     readers: Chosen[Reader] = None,
     markers: MarkerSet | None = None,
+    told: Told | None = None,
 ) -> Trial:
     """Read the trial in a file of any format.
 
@@ -160,6 +172,8 @@ def read_trial(
         Objects that read further formats (`biodance.lab.readers.Reader`), or names that limit the family to some.
     markers : MarkerSet, optional
         The set that was worn; by default the known set whose labels are there.
+    told : Told, optional
+        What the analyst says of the plates and of the body mass; it comes before what the file says.
 
     Returns
     -------
@@ -183,7 +197,7 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = without_frozen(reader.read(path, role=role, subject=subject))
+        trial = without_frozen(without_origin(_read(reader, path, role, subject, told)))
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise
@@ -192,6 +206,15 @@ def read_trial(
             f"{path}: a reader failed on it ({type(error).__name__}: {error}). Please report this file; others are "
             f"not affected."
         ) from error
+
+
+def _read(reader: Reader, path: Path, role: Role, subject: str | None, told: Told | None) -> Trial:
+    """Return the trial as its reader reads it, with what is ``told``."""
+    if told is None:
+        return reader.read(path, role=role, subject=subject)
+    if getattr(reader, "FOLLOWS_TOLD", False):
+        return reader.read(path, role=role, subject=subject, told=told)  # type: ignore[call-arg]
+    return as_told(reader.read(path, role=role, subject=subject), told)
 
 
 def _subject_data(head: bytes) -> str:

@@ -158,6 +158,15 @@ def chains(body: Body) -> tuple[tuple[int, ...], ...]:
     return tuple(found)
 
 
+def neighbours(body: Body) -> Array:
+    """Return (n, N + P) 1 where an anatomical joint (all its axes) is at an end of one of the `Body.links`."""
+    table = np.zeros((len(body.joints), len(body.links)))
+    for chain in chains(body):
+        child, above = body.joints[chain[-1]].segment, body.joints[chain[0]].parent
+        table[np.ix_(chain, (child, 0 if above < 0 else body.joints[above].segment))] = 1.0
+    return table
+
+
 def jacobian(body: Body, pose: Poses, segment: list[int], points: Array) -> tuple[Array, Array]:
     """Return (T, 3S, nv) of points (T, S, 3) on segments and of their turn, per unit of the lab-frame tangent [root
     place, root turn, angles].

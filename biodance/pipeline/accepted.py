@@ -69,11 +69,17 @@ def write_corrected(
 
 
 def _session_toml(session: Session) -> str:
-    """Return subject and roles of a session as its session.toml says them."""
+    """Return what is known of the subject (nothing guessed), a marker set of the user's own and the roles, as a
+    session.toml says them.
+    """
     subject = session.subject
     said = {"mass_kg": subject.mass, "height_m": subject.stature, "age": subject.age}
-    lines = ["[subject]", *(f"{key} = {float(x)}" for key, x in said.items() if np.isfinite(x))]
-    lines += [f'sex = "{subject.sex}"'] * (subject.sex in ("F", "M"))
+    guessed = {{"mass": "mass_kg", "stature": "height_m"}.get(what, what) for what in subject.guessed}
+    lines = ["[subject]", *(f"{key} = {float(x)}" for key, x in said.items() if np.isfinite(x) and key not in guessed)]
+    lines += [f'sex = "{subject.sex}"'] * (subject.sex in ("F", "M") and "sex" not in guessed)
+    own = {trial.marker_set for trial in session.trials if trial.marker_set.endswith(".toml")}
+    for file in own:
+        lines += ["", "[markers]", f"file = {json.dumps(str(Path(file).resolve()))}"]
     for trial in session.trials:
         lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"']
     return "\n".join(lines) + "\n"

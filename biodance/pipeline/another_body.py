@@ -7,13 +7,10 @@ from dataclasses import replace
 
 from biodance.body.body import Body
 from biodance.diagnosis.engine import Examined, without_name, without_names
+from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import unplaced_markers
 from biodance.effects.marker_misplaced import MarkerMisplaced
 
-_MORE_JOINTS = "the body moves at joints ({}) for which nobody has learned yet what is usual"
-"""Why what is left of a body with optional joints may be theirs."""
-_FEWER_JOINTS = "no marker shows what moves at {}, and the plates measure it all the same"
-"""Why what is left of a part of a body may be the forces of the other part."""
 _LEFT = ("unexplained", "named, incomplete")
 """Verdicts beside which something is left."""
 
@@ -23,10 +20,10 @@ def beside_another_body(examined: Examined, body: Body, joints: tuple[str, ...])
     its names as no more than what is resembled; ``joints`` are those that it moves at beside the usual ones.
     """
     doubt = _doubt(body, joints)
-    if not doubt or examined.diagnosis.verdict not in _LEFT or examined.diagnosis.doubt:
+    if not doubt or examined.diagnosis.verdict not in _LEFT or examined.diagnosis.doubted:
         return examined
     found = without_names(examined, examined.diagnosis.checks) if examined.diagnosis.findings else examined
-    return replace(found, diagnosis=replace(found.diagnosis, doubt=doubt))
+    return replace(found, diagnosis=replace(found.diagnosis, why={**found.diagnosis.why, **doubt}))
 
 
 def without_unplaced_markers(examined: Examined, body: Body) -> Examined:
@@ -42,9 +39,9 @@ def without_unplaced_markers(examined: Examined, body: Body) -> Examined:
         examined = without_name(examined, found)
 
 
-def _doubt(body: Body, joints: tuple[str, ...]) -> str:
-    """Return why what is left may be the body's own; "" where it moves as usual."""
+def _doubt(body: Body, joints: tuple[str, ...]) -> dict[Reason, tuple[str, ...]]:
+    """Return why what is left may be the body's own, with the joints; empty where it moves as usual."""
     hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
     if hidden:
-        return _FEWER_JOINTS.format(", ".join(name.replace("_", " ") for name in hidden))
-    return _MORE_JOINTS.format(", ".join(joints)) if joints else ""
+        return {Reason.UNSEEN_JOINTS: tuple(name.replace("_", " ") for name in hidden)}
+    return {Reason.UNDESCRIBED_JOINTS: joints} if joints else {}

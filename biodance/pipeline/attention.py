@@ -5,10 +5,9 @@ or outside its limit, strongest first. Page, terminal and JSON show the same rec
 from collections.abc import Sequence
 from dataclasses import replace
 
-from biodance.diagnosis.adequacy import LIMIT, largest_z
+from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
-from biodance.diagnosis.doubt import SEVERAL_CROSSTALKS, UNUSUAL_BODY, WITHOUT_RESEMBLED
-from biodance.diagnosis.engine import OUTSIDE_EVERY_LABORATORY, OUTSIDE_TOLERANCES
+from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.diagnosis.witness_evidence import WitnessEvidence
@@ -16,12 +15,11 @@ from biodance.effects import QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.finding_words import LOAD, alternatives_in_words, cause_of, explained, in_words, listed
 from biodance.pipeline.judged_trials import TOO_SHORT
+from biodance.pipeline.reason_words import STRANGE_IN_WORDS, doubt_in_words, reason_notes
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, Level, strongest_first, without_path
 
-_FITS = "the forces fit this body, but "
-"""Beginning of the doubt about a body whose residual is as without fault."""
 _FORCES = "force difference"
 """Beginning of the name of a check that compares a body with the plates, for however short a time."""
 _EMPTY = "empty_plate"
@@ -39,7 +37,6 @@ well enough.
 """
 _WEIGHT = "mass on the plates"
 """Beginning of the name of the check of the weight."""
-_ONLY_STOOD = "none of the movement could be judged, and standing still tells little"
 
 
 def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
@@ -54,9 +51,13 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, verdict="named, incomplete")
     if one.verdict == "nothing wrong" and result.doubts:
-        one = replace(one, verdict="unexplained", doubt=_FITS + _doubtful(result.doubts))
+        why = {Reason.BODY_DOUBTFUL: (_doubtful(result.doubts),), **one.why}
+        one = replace(one, verdict="unexplained", why=why)
     if one.verdict == "nothing wrong" and _only_standing_judged(result, judged):
-        one = replace(one, verdict="unexplained", doubt=_FITS + _ONLY_STOOD)
+        one = replace(one, verdict="unexplained", why={Reason.MOVEMENT_NOT_JUDGED: (), **one.why})
+    if one.verdict == "unexplained" and not (one.adequacy and any(row.seconds > 0 for row in judged)):
+        one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
+    one = replace(one, notes=(*one.notes, *reason_notes(one)))
     first = headline(one, amount(result, judged), judged, outside)
     return replace(one, judged=judged, attention=strongest_first([first, *session_attention(result, one.findings)]))
 
@@ -105,13 +106,14 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         text = f"Found: {names}. {_checks(one)}{more}{_explained(its_own)}{_sentence(beside)}"
     elif one.verdict == "nothing wrong":
         level = "warn" if beside else "note"
-        text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubt else (
+        text = f"Nothing wrong in what could be judged ({rests_on}){beside}." if beside or one.doubted else (
             f"Nothing wrong was found in {rests_on}. Faults below the sizes that it could have seen stay unseen."
         )  # fmt: skip
-    elif one.doubt.startswith(_FITS):
-        level, text = "warn", f"Cannot tell whether anything is wrong in {rests_on}: {one.doubt}."
-        text += (_MOVE if one.doubt.endswith(_ONLY_STOOD) else _MEND) + _sentence(beside)
-    elif not (one.adequacy and rests_on):
+    elif not {Reason.BODY_DOUBTFUL, Reason.MOVEMENT_NOT_JUDGED}.isdisjoint(one.why):
+        level, said = "warn", doubt_in_words(one)
+        text = f"Cannot tell whether anything is wrong in {rests_on}: the forces fit this body, but {said}."
+        text += (_MOVE if Reason.MOVEMENT_NOT_JUDGED in one.why else _MEND) + _sentence(beside)
+    elif Reason.NOT_COMPARED in one.why:
         partly = any(TOO_SHORT in row.why_not for row in judged) or any(
             check.what.startswith(_FORCES) for check in outside
         )
@@ -119,14 +121,10 @@ def headline(one: Diagnosis, rests_on: str, judged: tuple[Judged, ...], outside:
         level, where = "warn", f" in {rests_on}: no movement could be compared with a body{whole}" if rests_on else ""
         text = f"Cannot tell whether anything is wrong{where or ': nothing could be judged'}.{_witness_sentence(one)}"
         text += (_MOVE if where else _MEND) + _sentence(beside)
-    elif one.doubt:
-        level = "warn"
-        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}; but {one.doubt}.{_COMPARE}"
-        text += _sentence(beside)
-    elif _only_strange(one):
-        level = "warn"
-        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}.{like}{_COMPARE}"
-        text += _sentence(beside)
+    elif one.status is DiagnosisStatus.CANNOT_TELL:
+        level, doubt = "warn", doubt_in_words(one)
+        text = f"Cannot tell whether anything is wrong in {rests_on}: {_where(one)}"
+        text += f"{f'; but {doubt}.' if doubt else f'.{like}'}{_COMPARE}{_sentence(beside)}"
     else:
         text = f"Something is wrong in {rests_on} that no known cause explains: {_where(one)}.{_sentence(beside)}{like}"
     return Attention(level, text.strip(), about=ABOUT)
@@ -256,26 +254,12 @@ def _sentence(beside: str) -> str:
     return f" Also: {text}." if text else ""
 
 
-def _only_strange(one: Diagnosis) -> bool:
-    """Return whether nothing that is left speaks against "nothing wrong", only a strange body, a stretched tolerance or
-    a cause that is no more than resembled: how unlike the table people are, and how large what is small everywhere, was
-    learned from few laboratories, and clean sessions of others are beyond it.
-    """
-    strange = any(note in one.notes for note in (UNUSUAL_BODY, OUTSIDE_TOLERANCES, WITHOUT_RESEMBLED))
-    return strange and OUTSIDE_EVERY_LABORATORY not in one.notes and largest_z(one.adequacy) <= LIMIT
-
-
 def _where(one: Diagnosis) -> str:
     """Return where what is left is largest, with its size."""
     rows = [row for row in one.adequacy if row.matters and row.z > LIMIT] or list(one.adequacy)
-    if UNUSUAL_BODY in one.notes and largest_z(one.adequacy) <= LIMIT:
-        return f"w{UNUSUAL_BODY[1:-1]}"
-    if OUTSIDE_TOLERANCES in one.notes and largest_z(one.adequacy) <= LIMIT:
-        return "what the plates measured fits only if something that is small elsewhere is many times as large here"
-    if SEVERAL_CROSSTALKS in one.notes and largest_z(one.adequacy) <= LIMIT:
-        return "what the plates measured fits only several cross-talks at once, as of a plate that lies elsewhere"
-    if WITHOUT_RESEMBLED in one.notes and largest_z(one.adequacy) <= LIMIT:
-        return "nothing is left that matters and is unlike sessions without fault, with and without what it resembles"
+    strange = next((words for reason, words in STRANGE_IN_WORDS.items() if reason in one.why), "")
+    if strange and Reason.FORCES_LEFT not in one.why:
+        return strange
     if not rows:
         return "what is left is unlike sessions without fault"
     row = rows[0]
@@ -287,7 +271,7 @@ def _where(one: Diagnosis) -> str:
 
 def _incomplete(one: Diagnosis, rests_on: str) -> str:
     """Return what is more to say of a diagnosis that is not complete."""
-    if UNUSUAL_BODY in one.notes or largest_z(one.adequacy) > LIMIT:
+    if not {Reason.UNUSUAL_BODY, Reason.FORCES_LEFT}.isdisjoint(one.why):
         return f"Something more is wrong in {rests_on} that no known cause explains: {_where(one)}."
     return (
         f"Apart from that, {rests_on} look like a session without fault."

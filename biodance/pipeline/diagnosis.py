@@ -2,7 +2,7 @@
 and gains elsewhere.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -10,10 +10,11 @@ from biodance import display
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
-from biodance.diagnosis.engine import STANDING_ALONE, Examined, diagnose_trials, without_names
+from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
+from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
@@ -35,9 +36,6 @@ from biodance.uncertainty.tolerances import Tolerances, shipped
 
 if TYPE_CHECKING:
     import pandas as pd
-
-_FAR = "its markers move more on the body than where tolerances were learned"
-"""Why no cause is told from a movement whose soft tissue or joints err more than in null sessions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +129,7 @@ def diagnose_session(
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
-    measured = _measured(naming, found.diagnosis.doubt) if naming else {}
+    measured = _measured(naming, found.diagnosis.why) if naming else {}
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
@@ -139,17 +137,17 @@ def diagnose_session(
         whole, found = _with_mended_labels(whole, mended), replace(found, mended=result)
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
-    used = chosen_windows(result.trials) if found.examined else ()
+    looked_at = found.examined.naming.found.problem.looked_at if found.examined else frozenset[str]()
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
-    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, used)))
+    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, looked_at)))
 
 
-def _measured(naming: Naming, doubt: str) -> dict[tuple[str, str], SimulatedSize]:
-    """Return what the simulation tells of every cause, by effect and target, before any is named; nothing where its
-    ``doubt`` is that it looked for none, or that its tolerances do not hold.
+def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, str], SimulatedSize]:
+    """Return what the simulation tells of every cause, by effect and target, before any is named; nothing where it
+    looked for none, or its tolerances do not hold.
     """
-    if doubt in (STANDING_ALONE, _FAR):
+    if not {Reason.ONLY_STANDING, Reason.TOLERANCES_DO_NOT_HOLD}.isdisjoint(reasons):
         return {}
     return {
         one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
@@ -210,7 +208,8 @@ def _diagnosed(
             by_checks(checks, examined.diagnosis, suspicious=bool(examined.passes_threshold)), examined
         )
     if not own.believed:
-        examined = replace(examined, diagnosis=replace(examined.diagnosis, doubt=_FAR))
+        reasons = {**examined.diagnosis.why, Reason.TOLERANCES_DO_NOT_HOLD: ()}
+        examined = replace(examined, diagnosis=replace(examined.diagnosis, why=reasons))
         return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
     joints = tuple(one.name for one in result.shown_joints.gains if one.taken)
     examined = without_unplaced_markers(beside_another_body(examined, result.body, joints), result.body)

@@ -1,5 +1,7 @@
 """Which trials of a session the diagnosis looks at, and why it leaves others out."""
 
+from collections.abc import Set
+
 import numpy as np
 
 from biodance.body.body import Body
@@ -9,7 +11,7 @@ from biodance.effects import Case, QualityCheck, check_quality
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import Role
+from biodance.records import LeftOut, Role
 from biodance.records.attention import Judged
 
 _ENOUGH = 10.0
@@ -19,6 +21,7 @@ TOO_SHORT = f"no {SHORTEST_RUN:g} s in which the plates measure all ground conta
 _STATIC = "quiet standing tells nothing beside so much movement"
 _KEPT = "kept to measure what a finding gains"
 _NEVER = "it holds no measured ground contact"
+_DIFFERENT = "plates and motion differ by more than a wrong body can make of it, in most of what is measured."
 
 
 def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[TrialWindow, ...]:
@@ -42,7 +45,9 @@ def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
     """
     roles = FITTED_ROLES if windows(results, FITTED_ROLES) else KEPT_ROLES
     moving = windows(results, roles)
-    return moving if sum(window.seconds for window in moving) >= _ENOUGH else windows(results, ("static", *roles))
+    names = {window.trial.name for window in moving}
+    enough = sum(one.compared_s for one in results if one.name in names) >= _ENOUGH
+    return moving if enough else windows(results, ("static", *roles))
 
 
 def all_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
@@ -79,26 +84,33 @@ def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
     return {one.name: TOO_SHORT if one.name in seen else " ".join(one.reasons) for one in wanted}
 
 
-def judged_trials(result: SessionResult, used: tuple[TrialWindow, ...]) -> tuple[Judged, ...]:
-    """Return for every trial and refused file of a session how many seconds of it are judged in ``used``, or why it
-    is not.
+def judged_trials(result: SessionResult, looked_at: Set[str]) -> tuple[Judged, ...]:
+    """Return for every trial and refused file of a session how many seconds of it are judged (of those ``looked_at``),
+    or why it is not, and what every gate took out of it.
     """
-    seconds = {window.trial.name: window.seconds for window in used if window.seconds > 0}
     why = reasons_left_out(result.trials)
-    roles = {window.trial.role for window in used if window.trial.name in seconds}
+    roles = {one.trial.role for one in result.trials if one.name in looked_at}
     rows = []
     for one in result.trials:
         name, role = one.trial.name, one.trial.role
-        if name in seconds:
-            rows.append(Judged(name, seconds[name]))
+        if name in looked_at:
+            rows.append(Judged(name, one.compared_s, left_out=one.left_out))
         elif "fit" in roles and role not in ("fit", "static"):
-            rows.append(Judged(name, 0.0, _KEPT))
+            rows.append(Judged(name, 0.0, _KEPT, left_out=one.left_out))
         elif role == "static" and roles:
-            rows.append(Judged(name, 0.0, _STATIC))
+            rows.append(Judged(name, 0.0, _STATIC, left_out=one.left_out))
         else:
-            short = TOO_SHORT if one.comparison is not None and one.comparison.used.any() else _NEVER
-            rows.append(Judged(name, 0.0, why.get(name) or " ".join(one.reasons) or short, missed=True))
+            reason = why.get(name) or " ".join(one.reasons) or _no_frame(one)
+            rows.append(Judged(name, 0.0, reason, missed=True, left_out=one.left_out))
     return (*rows, *(Judged(file, 0.0, reason, missed=True) for file, reason in result.session.refused.items()))
+
+
+def _no_frame(one: TrialResult) -> str:
+    """Return why nothing of a trial that gives no other reason is looked at."""
+    if one.comparison is None or not one.comparison.used.any():
+        return _NEVER
+    largest = max(one.left_out, key=lambda reason: one.left_out[reason], default=LeftOut.SHORT_RUN)
+    return _DIFFERENT if largest is LeftOut.FORCES_DIFFER else TOO_SHORT
 
 
 def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
@@ -108,7 +120,8 @@ def identified_trials(result: SessionResult) -> tuple[Judged, ...]:
     for one in result.trials:
         if one.trial.role != "fit":
             continue
-        here = one.comparison if one.name in used else None
-        seconds = float(here.used.sum() * np.median(np.diff(here.time))) if here and here.time.size > 1 else 0.0
-        rows.append(Judged(one.name, seconds, "" if seconds else " ".join(one.reasons) or _NEVER, missed=not seconds))
+        left: dict[LeftOut, float] = {reason: s for reason, s in one.left_out.items() if reason != LeftOut.SHORT_RUN}
+        seconds = one.compared_s + one.left_out.get(LeftOut.SHORT_RUN, 0.0) if one.name in used else 0.0
+        why = "" if seconds > 0 else " ".join(one.reasons) or _no_frame(one)
+        rows.append(Judged(one.name, seconds, why, missed=bool(why), left_out=left))
     return tuple(rows)

@@ -62,14 +62,10 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     write_description(folder, session.folder.name)
     write_description(folder / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
     one = session.subject
-    row = {
-        "participant_id": f"sub-{subject}",
-        "sex": one.sex,
-        "age": one.age,
-        "height_m": one.stature,
-        "mass_kg": one.mass,
-    }
-    write_participants(folder, [row])
+    said = {"sex": one.sex, "age": one.age, "height_m": one.stature, "mass_kg": one.mass}
+    guessed = {"sex": "sex", "stature": "height_m", "mass": "mass_kg"}
+    unknown = dict.fromkeys((guessed[what] for what in one.guessed), None)
+    write_participants(folder, [{"participant_id": f"sub-{subject}", **said, **unknown}])
     for trial in raw:
         _recorded(trial, place, subject)
     moved = [found for found in trials if found.motion is not None]

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.optional_joints import marker_groups
 from biodance.cycles.movement import TrialMovement, trial_movement
+from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
+from biodance.identification.statistics import believable, standing_point
 from biodance.lab.c3d.subject import FileOutputs, read_outputs
 from biodance.lab.markers.gaps import MarkerGaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
@@ -20,8 +22,9 @@ from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_mar
 from biodance.motion.quiet_standing import quiet_standing
 from biodance.motion.regressor import compare, predict_wrench
 from biodance.motion.track import track
-from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison
-from biodance.records import Motion, Sip, Trial
+from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison, trial_fit
+from biodance.records import LeftOut, Motion, Sip, Trial, runs
+from biodance.records.left_out import seconds_left_out
 
 T = TypeVar("T")
 
@@ -198,7 +201,22 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
         standing = attempt(steps, "standing", lambda: quiet_standing(trial, contact.measured, body, motion))
     if contact is not None and body is not None and motion is not None:
         comparison = attempt(steps, "compare", lambda: compare_wrenches(trial, body, motion, contact))
-    return TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing, contact=contact)
+    done = TrialResult(trial, tuple(steps), read.gaps, fit, motion, comparison, standing, contact=contact)
+    return done if contact is None or body is None else replace(done, left_out=_left_out(done, contact, body))
+
+
+def _left_out(one: TrialResult, contact: Contact, body: Body) -> dict[LeftOut, float]:
+    """Return how many seconds each gate takes out of the comparison of the wrenches of a trial."""
+    if one.motion is None or one.motion.time.size < 2:
+        return {}
+    masks, fit = {**contact.left_out, LeftOut.POSTURE_OPEN: np.logical_not(one.motion.determined)}, trial_fit(one)
+    if fit is not None:
+        kept = believable(body, fit, standing_point((fit,)))[0].use
+        masks[LeftOut.FORCES_DIFFER] = fit.use & ~kept
+        masks[LeftOut.SHORT_RUN] = kept.copy()
+        for start, stop in runs(kept):
+            masks[LeftOut.SHORT_RUN][start:stop] = stop - start < SHORTEST_RUN * one.motion.rate
+    return seconds_left_out(masks, one.motion.rate)
 
 
 def movement_of(one: TrialResult, body: Body | None, sip: Sip | None) -> TrialMovement:

@@ -17,7 +17,7 @@ from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.contact.contact import Contact
 from biodance.motion.optional_joints import JointGain
 from biodance.motion.quiet_standing import QuietStanding
-from biodance.records import CHANNEL_TITLES, Array, Motion, Trial, Wrench
+from biodance.records import CHANNEL_TITLES, Array, LeftOut, Motion, Trial, Wrench
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -159,6 +159,7 @@ class TrialResult:
     standing: QuietStanding | None = None
     checks: tuple[Check, ...] = ()
     contact: Contact | None = None
+    left_out: Mapping[LeftOut, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         close = f", markers {1000 * self.fit.total_rms:.1f} mm from the body" if self.fit else ""
@@ -171,6 +172,15 @@ class TrialResult:
     def name(self) -> str:
         """Name of the trial."""
         return self.trial.name
+
+    @property
+    def compared_s(self) -> float:
+        """For how many seconds the measured wrench is compared with the simulated one, after all gates."""
+        found = self.comparison
+        if found is None or self.motion is None or self.motion.time.size < 2:
+            return 0.0
+        left = (self.left_out.get(reason, 0.0) for reason in (LeftOut.FORCES_DIFFER, LeftOut.SHORT_RUN))
+        return max(0.0, float(found.used.sum()) / self.motion.rate - sum(left))
 
     @property
     def gaps_percent(self) -> float:

@@ -20,9 +20,10 @@ from biodance.records.arrays import (
     runs,
     spread_frames,
 )
+from biodance.records.left_out import LeftOut
 from biodance.records.markers import Markers
 from biodance.records.motion import Motion
-from biodance.records.session import ROLES, Role, Session, Source, Trial
+from biodance.records.session import ROLES, Defect, Role, Session, Source, Trial
 from biodance.records.sip import Sip
 from biodance.records.subject import SIDES, FootSizes, Subject, side_in_name
 from biodance.records.wrench import Plate, Wrench
@@ -33,8 +34,10 @@ __all__ = [
     "ROLES",
     "SIDES",
     "Array",
+    "Defect",
     "FootSizes",
     "Index",
+    "LeftOut",
     "Markers",
     "Mask",
     "Motion",

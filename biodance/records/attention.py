@@ -1,8 +1,10 @@
 """What a person must see first, and what a verdict rests on: the same records on page, terminal and in JSON."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
+
+from biodance.records.left_out import LeftOut
 
 Level = Literal["fail", "warn", "note"]
 LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
@@ -30,13 +32,20 @@ class Attention:
 @dataclass(frozen=True)
 class Judged:
     """One trial (or refused file) and for how many ``seconds`` a verdict rests on it; ``why_not`` it does not, and
-    whether it was ``missed``: it should have been judged and could not.
+    whether it was ``missed``: it should have been judged and could not; ``left_out`` s that each reason took out of
+    the comparison with a body.
     """
 
     trial: str
     seconds: float
     why_not: str = ""
     missed: bool = False
+    left_out: Mapping[LeftOut, float] = field(default_factory=dict)
+
+    @property
+    def left_out_s(self) -> float:
+        """For how many seconds the trial could not be compared with a body, all reasons together."""
+        return sum(self.left_out.values(), 0.0)
 
 
 def strongest_first(sentences: Iterable[Attention]) -> tuple[Attention, ...]:

@@ -50,6 +50,31 @@ class Source:
     first_frame: int = 1
 
 
+@dataclass(frozen=True)
+class Defect:
+    """What was wrong in a recording and was left out when it was read.
+
+    Parameters
+    ----------
+    effect : str
+        The cause, by its name among the effects (``dead_plate``).
+    target : str
+        Where: a plate (``plate1``); "" for the whole recording.
+    text : str
+        What was seen and done, one plain sentence.
+    size : float
+        Of it, NaN = none.
+    unit : str
+        Of the size.
+    """
+
+    effect: str
+    target: str
+    text: str
+    size: float = float("nan")
+    unit: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """One recording: markers and/or force plates, with its role and its history.
@@ -76,6 +101,8 @@ class Trial:
         What a person should look at.
     settings : Settings
         What the analyst chose when it was read.
+    defects : tuple of Defect
+        What was wrong in the recording and was left out.
 
     Examples
     --------
@@ -93,6 +120,7 @@ class Trial:
     history: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     settings: Settings = USUAL
+    defects: tuple[Defect, ...] = ()
 
     def __post_init__(self) -> None:
         known_index("trial role", self.role, ROLES)
@@ -102,6 +130,7 @@ class Trial:
             measurements=MappingProxyType(dict(self.measurements)),
             history=tuple(self.history),
             warnings=tuple(self.warnings),
+            defects=tuple(self.defects),
         )
 
     @property

@@ -177,6 +177,10 @@ class Plate:
         (3,) N that the EMPTY plate read and that was subtracted, lab frame, as if it acted on the subject.
     placed : bool
         Whether the file says where the plate lies; False: ``corners`` only enclose the centres of pressure.
+    foot : {"", "left", "right"}
+        The foot that stands on it, where the analyst says so; "" = the one that the markers show.
+    columns : str
+        What a table calls the plate, by which it is known again there; "" where the file numbers its plates.
 
     Examples
     --------
@@ -191,6 +195,8 @@ class Plate:
     decisions: tuple[str, ...] = ()
     zero: Array = field(default_factory=lambda: np.zeros(3))
     placed: bool = True
+    foot: str = ""
+    columns: str = ""
 
     def __post_init__(self) -> None:
         assign(self, decisions=tuple(self.decisions))

@@ -17,7 +17,7 @@ from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.effects import Case
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.motion.contact.contact import Contact
-from biodance.motion.contact.footing import inside
+from biodance.motion.contact.over import inside
 from biodance.motion.contact.soles import Soles
 from biodance.records import SIDES, Array, Motion, Trial, Wrench, runs
 from biodance.registration.pose import Forces, FramePose
@@ -108,7 +108,7 @@ def _step(
     near = (frames > time[0] - 0.2) & (frames < time[-1] + 0.1)
     if not (np.isfinite(heel[near]).all() and np.isfinite(toe[near]).all()):
         return None
-    path = FootPath(SIDES[foot], frames, heel, toe)
+    path = FootPath(SIDES[foot], frames, heel, toe, toe)
     ahead, beside, apart = path.in_foot(time, place[:, :2])
     behind, front = path.at(time)
     forwards = (front - behind) * np.array([1.0, 1.0, 0.0]) / apart[:, None]

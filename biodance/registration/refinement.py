@@ -10,8 +10,8 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import TrialRefused
+from biodance.motion.contact.belts import dilate, speeds
 from biodance.motion.contact.contact import Contact, ground_contact
-from biodance.motion.contact.footing import dilate, speeds
 from biodance.motion.contact.soles import Soles, soles_from_body
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Mask, Motion, Trial, runs

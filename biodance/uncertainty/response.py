@@ -23,7 +23,7 @@ from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.motion.kinematics import Poses, SegmentMotion, chains, place_jacobian, poses, segment_motion, tangent_of
+from biodance.motion.kinematics import Poses, SegmentMotion, place_jacobian, poses, segment_motion, tangent_of
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew
 
@@ -273,15 +273,6 @@ class ErrorSource(ABC):
     @abstractmethod
     def squares(self, trial: Response) -> Array:
         """Return (K,) mean square distance (m²) between markers and model that every error leaves."""
-
-
-def neighbours(body: Body) -> Array:
-    """Return (n, N + P) 1 where an anatomical joint (all its axes) is at an end of one of the `Body.links`."""
-    table = np.zeros((len(body.joints), len(body.links)))
-    for chain in chains(body):
-        child, above = body.joints[chain[-1]].segment, body.joints[chain[0]].parent
-        table[np.ix_(chain, (child, 0 if above < 0 else body.joints[above].segment))] = 1.0
-    return table
 
 
 def mean_local(trial: Response, residual: Array, weight: Array) -> Array:

@@ -10,9 +10,10 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
 from biodance.motion.ik.compiled.derivatives import FOUR, add_products
+from biodance.motion.kinematics import neighbours
 from biodance.records import Array, Index
 from biodance.spatial import cross
-from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares, neighbours
+from biodance.uncertainty.response import ErrorSource, Response, mean_local, mean_squares
 
 
 class _WithAngles(ErrorSource):

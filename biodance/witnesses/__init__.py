@@ -22,12 +22,14 @@ from biodance.discovery import Chosen, Family
 from biodance.records import assign
 from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
 from biodance.witnesses._feet import FootPath
+from biodance.witnesses._landmark import LANDMARK, shift_per_sd
 from biodance.witnesses._recording import ONSET, FootStep, SeenTrial, recording
 
 _TIME = re.compile(r" (at|from) [-\d.]+ s")
 """When a step was, as its name says it."""
 
 __all__ = [
+    "LANDMARK",
     "ONSET",
     "Alteration",
     "FootPath",
@@ -38,6 +40,7 @@ __all__ = [
     "observe",
     "possible_causes",
     "recording",
+    "shift_per_sd",
     "traces",
     "turned_signs",
     "witnesses",
@@ -84,6 +87,14 @@ class Observation:
     def stride(self) -> str:
         """Witness, trial and what, but for the time: the same in all strides of one foot on one plate in a trial."""
         return f"{self.witness}, {self.trial}, {_TIME.sub('', self.what)}"
+
+    @property
+    def contact(self) -> tuple[str, str]:
+        """Trial and time of the step, or the trial alone, that it was seen in: observations of one contact err
+        together in ways that nobody foresees.
+        """
+        when = _TIME.search(self.what)
+        return self.trial, when[0] if when else ""
 
     @property
     def expected_sd(self) -> float:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.still import is_still
-from biodance.motion.contact.footing import inside
+from biodance.motion.contact.over import inside
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
@@ -26,6 +26,8 @@ _RAISED = 0.05
 """m that a plate stands out above the lowest one: what sticks out over a stair hangs in the air."""
 _BESIDE = 0.04
 """m: a sole that reaches farther over the edge is half beside the plate: its centre of pressure says nothing."""
+_OUTLINE = 0.01
+"""m to which a sole is known that is drawn from two markers."""
 _STILL, _EVEN = 0.5, 0.35
 """m/s against the ground or belt of a foot that stands; the other one swings faster."""
 _BELT = 0.25
@@ -140,6 +142,18 @@ class SeenTrial:
         parts = [(self.plate(step.plate).wrench.time, self.stance(step)) for step in self.steps]
         return float(sum(time[part.stop - 1] - time[part.start] for time, part in parts if part is not None))
 
+    @cached_property
+    def whole(self) -> bool:
+        """Whether nothing of the feet of somebody who stands still reaches beyond the plates, as far as it is known
+        where feet and plates are: what stands beside them is not measured.
+        """
+        plates = [plate for plate in self.trial.plates if plate.placed]
+        if not self.feet or len(plates) < len(self.trial.plates):
+            return True
+        soles = [foot.outline(np.linspace(foot.time[0], foot.time[-1], 10)) for foot in self.feet]
+        within = [np.max([inside(plate, sole) for plate in plates], axis=0).min(axis=1) for sole in soles]
+        return all(not np.nanmedian(one) < -_OUTLINE for one in within if np.isfinite(one).any())
+
     def pelvis_at(self, time: Array) -> Array:
         """Return where (n, 3) m the pelvis is at times (n,) s; NaN where it was not seen."""
         if self.pelvis is None or self.trial.markers is None:
@@ -150,9 +164,10 @@ class SeenTrial:
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
 
-    ``mass`` kg as declared, NaN = unknown. Without foot markers or plates there are no steps; nothing is raised.
+    ``mass`` kg as declared, NaN = unknown. Feet and pelvis are found by the trial's marker set, and by the known ones
+    where it has none. Without foot markers or plates there are no steps; nothing is raised.
     """
-    known = tuple(dict.fromkeys(filter(None, (trial.marker_set, *FAMILY.files()))))
+    known = (trial.marker_set,) if trial.marker_set else tuple(FAMILY.files())
     feet = feet_of(trial.markers, known)
     lowest = min((plate.height for plate in trial.plates), default=0.0)
     steps = tuple(
@@ -225,7 +240,7 @@ def _stands(foot: FootPath, time: Array) -> bool:
     known = np.isfinite(off)
     if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
         return False
-    heights = zip(foot.at(time), (foot.heel, foot.toe), strict=True)
+    heights = zip(foot.at(time), (foot.heel, foot.front), strict=True)
     flat = all(np.nanmedian(path[:, 2]) < np.nanmin(whole[:, 2]) + _FLAT for path, whole in heights)
     return bool(np.linalg.norm(drift) < _STILL or flat)
 
@@ -238,16 +253,16 @@ def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:
         near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
         slow = np.linalg.norm(path_at(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
-        lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.toe[:, 2]))
+        lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.front[:, 2]))
     return bool((near & slow & (low < lowest + _LIFTED)).mean() >= 0.1)
 
 
 def _heel_first(foot: FootPath, first: float) -> bool:
-    """Return whether the toe is farther above its standing height than the heel when a contact begins."""
+    """Return whether the front is farther above its standing height than the heel when a contact begins."""
     at = np.array([first])
-    heel, toe = (path[0, 2] for path in foot.at(at))
+    heel, front = (path[0, 2] for path in foot.at(at))
     flat = np.abs(foot.velocity[:, 2]) < 0.1
     if not flat.any():
         return False
-    rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.toe)]
-    return bool(toe - rest[1] > heel - rest[0] + 0.01)
+    rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.front)]
+    return bool(front - rest[1] > heel - rest[0] + 0.01)

@@ -1,12 +1,13 @@
 """Where the pressure lies across the foot that stands there: under the heel early, near the foot's line in the middle.
 
-One ordinary step shows the plate's place across the foot; right and left feet, and steps in other directions, tell it
-from where the laboratory puts its toe marker. A turned plate shows as a slant of the pressure's path.
+One ordinary step shows the plate's place across the foot; the same foot on two plates, and steps in other directions,
+tell it from where the laboratory puts its toe marker. A turned plate shows as a slant of the pressure's path.
 """
 
 from collections.abc import Mapping
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._landmark import landmark_across
 from biodance.witnesses._stance import by_step, step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
@@ -15,17 +16,15 @@ ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "late": (0.60, 0.80, -0.006, 0.0055, 0.0070, 0.0040),
 }
 """Start and stop of the phase as shares of stance; expected m outwards; m sd of one step, of one foot of one person, of
-one laboratory's markers."""
+one laboratory's people beside its markers (`_landmark`)."""
 _RUNNING: Mapping[str, tuple[float, ...]] = {"running": (0.30, 0.60, -0.001, 0.0080, 0.0090, 0.0050)}
 """The same of a foot that runs: the pressure stays near the foot's line, too (De Cock et al. 2008,
 doi:10.1016/j.gaitpost.2007.08.013); no public running was there to learn from, so all is twice as uncertain.
 """
-_TOES_FIRST = 0.025
-"""m: on stairs, and where toes come down first, persons tread on the outer side (35 mm in the one laboratory seen)."""
 
 
 class FootAcross(Witness):
-    """Centre of pressure outwards of the line from the heel to the toe marker, m, by phase of stance."""
+    """Centre of pressure outwards of the line from the heel marker to the front of the foot, m, by phase of stance."""
 
     name = "foot_across"
     sees = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
@@ -49,19 +48,16 @@ class FootAcross(Witness):
         part, found = step_course(seen, step, running=running), []
         if part is None:
             return []
-        counts = seen.foot(step.side).centred
+        side = seen.foot(step.side)
         for phase, (start, stop, expected, sd, foot, laboratory) in phases.items():
             if phase == "early" and (step.beside or not step.heel_first):
                 continue
-            norms = {f"person {step.side} foot across, {phase}": foot}
-            if step.heel_first or running:
-                norms[f"laboratory markers across, {phase}"] = laboratory
-            else:
-                norms["laboratory toes first, across"] = _TOES_FIRST
+            norms = {f"person {step.side} foot across, {phase}": foot, f"laboratory across, {phase}": laboratory}
+            norms |= landmark_across(side, phase)
             value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
             what = f"{step.name}, {phase}"
             found.append(
-                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, counts)
+                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred)
             )
         return found
 

@@ -1,9 +1,11 @@
 """Where the pressure lies along the foot that stands there: ahead of the heel marker early, under the toes late.
 
-Coarser than across the foot, and it scales with the foot; steps in different directions tell plate from foot.
+Coarser than across the foot, and it scales with the foot; steps in different directions, and the same foot on two
+plates, tell plate from foot.
 """
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
+from biodance.witnesses._landmark import landmark_along
 from biodance.witnesses._stance import by_step, step_course
 
 ALONG_PHASES = {
@@ -34,17 +36,18 @@ class FootAlong(Witness):
         part, found = step_course(seen, step), []
         if part is None:
             return []
-        counts = seen.foot(step.side).centred
+        side = seen.foot(step.side)
         phases = {"middle": _MIDDLE} if step.beside else ALONG_PHASES
         for phase, (start, stop, share, sd, person, laboratory) in phases.items():
             norms = {
                 f"person foot along, {phase}": person * part.length,
-                f"laboratory markers along, {phase}": laboratory * part.length,
+                f"laboratory along, {phase}": laboratory * part.length,
+                **landmark_along(side),
             }
             value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(
-                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, counts)
+                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred)
             )
         return found
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from biodance.motion.contact.footing import distance_to_hull
+from biodance.motion.contact.over import distance_to_hull
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import by_step
 

@@ -23,13 +23,13 @@ class StandingForce(Witness):
 
     name = "standing_force"
     sees = ("body_mass", "plate_gain", "plate_offset")
-    needs = "Standing still on the plates with both feet."
+    needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
         """Return one mass and two horizontal forces of a trial in which somebody stands still."""
         plates = [p for p in seen.trial.plates if p.wrench.time.size and p.wrench.force[:, 2].mean() > ONSET]
-        if not plates or not seen.still or not seen.mass > 0:
+        if not plates or not seen.still or not seen.whole or not seen.mass > 0:
             return ()
         total, weight = seen.total, seen.mass * seen.trial.settings.gravity
         force = mean_force(total.force)

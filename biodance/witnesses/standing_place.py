@@ -26,7 +26,7 @@ class StandingPlace(Witness):
 
     name = "standing_place"
     sees = ("plate_position", "plate_crosstalk")
-    needs = "Standing still on the plates with both feet; pelvis and foot markers."
+    needs = "Standing still with both feet wholly on the plates; pelvis and foot markers."
     source = (
         "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
     )
@@ -35,7 +35,7 @@ class StandingPlace(Witness):
         """Return two observations of a trial in which somebody stands still on the plates."""
         trial = seen.trial
         plates = [plate for plate in trial.plates if plate.wrench.time.size]
-        if not plates or not seen.still or seen.pelvis is None or not seen.feet:
+        if not plates or not seen.still or not seen.whole or seen.pelvis is None or not seen.feet:
             return ()
         force = mean_force(seen.total.force)[2]
         ahead = _facing(seen)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import walks
+from biodance.witnesses._stance import steps, walks
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
@@ -149,7 +149,8 @@ def _mass(seen: SeenTrial, means: Array) -> float:
 
 def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
     """Return steps that follow one another with different feet, the second before the first has ended."""
-    for first, last in zip(seen.steps, seen.steps[1:], strict=False):
+    swung = [step for step in seen.steps if steps(seen, step)]
+    for first, last in zip(swung, swung[1:], strict=False):
         if first.side != last.side and first.plate != last.plate and _one_clock(seen):
             yield first, last
 

@@ -43,7 +43,7 @@ def plate_evidence(
     mass: float = float("nan"),
     conditions: Mapping[str, Mapping[str, str]] | None = None,
 ) -> tuple[PlateEvidence, ...]:
-    """Return what the trials of a visit say of their plates.
+    """Return what the trials of a visit say of their plates; nothing of the place of one that no file places.
 
     Parameters
     ----------
@@ -69,12 +69,17 @@ def plate_evidence(
             labels = {plate.name: plate_label(plate) for plate in trial.plates}
             seen = recording(trial, mass=mass)
             found += of_steps(seen, visit, kind, labels)
-            rows += step_rows(seen, labels)
+            unknown = {labels[plate.name] for plate in trial.plates if not plate.placed}
+            rows += [row for row in step_rows(seen, labels) if row.plate not in unknown]
     return (*found, *placed(rows, visit, _TOGETHER))
 
 
 def plate_label(plate: Plate) -> str:
-    """Return by what a plate is known again in other visits: its name and its sides, ``plate1 (460 x 500 mm)``."""
+    """Return by what a plate is known again in other visits: its name and its sides, ``plate1 (460 x 500 mm)``; in a
+    table that does not place it, its columns: what encloses the pressure of a trial is another rectangle in the next.
+    """
+    if plate.columns:
+        return f"{plate.columns} (place unknown)"
     if not np.isfinite(plate.corners).all():
         return f"{plate.name} (of unknown size)"
     sides = sorted(np.linalg.norm(plate.corners[[1, 2]] - plate.corners[:2], axis=1).tolist())

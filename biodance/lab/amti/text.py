@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.plain_text import read_text
+from biodance.lab.plain_text import COMMAS_READ, read_text, with_points
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.plates.wrench import DEEPEST
@@ -43,7 +43,8 @@ def parse_amti_text(path: Path) -> AmtiText:
     FileRefused
         The text is no table of numbers, or something needed is said neither in it nor in the TOML file beside it.
     """
-    header, values = _table(read_text(path), path)
+    text, commas = with_points(read_text(path))
+    header, values = _table(text, path)
     beside = path.with_suffix(".toml")
     given = _given(beside) if beside.is_file() else {}
     columns, units = _header_columns(header)
@@ -65,7 +66,7 @@ def parse_amti_text(path: Path) -> AmtiText:
     force, moment = plain_unit(str(force_unit)), plain_unit(str(moment_unit))
     load, rate = values[:, order] * ([FORCE[force]] * 3 + [MOMENT[moment]] * 3), float(rate or 0)
     told = f"Columns, units and size as in {beside.name}: " if given else "Columns and units as in the header line: "
-    said = (f"{told}{', '.join(columns)}; {force_unit}, {moment_unit}; {rate:g} Hz.",)
+    said = (f"{told}{', '.join(columns)}; {force_unit}, {moment_unit}; {rate:g} Hz.", *[COMMAS_READ] * commas)
     assert size is not None
     depth, on_plate = float(given.get("sensor_depth_m", 0.0)), given.get("acts_on", "plate") == "plate"
     return AmtiText(load, rate, (float(size[0]), float(size[1])), depth, on_plate, said)

@@ -6,7 +6,6 @@ one, the file is refused.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -15,12 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
-
-_CLIPPED = 65535
-"""What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group
-or LONG_FRAMES.
-"""
+from biodance.lab.c3d.declared import (
+    distinct,
+    first_frame_number,
+    frame_counts,
+    frames_held,
+    is_clipped,
+    parameter_numbers,
+    scalar,
+    texts,
+)
+from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters
 
 
 @dataclass(frozen=True)
@@ -51,34 +55,8 @@ class Layout:
     remarks: tuple[str, ...] = ()
 
 
-def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
-    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if
-    missing or text.
-    """
-    family = _continued(parameters, group, name)
-    arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
-    return np.concatenate(arrays) if arrays else np.empty(0)
-
-
-def texts(parameters: Parameters, group: str, name: str) -> list[str]:
-    """Return a text parameter, continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or numeric."""
-    return [text for value in _continued(parameters, group, name) if isinstance(value, list) for text in value]
-
-
-def _continued(parameters: Parameters, group: str, name: str) -> list[ParameterValue]:
-    """Return the values of a parameter and of its continuations NAME2, NAME3 ..."""
-    found = parameters.get(group, {})
-    return [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
-
-
-def scalar(parameters: Parameters, group: str, name: str) -> float:
-    """Return the first number of a parameter; NaN if it is missing, empty or not finite."""
-    values = parameter_numbers(parameters, group, name)
-    return float(values[0]) if values.size and np.isfinite(values[0]) else math.nan
-
-
-def read_layout(size: int, header: Header, parameters: Parameters, where: str) -> Layout:
-    """Return the layout of the data section of a file of ``size`` bytes.
+def read_layout(content: bytes, header: Header, parameters: Parameters, where: str) -> Layout:
+    """Return the layout of the data section of a file of these bytes.
 
     Raises
     ------
@@ -89,12 +67,13 @@ def read_layout(size: int, header: Header, parameters: Parameters, where: str) -
     notes: list[str] = []
     scale = _agreed_scale(header, parameters, where)
     floating = scale < 0
-    start, points, channels, samples, frames = _counts(size, header, parameters, 4 if floating else 2, where, notes)
+    remarks: list[str] = []
+    word = 4 if floating else 2
+    start, points, channels, samples, frames = _counts(content, header, parameters, word, where, notes, remarks)
     rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
     unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))
-    remarks: list[str] = []
     gain, offset = _analog_transform(parameters, channels, unsigned, where, remarks)
-    first = _first_frame(header, parameters, frames, notes)
+    first = first_frame_number(header, parameters, frames, notes)
     kind = (floating, unsigned, abs(scale), rate, analog_rate, gain, offset)
     return Layout(
         header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes), tuple(remarks)
@@ -113,34 +92,6 @@ def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
     return header.scale
 
 
-def _distinct(values: Iterable[float]) -> list[int]:
-    """Return the distinct finite values >= 0 as integers, in order."""
-    return list(dict.fromkeys(int(v) for v in values if math.isfinite(v) and v >= 0))
-
-
-def _unsigned(value: float) -> float:
-    """Return a frame number that was stored in 16 bits without its sign."""
-    return value + 65536 if -32768 <= value < 0 else value
-
-
-def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
-    """Return all frame counts that the file declares: header, TRIAL fields, POINT:FRAMES, POINT:LONG_FRAMES."""
-    declared = [float(header.last_frame - header.first_frame + 1) if header.last_frame < _CLIPPED else math.nan]
-    first, last = (_field(parameters, name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
-    declared.append(last - first + 1)
-    declared += [_unsigned(scalar(parameters, "POINT", name)) for name in ("FRAMES", "LONG_FRAMES")]
-    counts = [count for count in _distinct(declared) if count > 0]
-    return [count for count in counts if count != _CLIPPED] or counts
-
-
-def _field(parameters: Parameters, name: str) -> float:
-    """Return a frame number stored as two 16-bit words (low, high) in the TRIAL group; NaN if it is missing."""
-    words = parameter_numbers(parameters, "TRIAL", name)
-    if words.size == 0 or not np.all(np.isfinite(words)):
-        return math.nan
-    return _unsigned(float(words[0])) + 65536 * (_unsigned(float(words[1])) if words.size > 1 else 0)
-
-
 def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:
     """Return the pairs (channels, samples per frame) that at most one statement of the file contradicts."""
     used, values, samples = scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
@@ -150,8 +101,8 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
         return [(0, 0)]
     if values == 0 and samples == 0:  # a header that is silent on analog data
         return [(0, 0), (int(used), int(ratio))] if math.isfinite(ratio) else [(0, 0)]
-    channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
-    rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
+    channels = distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
+    rows = distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
 
     def against(c: int, s: int) -> int:
         contradicted = (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio))
@@ -164,14 +115,25 @@ def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, in
 
 
 def _counts(
-    size: int, header: Header, parameters: Parameters, word: int, where: str, notes: list[str]
+    content: bytes,
+    header: Header,
+    parameters: Parameters,
+    word: int,
+    where: str,
+    notes: list[str],
+    remarks: list[str],
 ) -> tuple[int, int, int, int, int]:
-    """Return (start byte, points, channels, samples per frame, frames); ``notes`` say what was overruled."""
-    starts = _distinct(
+    """Return (start byte, points, channels, samples per frame, frames); ``notes`` say what was overruled, ``remarks``
+    that nothing but the file's length tells the frames.
+    """
+    starts = distinct(
         [header.data_start, (scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
     )
-    points = _distinct([header.points, scalar(parameters, "POINT", "USED")])
-    analog, frames = _analog_counts(header, parameters), _frame_counts(header, parameters)
+    points = distinct([header.points, scalar(parameters, "POINT", "USED")])
+    analog, frames, size = _analog_counts(header, parameters), frame_counts(header, parameters), len(content)
+    if not frames and is_clipped(header, parameters) and len(starts) == len(points) == len(analog) == 1:
+        width = word * (4 * points[0] + analog[0][0] * analog[0][1])
+        frames = [frames_held(content, starts[0], width, header.first_frame, remarks)]
     readings = [(s, p, c, n, f) for s, p, (c, n), f in product(starts, points, analog, frames)]
 
     def rest(reading: tuple[int, int, int, int, int]) -> int:
@@ -190,7 +152,7 @@ def _counts(
         held = max(0, size - start) // (word * (4 * p + c * n))
         raise FileRefused(f"{where}: the file is cut off: it declares {f} frames and holds {held}. {RESAVE}")
     full = [reading for reading in fitting if rest(reading) < C3D_BLOCK]
-    if len(readings) == 1 and (full or _all_told_twice(header, parameters)):
+    if len(readings) == 1 and (full or remarks or _all_told_twice(header, parameters)):
         return fitting[0]
     if len(full) != 1:
         raise FileRefused(
@@ -258,25 +220,3 @@ def _analog_transform(
 def _listed(channels: list[str]) -> str:
     """Return channel numbers for a sentence, each once."""
     return f"channels {', '.join(dict.fromkeys(channels))}"
-
-
-def _first_frame(header: Header, parameters: Parameters, frames: int, notes: list[str]) -> int:
-    """Return the number of the first frame."""
-    first = _field(parameters, "ACTUAL_START_FIELD")
-    spans = header.last_frame - header.first_frame + 1 == frames or header.last_frame == _CLIPPED
-    if int(first) == header.first_frame if math.isfinite(first) else spans:
-        return header.first_frame
-    if not math.isfinite(first):
-        notes.append(
-            f"The first frame's number, {header.first_frame} in the header, does not fit its last one, "
-            f"{header.last_frame}."
-        )
-        return header.first_frame
-    last = _field(parameters, "ACTUAL_END_FIELD")
-    if last - first + 1 == frames and header.last_frame - header.first_frame + 1 != frames:
-        return int(first)
-    notes.append(
-        f"The first frame is {header.first_frame} in the header and {first:g} in TRIAL:ACTUAL_START_FIELD; the "
-        f"header's is taken."
-    )
-    return header.first_frame

@@ -23,6 +23,13 @@ _SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
 _RESAVE_IT = "export the trial again from the recording software."
+_NEEDED = {
+    "POINT": {"USED", "SCALE", "RATE", "DATA_START", "FRAMES", "LONG_FRAMES", "LABELS", "UNITS"},
+    "ANALOG": {"USED", "LABELS", "GEN_SCALE", "SCALE", "OFFSET", "UNITS", "FORMAT", "RATE"},
+    "TRIAL": {"ACTUAL_START_FIELD", "ACTUAL_END_FIELD"},
+    "FORCE_PLATFORM": {"USED", "TYPE", "CHANNEL", "CORNERS", "ORIGIN", "ZERO", "CAL_MATRIX", "MATRIX_STORE"},
+}
+"""Parameters without which numbers or plates of a file cannot be read; all others may be left out."""
 RESAVE = "Export the trial again from the recording software, or copy the file again from its source."
 
 ParameterValue = NDArray[Any] | list[str]
@@ -111,8 +118,10 @@ def read_header(content: bytes, where: str) -> Header:
     return Header(processor, words[1], words[2], words[3], words[4], scale, words[9], rate, start, data_start)
 
 
-def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
-    """Return all parameters as ``parameters[GROUP][NAME]``, names in upper case as the standard asks.
+def read_parameters(content: bytes, header: Header, where: str) -> tuple[Parameters, tuple[str, ...]]:
+    """Return all parameters as ``parameters[GROUP][NAME]``, names in upper case as the standard asks, and a sentence
+    for each that stands there twice with different values and was left out, because nothing needs it; of two of which
+    one is zero, as what was never measured is, the other is kept.
 
     Text is a list of stripped strings; numbers are arrays with the dimensions of the file, first dimension fastest (so
     that ``CORNERS[i, j, plate]`` is coordinate i of corner j), a scalar has shape (1,).
@@ -121,6 +130,7 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
     ------
     FileRefused
         A record reaches beyond the section, overlaps the next one or skips bytes: a damaged section cannot be trusted.
+        A parameter that is needed (counts, scales, labels, plates) stands there twice with different values.
     """
     names: dict[int, str] = {}
     records: list[tuple[int, str, ParameterValue]] = []
@@ -134,15 +144,30 @@ def read_parameters(content: bytes, header: Header, where: str) -> Parameters:
         if at == 0:
             break
     groups: dict[str, dict[str, ParameterValue]] = {name: {} for name in names.values()}
-    for group, name, value in records:
-        known = groups.setdefault(names.get(group, f"GROUP {group}"), {})
-        if name in known and not _same(known[name], value):
-            raise FileRefused(
-                f"{where}: parameter {names.get(group, group)}:{name} is there twice, as {_short(known[name])} and as "
-                f"{_short(value)}. Delete the wrong one, for example in Mokka or with ezc3d, or {_RESAVE_IT}"
-            )
-        known[name] = value
-    return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()})
+    twice: dict[tuple[str, str], list[ParameterValue]] = {}
+    for number, name, value in records:
+        group_name = names.get(number, f"GROUP {number}")
+        first = groups.setdefault(group_name, {}).setdefault(name, value)
+        if not _same(first, value):
+            twice.setdefault((group_name, name), [first]).append(value)
+    said = [_left_out(groups[group], group, name, values, where) for (group, name), values in twice.items()]
+    return MappingProxyType({name: MappingProxyType(group) for name, group in groups.items()}), tuple(said)
+
+
+def _left_out(known: dict[str, ParameterValue], group: str, name: str, values: list[ParameterValue], where: str) -> str:
+    """Settle in its group, which is ``known``, a parameter with several ``values``; return the sentence about it."""
+    twice = f"parameter {group}:{name} is there twice, as {' and as '.join(map(_short, values))}"
+    if name.rstrip("0123456789") in _NEEDED.get(group, ()):
+        raise FileRefused(
+            f"{where}: {twice}, and the file cannot be read without it. Delete the wrong one, for example in Mokka or "
+            f"with ezc3d, or {_RESAVE_IT}"
+        )
+    filled = [value for value in values if isinstance(value, list) or value.any()]
+    del known[name]
+    if len(filled) == 1:
+        known[name] = filled[0]
+        return f"{twice[0].upper()}{twice[1:]}; the one that is not zero was taken."
+    return f"{twice[0].upper()}{twice[1:]}; neither was taken, and the file is read without it."
 
 
 def _same(one: ParameterValue, other: ParameterValue) -> bool:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.layout import Layout, parameter_numbers, read_layout, texts
+from biodance.lab.c3d.declared import parameter_numbers, texts
+from biodance.lab.c3d.layout import Layout, read_layout
 from biodance.lab.c3d.numbers import Numbers, read_numbers, second_opinion
 from biodance.lab.c3d.parameters import RESAVE, Parameters, read_header, read_parameters
 from biodance.lab.plain_text import refuse_huge
@@ -156,7 +157,8 @@ class RawC3d:
     ``analog_rate`` Hz, NaN = none; ``analog_units`` (C) as written ("" = none). ``parameters[GROUP][NAME]`` (upper
     case): arrays with the file's own dimensions, first dimension fastest, or lists of stripped strings. ``reader``
     names who agrees on the numbers, "biodance" or "biodance, ezc3d"; ``warnings`` say where the file contradicts itself
-    or smells of a misread, and how that was decided.
+    or smells of a misread, and how that was decided, ``history`` what was decided without doubt; ``layout`` says how
+    the numbers were stored (None = by no file).
     """
 
     path: Path
@@ -172,6 +174,8 @@ class RawC3d:
     analog_rate: float
     parameters: Parameters
     warnings: tuple[str, ...] = ()
+    history: tuple[str, ...] = ()
+    layout: Layout | None = None
 
 
 def read_raw(path: str | Path) -> RawC3d:
@@ -184,7 +188,7 @@ def read_raw(path: str | Path) -> RawC3d:
         The path is no readable file, no C3D file, or a C3D file that is damaged, cut off or contradicts itself.
     """
     path = Path(path)
-    content, parameters, layout = open_c3d(path)
+    content, parameters, layout, history = open_c3d(path)
     points, analog = numbers = read_numbers(content, layout)
     labels = point_labels(parameters, layout)
     smells, reader = _smells(numbers, labels, layout, parameters, path)
@@ -204,11 +208,14 @@ def read_raw(path: str | Path) -> RawC3d:
         analog_rate=layout.analog_rate,
         parameters=parameters,
         warnings=(*layout.notes, *layout.remarks, *smells),
+        history=history,
+        layout=layout,
     )
 
 
-def open_c3d(path: Path) -> tuple[bytes, Parameters, Layout]:
-    """Return the bytes of a C3D file, its parameters and where its numbers lie, none of which is read yet.
+def open_c3d(path: Path) -> tuple[bytes, Parameters, Layout, tuple[str, ...]]:
+    """Return the bytes of a C3D file, its parameters, where its numbers lie, none of which is read yet, and what was
+    decided about parameters that stand there twice.
 
     Raises
     ------
@@ -227,8 +234,23 @@ def open_c3d(path: Path) -> tuple[bytes, Parameters, Layout]:
     except OSError as error:
         raise FileRefused(f"{path}: the file cannot be opened ({error.strerror}). Check the permissions.") from error
     header = read_header(content, str(path))
-    parameters = read_parameters(content, header, str(path))
-    return content, parameters, read_layout(len(content), header, parameters, str(path))
+    parameters, said = read_parameters(content, header, str(path))
+    poses = segment_poses(parameters)
+    if poses and not header.points and not header.analog_values:
+        raise FileRefused(f"{path}: {poses}")
+    return content, parameters, read_layout(content, header, parameters, str(path)), said
+
+
+def segment_poses(parameters: Parameters) -> str:
+    """Return the sentence about the segment poses (group ROTATION) of a file without points; "" where it has none."""
+    poses = [label.removesuffix("_4X4") for label in texts(parameters, "ROTATION", "LABELS") if label]
+    if not poses:
+        return ""
+    return (
+        f"holds {len(poses)} segment poses ({', '.join(poses[:4])} ...), as markerless systems (Theia) write them, and "
+        f"no markers. The file is sound, but biodance follows markers and does not read poses: record markers, or let "
+        f"the markerless software write its landmarks as points, too."
+    )
 
 
 def point_labels(parameters: Parameters, layout: Layout) -> tuple[str, ...]:

@@ -6,17 +6,23 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.layout import parameter_numbers, texts
+from biodance.lab.c3d.declared import parameter_numbers, texts
 from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.markers.sets import recognise
 from biodance.lab.markers.upright import axis_to_head, clear_axis
 from biodance.lab.plates.corners import is_rectangle
-from biodance.records import Array, Markers, Plate, Role, Source, Trial, spread_frames
+from biodance.lab.plates.told import Told
+from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
+
+if TYPE_CHECKING:
+    from biodance.lab.plates.read import ReadPlates
+
 
 _CLOUD = 6
 """Markers that show how a body lies."""
@@ -24,7 +30,7 @@ _LONGER = 1.5
 _AXES = "XYZ"
 
 
-def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None) -> Trial:
+def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None, told: Told | None = None) -> Trial:
     """Read one C3D file: markers in m with z up (time starts at 0), force plates as ground-on-subject wrenches about
     the lab origin.
 
@@ -36,6 +42,8 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
         What it is for.
     subject : str, optional
         Chooses the person by the prefix of the labels, needed only where a file holds several.
+    told : Told, optional
+        What the analyst says of the plates and of the body mass; it comes before what the file says.
 
     Returns
     -------
@@ -64,14 +72,25 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     labels = marker_labels(raw, subject=subject)
     markers, metres, turn, axes_history, axes_warnings = _in_lab(raw, labels)
     measures, measure_history, measure_warnings = measurements_of(raw)
-    plates, plate_warnings = _plates(raw, metres, turn, markers, measures.get("Bodymass"))
+    told = told or Told()
+    mass = measures.get("Bodymass") if told.mass is None else told.mass
+    read = _plates(raw, metres, turn, markers, mass, told)
     marker_set = recognise(markers.names) if markers is not None else None
     rate, worn = raw.rate if markers is not None else math.nan, marker_set.name if marker_set is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
-    history = (*_read(raw), *labels.history, *axes_history, *_gaps(markers), *measure_history)
+    history = (
+        *_read(raw),
+        *raw.history,
+        *labels.history,
+        *axes_history,
+        *_gaps(markers),
+        *measure_history,
+        *read.history,
+    )
     odd = (*raw.warnings, *([poses] if poses else []), *labels.warnings, *axes_warnings)
-    warnings = (*odd, *measure_warnings, *plate_warnings)
-    return Trial(raw.path.stem, role, markers, plates, source, worn, measures, history, warnings)
+    warnings = (*odd, *measure_warnings, *read.warnings)
+    seen = (raw.path.stem, role, markers, read.plates, source, worn, measures)
+    return Trial(*seen, history, warnings, defects=read.defects)
 
 
 def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array]:
@@ -128,11 +147,11 @@ def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None
 
 
 def _plates(
-    raw: RawC3d, metres: float, turn: Array, markers: Markers | None, body_mass: float | None
-) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
+    raw: RawC3d, metres: float, turn: Array, markers: Markers | None, mass: float | None, told: Told
+) -> "ReadPlates":
     from biodance.lab.plates.read import read_plates
 
-    return read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=body_mass)
+    return read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=mass, told=told.plates)
 
 
 def _gaps(markers: Markers | None) -> tuple[str, ...]:

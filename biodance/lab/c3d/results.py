@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.c3d.layout import texts
+from biodance.lab.c3d.declared import texts
 from biodance.lab.c3d.parameters import read_header, text_rows
 from biodance.lab.c3d.raw import RawC3d, read_raw, split_label
 from biodance.lab.c3d.read import file_frame

@@ -10,10 +10,19 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
+from biodance.lab.c3d.declared import parameter_numbers, texts
+from biodance.lab.c3d.layout import Layout
 from biodance.lab.c3d.numbers import read_numbers
 from biodance.lab.c3d.parameters import Parameters
-from biodance.lab.c3d.raw import RawC3d, model_outputs, open_c3d, point_labels, split_label, unlabelled
+from biodance.lab.c3d.raw import (
+    RawC3d,
+    model_outputs,
+    open_c3d,
+    point_labels,
+    segment_poses,
+    split_label,
+    unlabelled,
+)
 from biodance.records import Array
 
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
@@ -48,7 +57,7 @@ def read_outputs(path: str | Path) -> FileOutputs:
     FileRefused
         The file cannot be read.
     """
-    content, parameters, layout = open_c3d(Path(path))
+    content, parameters, layout, _ = open_c3d(Path(path))
     listed = {split_label(label)[1] for label in texts(parameters, "POINT", "ANGLES")}
     unit = next(iter(texts(parameters, "POINT", "ANGLE_UNITS")), "deg")
     degrees = 180 / np.pi if unit.lower().startswith("rad") else 1.0
@@ -99,14 +108,8 @@ def poses_only(raw: RawC3d) -> str:
     """Return the sentence for a file with segment poses (group ROTATION) and no point that was ever seen; "" for
     others.
     """
-    poses = [label.removesuffix("_4X4") for label in texts(raw.parameters, "ROTATION", "LABELS") if label]
-    if not poses or np.isfinite(raw.points).any():
-        return ""
-    return (
-        f"{raw.path}: holds the poses of {len(poses)} segments ({', '.join(poses[:4])} ...), as markerless systems "
-        f"(Theia) write them, and no points. Markers are followed here, not poses: export the trial with its landmarks "
-        f"as points, or record markers."
-    )
+    said = "" if np.isfinite(raw.points).any() else segment_poses(raw.parameters)
+    return f"{raw.path}: {said}" if said else ""
 
 
 def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:

@@ -52,6 +52,17 @@ class Gap:
     how: str = ""
 
 
+def unseen_at_origin(xyz: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return samples (T, K, 3) with NaN where all three coordinates are exactly zero, as many programs write a marker
+    that was not seen, and how many there were in a sentence; nothing is said where there were none.
+    """
+    zero = (xyz == 0).all(axis=2)
+    if not zero.any():
+        return xyz, ()
+    said = f"{int(zero.sum())} of {zero.size} samples of markers are (0, 0, 0): they count as not seen."
+    return np.where(zero[:, :, None], np.nan, xyz), (said,)
+
+
 def report_gaps(markers: Markers) -> tuple[MarkerGaps, ...]:
     """Return percentage and longest gap of every marker, in the order of ``markers``."""
     step = 1 / markers.rate if markers.time.size > 1 else 0.0

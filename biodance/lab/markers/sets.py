@@ -156,19 +156,24 @@ def recognise(labels: Iterable[str], *, candidates: Iterable[MarkerSet] | None =
 
 
 def wearing(trial: Trial, marker_set: MarkerSet) -> Trial:
-    """Return the trial with its markers taken as ``marker_set``, which a person chose; with a warning where required
-    labels are absent.
+    """Return the trial with its markers taken as ``marker_set``, which a person chose, whatever set its labels are
+    like; of no set where none of the labels that the set requires is there.
+
+    A moving trial need not have all of them (medial markers are taken off); a warning says which are missing from a
+    static one, and from one that more labels of another set are in.
     """
-    if trial.markers is None or trial.marker_set == marker_set.name:
+    if trial.markers is None:
         return trial
     match, title = marker_set.match(trial.markers.names), marker_set.title
     absent = [label for label in marker_set.required if label not in match]
-    if absent:
-        lacking = f"{', '.join(absent)} missing. Choose the set that was worn."
-        return replace(trial, warnings=(*trial.warnings, f"The markers are not of the chosen set {title}: {lacking}"))
-    count = f"{len(match)} of its {len(marker_set.labels)} labels are there."
-    said = f"The markers were read as the set {title}: {count}"
-    return replace(trial, marker_set=marker_set.name, history=(*trial.history, said))
+    worn = len(absent) < len(marker_set.required)
+    other = len(read_marker_set(trial.marker_set).match(trial.markers.names)) if trial.marker_set else 0
+    said = f"The markers were read as the set {title}: {len(match)} of its {len(marker_set.labels)} labels are there."
+    doubt = f"The markers are not of the chosen set {title}: {', '.join(absent)} missing. Choose the set that was worn."
+    doubtful = bool(absent) and (trial.role == "static" or not worn or other > len(match))
+    history = (*trial.history, said) if worn else trial.history
+    warnings = (*trial.warnings, doubt) if doubtful else trial.warnings
+    return replace(trial, marker_set=marker_set.name if worn else "", history=history, warnings=warnings)
 
 
 def canonical(markers: Markers, marker_set: MarkerSet) -> Markers:

@@ -1,9 +1,9 @@
 """Tables over time as text: the .mot and .sto files of OpenSim (forces of the plates, joint coordinates, anything with
 a time column).
 
-A name, header rows ``key=value`` up to ``endheader``, a row of column labels (the first is ``time``), then numbers.
-What the columns mean is not said in the file, apart from ``inDegrees``; ``ground_forces.py`` knows the columns of force
-plates.
+A name, header rows ``key=value`` up to ``endheader``, a row of column labels (the first is ``time``), then numbers, one
+a cell or three (``x,y,z``, DataType=Vec3). What the columns mean is not said in the file, apart from ``inDegrees``;
+``plate_columns.py`` knows the columns of force plates.
 """
 
 import re
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
-from biodance.lab.plain_text import cells, parse_number, read_text, write_new
+from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text, with_points, write_new
 from biodance.records import Array, assign, frozen_array
 
 _LONGEST_HEADER = 200
@@ -25,8 +25,9 @@ class TimeTable:
     """A table over time: ``columns`` (C) labels, ``time`` (T,) s, ``values`` (T, C) in the file's units.
 
     ``in_degrees`` says that rotational coordinates are in degrees (the file's ``inDegrees``); which columns are
-    rotations only the model knows. ``name`` is the first row of the file. ``warnings`` are what a person should look
-    at.
+    rotations only the model knows. ``name`` is the first row of the file. ``vectors`` are the labels whose cells hold
+    three numbers: their columns end in _x, _y, _z. ``history`` says how it was read, ``warnings`` are what a person
+    should look at.
     """
 
     name: str
@@ -34,12 +35,14 @@ class TimeTable:
     time: Array
     values: Array
     in_degrees: bool = False
+    vectors: tuple[str, ...] = ()
+    history: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         time = frozen_array(self.time, (None,), "Table.time")
         values = frozen_array(self.values, (time.size, len(self.columns)), "Table.values")
-        assign(self, columns=tuple(self.columns), time=time, values=values, warnings=tuple(self.warnings))
+        assign(self, columns=tuple(self.columns), time=time, values=values)
         if len(set(self.columns)) != len(self.columns):
             raise BiodanceError(f"Table {self.name}: a column label occurs twice in {', '.join(self.columns)}.")
 
@@ -62,11 +65,12 @@ def read_mot(path: str | Path) -> TimeTable:
     Raises
     ------
     FileRefused
-        No ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, a time that does not
-        increase.
+        No ``endheader``, no ``time`` column, rows of the wrong length, a cell that is no number, or several of which
+        there are not three, a time that does not increase.
     """
     path = Path(path)
-    header, labels, body = _parts(path)
+    parts = _parts(path)
+    header, labels, body = parts.header, parts.labels, parts.body
     if not body:
         raise FileRefused(f"{path}: holds no row of numbers. Export it again.")
     table = np.array([_numbers(row, len(labels), f"{path}, row {i}") for i, row in body])
@@ -78,14 +82,16 @@ def read_mot(path: str | Path) -> TimeTable:
     differs = announced.isdigit() and int(announced) != len(table)
     warnings = (f"The header announces {announced} rows, the file holds {len(table)}.",) if differs else ()
     degrees = header.get("indegrees", "no").lower() in ("yes", "true", "1")
-    return TimeTable(header.get("", path.stem), tuple(labels[1:]), time, table[:, 1:], degrees, warnings)
+    return TimeTable(
+        header.get("", path.stem), parts.labels[1:], time, table[:, 1:], degrees, parts.vectors, parts.history, warnings
+    )
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
     """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a
     wrong header.
     """
-    return tuple(_parts(Path(path))[1][1:])
+    return _parts(Path(path)).labels[1:]
 
 
 def write_mot(path: str | Path, table: TimeTable) -> Path:
@@ -113,9 +119,22 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
     return write_new(path, ("\n".join([*header, *rows]) + "\n").encode())
 
 
-def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]]:
-    """Return the header (lower-case keys, the table's name under ""), the column labels and the numbered rows."""
-    rows = read_text(path).splitlines()
+@dataclass(frozen=True)
+class _Parts:
+    """``header`` (lower-case keys, the table's name under ""), column ``labels``, numbered rows (``body``), ``vectors``
+    as of a `TimeTable`, ``history``.
+    """
+
+    header: dict[str, str]
+    labels: tuple[str, ...]
+    body: list[tuple[int, str]]
+    vectors: tuple[str, ...]
+    history: tuple[str, ...]
+
+
+def _parts(path: Path) -> _Parts:
+    text, commas = with_points(read_text(path))
+    rows = text.splitlines()
     start = next((i for i, row in enumerate(rows[:_LONGEST_HEADER]) if row.strip().lower() == "endheader"), None)
     if start is None:
         raise FileRefused(f"{path}: has no row 'endheader', so it is not a .mot or .sto file. Export it again.")
@@ -128,11 +147,45 @@ def _parts(path: Path) -> tuple[dict[str, str], list[str], list[tuple[int, str]]
     if not labels or labels[0].lower() != "time":
         found = repr(labels[0]) if labels else "missing"
         raise FileRefused(f"{path}: the first column is {found}, it must be 'time'. Export it again.")
-    return header, labels, body[1:]
+    vectors = _vectors(labels, body[1][1], path) if len(body) > 1 else ()
+    history = [*[COMMAS_READ] * commas, *[VECTORS_READ] * bool(vectors)]
+    return _Parts(header, _columns(labels, vectors), body[1:], vectors, tuple(history))
+
+
+VECTORS_READ = "Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z."
+_BRACKETS = str.maketrans("", "", "~()[] ")
+"""What some writers put around the numbers of one cell."""
+_OF_PLATE = {"f": "v", "p": "p", "m": "m"}
+"""Force, point and moment of plate N are fN, pN, mN in the tables that OpenSim makes of C3D files."""
+
+
+def _vectors(labels: list[str], row: str, path: Path) -> tuple[str, ...]:
+    """Return the labels whose cells hold three numbers."""
+    sizes = {label: cell.count(",") + 1 for label, cell in zip(labels, cells(row), strict=False)}
+    odd = next((label for label, size in sizes.items() if size not in (1, 3)), None)
+    if odd is not None:
+        what = "orientations (quaternions)" if sizes[odd] == 4 else "quantities"
+        raise FileRefused(
+            f"{path}: holds {what} of {sizes[odd]} numbers in a cell ({odd}). Markers (.trc), plates and tables of "
+            f"single numbers are read; export these."
+        )
+    return tuple(label for label, size in sizes.items() if size == 3)
+
+
+def _columns(labels: list[str], vectors: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the labels of single numbers."""
+    found: list[str] = []
+    for label in labels:
+        plate = re.fullmatch(r"([fpm])(\d+)", label)
+        stem = f"ground_force_{plate[2]}_{_OF_PLATE[plate[1]]}" if plate else f"{label}_"
+        found += [f"{stem}{axis}" for axis in "xyz"] if label in vectors else [label]
+    return tuple(found)
 
 
 def _numbers(row: str, width: int, where: str) -> list[float]:
     found = cells(row)
+    if any("," in cell for cell in found):
+        found = [part for cell in found for part in cell.translate(_BRACKETS).split(",")]
     found = found[:-1] if len(found) == width + 1 and not found[-1] else found
     if len(found) != width:
         raise FileRefused(f"{where}: holds {len(found)} cells, {width} are expected. Export the file again.")

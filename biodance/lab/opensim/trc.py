@@ -13,10 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused, TrialRefused
+from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.sets import recognise
 from biodance.lab.markers.upright import axis_to_head
 from biodance.lab.opensim import Y_UP_TO_Z_UP
-from biodance.lab.plain_text import cells, decode, parse_number, read_bytes, sha256, write_new
+from biodance.lab.plain_text import (
+    COMMAS_READ,
+    cells,
+    decode,
+    parse_number,
+    read_bytes,
+    sha256,
+    with_points,
+    write_new,
+)
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -41,7 +51,8 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     """
     path = Path(path)
     content = read_bytes(path)
-    rows = decode(content, path).splitlines()
+    text, commas = with_points(decode(content, path))
+    rows = text.splitlines()
     header = _header(rows, path)
     names, warnings = _labels(rows, path)
     numbers, raw_time, values = _table(rows, len(names), path)
@@ -56,8 +67,8 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
         )
     time, xyz, timing = _equal_steps(numbers, raw_time, values * _METRES[unit], _rate(header, path), path)
     warnings += timing
-    history = [f"Coordinates were read in {unit} and turned into m."]
-    xyz[(xyz == 0).all(axis=2)] = np.nan
+    xyz, unseen = unseen_at_origin(xyz)
+    history = [*[COMMAS_READ] * commas, f"Coordinates were read in {unit} and turned into m.", *unseen]
     if _is_z_up(Markers(tuple(names), time, xyz)):
         warnings.append(
             "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."

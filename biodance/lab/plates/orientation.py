@@ -14,6 +14,7 @@ from biodance.records import Array, Markers, Plate, Wrench
 
 _LOW = 0.15  # m above the surface: markers of a standing foot, ankle included
 BESIDE = 0.15  # m beyond the edge
+_AROUND = 0.05  # m by which a sole reaches beyond its markers
 _FRAMES = 200
 _QUARTER_TURNS = [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((0, 1), (-1, 0), (0, -1))]
 """Rotations about z by 90, 180 and 270 degrees."""
@@ -36,6 +37,17 @@ def distance_to_feet(cop: Array, xyz: Array, corners: Array) -> float | None:
     point, near, feet = cop[told], near[told], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[told]
     first = np.argsort(~near, axis=1, kind="stable")[:, : near.sum(axis=1).max(), None]
     return float(np.median(_distances_between(point, np.take_along_axis(feet, first, axis=1))))
+
+
+def feet_on(corners: Array, markers: Markers) -> bool:
+    """Return whether a marker as low as a standing foot's is ever over the plate of ``corners`` (4, 3) m, or no more
+    than 0.05 m beside it.
+    """
+    axes, centre = plate_axes(corners), corners.mean(axis=0)
+    x, y, _ = (axes[:, k] @ np.moveaxis(markers.xyz - centre, -1, 0).reshape(3, -1) for k in range(3))
+    low = np.abs(markers.xyz[..., 2] - centre[2]).ravel() <= _LOW
+    half = half_sides(corners) + _AROUND
+    return bool((low & (np.abs(x) <= half[0]) & (np.abs(y) <= half[1])).any())
 
 
 def _distances_between(points: Array, feet: Array) -> Array:
@@ -91,7 +103,8 @@ def oriented(
     value.setflags(write=False)  # the record keeps it without a copy
     decisions = (*reading.decisions, *moved, *said, _sign_said(sign, otherwise))
     zero = (sign or otherwise) * axes @ reading.empty
-    plate = Plate(reading.plate.name, reading.plate.type, reading.corners, Wrench(time, value), decisions, zero)
+    where = (reading.plate.name, reading.plate.type, reading.corners)
+    plate = Plate(*where, Wrench(time, value), decisions, zero, foot=reading.plate.told.foot)
     return plate, (*reading.warnings, *(f"Plate {reading.plate.number}: {one}" for one in moved), *warnings)
 
 

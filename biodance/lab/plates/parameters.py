@@ -11,11 +11,14 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
+from biodance.lab.plates.told import NOTHING_TOLD, ToldPlate
 from biodance.records import Array
 from biodance.settings import STANDARD_GRAVITY
 
-_CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
+CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
 _MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
+_USUAL_TYPE = 2
+"""Three forces and three moments: taken for channels of which nothing else is said."""
 _NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
 
@@ -25,7 +28,8 @@ class PlateParameters:
 
     ``number`` from 1; ``type`` the C3D TYPE; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3);
     ``origin`` (3,); ``calibration`` (rows, columns), output = calibration @ channels, None where the type has none;
-    ``polynomial`` (2, 6) Kistler's correction of the centre of pressure in millimetres, None = none.
+    ``polynomial`` (2, 6) Kistler's correction of the centre of pressure in millimetres, None = none. ``told`` what of
+    it session.toml says; its sensitivity gives N and N·m, the file's matrix N and N times the file's length unit.
     """
 
     number: int
@@ -35,6 +39,7 @@ class PlateParameters:
     origin: Array
     calibration: Array | None = None
     polynomial: Array | None = None
+    told: ToldPlate = NOTHING_TOLD
 
     @property
     def name(self) -> str:
@@ -81,31 +86,55 @@ def zero_window(raw: RawC3d) -> tuple[int, int] | None:
     return int(values[0]), int(values[1])
 
 
-def plate_parameters(raw: RawC3d, number: int) -> PlateParameters:
-    """Return the parameters of plate ``number`` (from 1).
+def plate_parameters(
+    raw: RawC3d, number: int, told: ToldPlate | None = None, *, metres: float = 1.0, turn: Array | None = None
+) -> PlateParameters:
+    """Return the parameters of plate ``number`` (from 1), those that are ``told`` instead of the file's.
+
+    ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the lab (None = they are the
+    same): what is told in m and in the lab frame is turned into them.
 
     Raises
     ------
     TrialRefused
         An entry is missing, not finite or out of range, or the TYPE is not one that can be computed.
     """
-    group = raw.parameters.get("FORCE_PLATFORM", {})
-    kind = int(_of_plate(group, "TYPE", (), number))
-    if kind not in _CHANNELS_OF_TYPE:
-        known = ", ".join(map(str, _CHANNELS_OF_TYPE))
+    told, group = told or NOTHING_TOLD, raw.parameters.get("FORCE_PLATFORM", {})
+    described = _numbers(group, "TYPE").size >= number
+    kind = told.type or (int(_of_plate(group, "TYPE", (), number)) if described or not told.channels else _USUAL_TYPE)
+    if kind not in CHANNELS_OF_TYPE:
+        known = ", ".join(map(str, CHANNELS_OF_TYPE))
         what = f" ({_NAMES_OF_TYPE[kind]})" if kind in _NAMES_OF_TYPE else ""
         raise TrialRefused(f"TYPE {kind}{what} cannot be computed; legal are {known}. Export the plate as TYPE 2.")
     rows = _numbers(group, "CHANNEL", keep=True).shape[:1]
-    listed = _of_plate(group, "CHANNEL", rows or (0,), number)
+    listed = told.columns(raw.analog_labels) if told.channels else _of_plate(group, "CHANNEL", rows or (0,), number)
     channels = _channels(listed, kind, raw.analog.shape[1])
-    corners, origin = _of_plate(group, "CORNERS", (3, 4), number).T, _of_plate(group, "ORIGIN", (3,), number)
-    maker = (_calibration(group, kind, number), _polynomial(group, number))
-    return PlateParameters(number, kind, channels, corners, origin, *maker)
+    if told.corners is None:
+        corners = _of_plate(group, "CORNERS", (3, 4), number).T
+    else:
+        corners = told.corners @ (np.eye(3) if turn is None else turn) / metres
+    if told.origin is None:
+        origin = _of_plate(group, "ORIGIN", (3,), number) if described else np.zeros(3)
+    else:
+        origin = told.origin / metres
+    calibration = _calibration(group, kind, number) if told.sensitivity is None else told.sensitivity
+    _refuse_shape(calibration, kind)
+    return PlateParameters(number, kind, channels, corners, origin, calibration, _polynomial(group, number), told)
+
+
+def _refuse_shape(calibration: Array | None, kind: int) -> None:
+    """Refuse a sensitivity that does not fit the TYPE of the plate."""
+    need = (len(CONTENT[kind]), CHANNELS_OF_TYPE[kind])
+    if calibration is not None and calibration.shape != need:
+        raise TrialRefused(
+            f"the sensitivity in session.toml has the shape {calibration.shape}, TYPE {kind} needs {need}. Give the "
+            f"type, too, or correct it."
+        )
 
 
 def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
     """Return the columns (from 0) of the plate's channels after checking their number and range."""
-    need = _CHANNELS_OF_TYPE[kind]
+    need = CHANNELS_OF_TYPE[kind]
     if listed.size < need:
         raise TrialRefused(
             f"CHANNEL lists {listed.size} channels, TYPE {kind} needs {need}. Correct the file or export it again."
@@ -176,7 +205,8 @@ def _of_plate(group: Mapping[str, Any], name: str, shape: tuple[int, ...], numbe
     if not size or block.size < size:
         held = values.size // size if size else 0
         raise TrialRefused(
-            f"FORCE_PLATFORM:{name} holds values for {held} plates, none for this one. Correct USED or export it again."
+            f"FORCE_PLATFORM:{name} holds values for {held} plates, none for this one. Correct USED, export it again, "
+            f"or say it in session.toml: [plates.plate{number}]."
         )
     if not np.isfinite(block).all():
         raise TrialRefused(
@@ -220,6 +250,9 @@ def unit_factors(
     """
     content = CONTENT[plate.type]
     assumed = {"F": 1.0, "M": metres, "L": metres}
+    if plate.told.sensitivity is not None:
+        given = f"Units: channels in {_listed(units)} times the sensitivity in session.toml give N and N·m."
+        return (1.0,) * len(content), (given,)
     if plate.type in _MATRIX_OF_TYPE:
         return tuple(assumed[c] for c in content), (
             f"Units: channels in {_listed(units)} times CAL_MATRIX give N and N x {metres:g} m.",

@@ -2,7 +2,9 @@
 decision is a sentence.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,21 +12,30 @@ from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.still import movement, steady_mass
 from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.dead import borne_elsewhere, why_dead, without_offset
 from biodance.lab.plates.orientation import oriented
+from biodance.lab.plates.padding import padded_samples, padding_said
 from biodance.lab.plates.parameters import POUND, count_plates, plate_parameters
+from biodance.lab.plates.scaled import already_scaled, scale_in_doubt, unscaled
 from biodance.lab.plates.signals import PlateReading, read_plate_signals
+from biodance.lab.plates.told import ToldPlate
+from biodance.lab.plates.undescribed import undescribed_plates
 from biodance.lab.plates.wrench import gravity_sign
-from biodance.records import Array, Markers, Plate, Wrench
+from biodance.records import Array, Defect, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
 _AS_POUNDS = 0.03
-_STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
-
-_SAME_PLACE = 0.001
-"""m: standard deviation of a centre of pressure that nobody moves."""
 _HALF_ROUND = "were turned by 180 degrees"
-ReadPlates = tuple[tuple[Plate, ...], tuple[str, ...]]
+
+
+class ReadPlates(NamedTuple):
+    """The plates of one file, what a person should look at, what was decided without doubt, and what was left out."""
+
+    plates: tuple[Plate, ...] = ()
+    warnings: tuple[str, ...] = ()
+    history: tuple[str, ...] = ()
+    defects: tuple[Defect, ...] = ()
 
 
 def read_plates(
@@ -34,30 +45,59 @@ def read_plates(
     turn: Array | None = None,
     markers: Markers | None = None,
     body_mass: float | None = None,
+    told: Mapping[str, ToldPlate] | None = None,
 ) -> ReadPlates:
-    """Return the force plates of a C3D file and the warnings about them.
+    """Return the force plates of a C3D file, with warnings, history and defects.
 
     Each ``Plate.wrench`` is the ground's action ON the subject about the LAB origin at the analog rate, zero taken off,
-    in N and N·m.
+    in N and N·m, NaN where nothing was measured (padding).
 
     ``metres`` is the file's length unit in m (0.001 for mm); ``turn`` (3, 3) leads from the file's axes to the lab
     frame (z up; None = they are the same); ``markers`` (m, lab frame) set the clock and say where the feet are;
-    ``body_mass`` kg is compared with the weight on the plates. A plate that cannot be trusted is left out with a
-    warning that says why; nothing is raised. The method per TYPE is in ``plate_types``.
+    ``body_mass`` kg is compared with the weight on the plates; ``told`` by name what the analyst says of them, which
+    comes before what the file says. A plate that cannot be trusted is left out with a warning that says why; nothing is
+    raised. The method per TYPE is in ``plate_types``.
     """
-    count, warnings = count_plates(raw)
-    if not count:
-        return (), warnings
+    told = told or {}
+    numbers, warnings, history = _numbers_of(raw, told)
+    if not numbers:
+        return ReadPlates((), warnings, history)
     if raw.analog.shape[0] == 0 or not raw.analog_rate > 0:
         lacks = "holds no analog samples" if raw.analog.shape[0] == 0 else f"has the analog rate {raw.analog_rate:g}"
-        return (), (
-            *warnings,
-            f"The file declares {count} force plates but {lacks}: no plate was read. Export it with the analog data.",
-        )
-    readings, refused = _readings(raw, count, metres, np.eye(3) if turn is None else turn)
-    readings, stuck = _alive(readings, markers)
+        declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
+        return ReadPlates((), (*warnings, f"{declared} Export it with the analog data."), history)
+    readings, refused = _readings(raw, numbers, metres, np.eye(3) if turn is None else turn, told)
+    if body_mass and scale_in_doubt(raw, readings, body_mass):
+        plain, refused_plain = _readings(unscaled(raw), numbers, metres, np.eye(3) if turn is None else turn, told)
+        if scaled := already_scaled(readings, plain, body_mass):
+            readings, refused = plain, [scaled, *refused_plain]
+    readings, dead = _alive(readings, markers)
+    readings, padded = _measured(raw, readings, markers)
     plates, said = _oriented(readings, _time(raw, markers), markers)
-    return plates, (*warnings, *refused, *stuck, *said, *_weight_said(plates, markers, body_mass))
+    defects = (*dead, *padded)
+    history += tuple(f"{one.plate.name}: {one.plate.told.sentence}" for one in readings if one.plate.told.sentence)
+    warned = (*warnings, *refused, *(one.text for one in defects), *said, *_weight_said(plates, markers, body_mass))
+    return ReadPlates(plates, warned, history, defects)
+
+
+def _numbers_of(raw: RawC3d, told: Mapping[str, ToldPlate]) -> tuple[list[int], tuple[str, ...], tuple[str, ...]]:
+    """Return the numbers of the plates to be read, warnings and history: those of the file, and those of which the
+    analyst says the channels, without those that are not to be used.
+    """
+    count, warnings = count_plates(raw)
+    more = {int(name.removeprefix("plate")): one for name, one in told.items()}
+    if not count and not warnings and not more and (undescribed := undescribed_plates(raw)):
+        warnings = (undescribed,)
+    lacking = [n for n, one in more.items() if n > count and one.use and not one.channels] if raw.analog.size else []
+    warnings += tuple(
+        f"Plate {n} of session.toml is none of the file's {count} plates. Give its channels in [plates.plate{n}], or "
+        f"take it away."
+        for n in lacking
+    )
+    unused = [n for n, one in more.items() if not one.use]
+    numbers = sorted({*range(1, count + 1), *(n for n, one in more.items() if one.channels)} - set(unused))
+    history = tuple(f"plate{n} was left out, as session.toml says." for n in unused if n <= count)
+    return numbers, warnings, history
 
 
 def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
@@ -72,39 +112,45 @@ def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
     return Wrench(plates[0].wrench.time, np.sum([p.wrench.value for p in plates], axis=0))
 
 
-def _readings(raw: RawC3d, count: int, metres: float, turn: Array) -> tuple[list[PlateReading], list[str]]:
+def _readings(
+    raw: RawC3d, numbers: list[int], metres: float, turn: Array, told: Mapping[str, ToldPlate]
+) -> tuple[list[PlateReading], list[str]]:
     """Return the readings of the plates that make sense and a sentence for each of the others."""
     readings, refused = [], []
-    for number in range(1, count + 1):
+    for number in numbers:
         try:
-            readings.append(read_plate_signals(raw, plate_parameters(raw, number), metres=metres, turn=turn))
+            plate = plate_parameters(raw, number, told.get(f"plate{number}"), metres=metres, turn=turn)
+            readings.append(read_plate_signals(raw, plate, metres=metres, turn=turn))
         except TrialRefused as error:
             refused.append(_left_out(number, error))
     return readings, refused
 
 
-def _alive(readings: list[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[str]]:
-    """Return the readings without plates that carry the same load at the same place for the whole trial, though the
-    person moves (whoever stands and lifts an arm moves the centre of pressure); a sentence for each of these.
-    """
-    alive, said = [], []
-    moves = markers is not None and movement(markers) > StandingRules.still
+def _alive(readings: list[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[Defect]]:
+    """Return the readings of plates that are not dead, without constants where nobody steps on them; the dead ones."""
+    alive, dead = [], []
     for reading in readings:
-        sensor = reading.sensor if reading.known.all() else reading.sensor[reading.known]
-        vertical = sensor[:, 2]
-        mean, spread = float(vertical.mean()), float(vertical.std())
-        wanders = max(float(moment.std()) for moment in sensor[:, 3:5].T)
-        same = spread < _STUCK * abs(mean) and wanders < _SAME_PLACE * abs(mean)
-        if not (moves and abs(mean) > TOUCH_FORCE and same):
-            alive.append(reading)
-            continue
-        wires = ", ".join(str(c + 1) for c in reading.plate.channels)
-        stuck = TrialRefused(
-            f"it reads a constant {mean:.0f} N (± {spread:.2g} N) while the person moves: a stuck or unplugged "
-            f"channel, or a plate whose zero was never set. Check channels {wires}."
-        )
-        said.append(_left_out(reading.plate.number, stuck))
-    return alive, said
+        elsewhere = borne_elsewhere(reading, [one for one in readings if one is not reading], markers)
+        constant = without_offset(reading, elsewhere)
+        if why := why_dead(constant, markers, elsewhere):
+            said = _left_out(reading.plate.number, TrialRefused(why))
+            dead.append(Defect("dead_plate", reading.plate.name, said, float(reading.sensor[:, 2].mean()), "N"))
+        else:
+            alive.append(constant)
+    return alive, dead
+
+
+def _measured(
+    raw: RawC3d, readings: list[PlateReading], markers: Markers | None
+) -> tuple[list[PlateReading], list[Defect]]:
+    """Return the readings without padding at the ends of the recording, where a plate is loaded meanwhile, and it as a
+    defect.
+    """
+    padded = padded_samples(raw, markers)
+    if not any((np.abs(reading.sensor[padded, 2]) > TOUCH_FORCE).any() for reading in readings):
+        return readings, []
+    said, lost = padding_said(padded, raw.analog_rate), float(padded.sum() / raw.analog_rate)
+    return [replace(one, known=one.known & ~padded) for one in readings], [Defect("padding", "", said, lost, "s")]
 
 
 def _two_signs(readings: list[PlateReading], votes: list[float]) -> tuple[str, ...]:
@@ -122,7 +168,9 @@ def _two_signs(readings: list[PlateReading], votes: list[float]) -> tuple[str, .
     )
 
 
-def _oriented(readings: list[PlateReading], time: Array, markers: Markers | None) -> ReadPlates:
+def _oriented(
+    readings: list[PlateReading], time: Array, markers: Markers | None
+) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
     """Return the plates in the lab frame; an unloaded one takes the majority's sign, +1 if all are unloaded."""
     axes = [plate_axes(r.corners) for r in readings]
     signs = [gravity_sign(r.sensor, a, r.rate) for r, a in zip(readings, axes, strict=True)]  # any point: forces alone

@@ -92,7 +92,8 @@ def read_plate_signals(raw: RawC3d, plate: PlateParameters, *, metres: float, tu
     )
     _refuse_impossible(plate, sensor)
     first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
-    said = (first, *placed, *origin_said, *turned, *unit_said, *gaps_said, *sense, zero.said)
+    told = tuple(f"{said[0].upper()}{said[1:]}" for said in (plate.told.sentence,) if said)
+    said = (first, *told, *placed, *origin_said, *turned, *unit_said, *gaps_said, *sense, zero.said)
     odd = tuple(f"Plate {plate.number}: {sentence}" for sentence in (*placed, *origin_said, *turned, *gaps_said))
     return PlateReading(plate, corners, sensor, vector, raw.analog_rate, said, (*odd, *warnings), empty, known)
 
@@ -208,7 +209,7 @@ def _offsets(plate: PlateParameters, channels: Array, start: int, stop: int) -> 
     if stop <= start:
         return np.zeros(channels.shape[1])
     mean = channels[start:stop].mean(axis=0)
-    return np.where([kind == "L" for kind in CONTENT[plate.type]], 0.0, mean) if plate.calibration is None else mean
+    return np.where([kind == "L" for kind in CONTENT[1]], 0.0, mean) if plate.type == 1 else mean
 
 
 def _moments_in_sense(

@@ -10,7 +10,7 @@ _BLOCK = 0.04  # s: the force is judged in means over two periods of the mains
 _NEAR = 20.0  # N, readings this close to the unloaded end of the trial belong to it
 _SMALL = 30.0  # N, an offset that needs no further proof
 _FLAT = 5.0  # N, spread of the block means up to which a plate counts as quiet
-_SHARE = 1 / 3  # an offset of the sign of a load must stay below this share of the trial's range
+LARGEST_SHARE = 1 / 3  # an offset of the sign of a load must stay below this share of the trial's range
 _SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
 DEAD, LONG = 1.5, 0.5
 """N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer."""
@@ -67,7 +67,7 @@ def is_unloaded(level: float, vertical: Array) -> bool:
         return False
     load = level if level <= low + _NEAR else -level
     at_an_end = level <= low + _NEAR or level >= high - _NEAR
-    return at_an_end and -(high - low) <= load <= _SHARE * (high - low)
+    return at_an_end and -(high - low) <= load <= LARGEST_SHARE * (high - low)
 
 
 def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:

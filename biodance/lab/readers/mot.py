@@ -4,8 +4,8 @@ import math
 import re
 from pathlib import Path
 
-from biodance.lab.opensim.ground_forces import plates_of
 from biodance.lab.opensim.mot import read_mot
+from biodance.lab.opensim.plate_columns import plates_of
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.readers import head_text
 from biodance.records import Plate, Role, Source, Trial
@@ -23,9 +23,9 @@ def sniff(head: bytes) -> bool:
 def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
     """Return the trial of a table with plate columns: plates, no markers."""
     table = read_mot(path)
-    plates, said = plates_of(table, where=str(path))
+    plates, said, doubts = plates_of(table, where=str(path))
     source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=plates_rate(plates))
-    return Trial(path.stem, role, None, plates, source, history=said, warnings=table.warnings)
+    return Trial(path.stem, role, None, plates, source, history=said, warnings=(*table.warnings, *doubts))
 
 
 def plates_rate(plates: tuple[Plate, ...]) -> float:

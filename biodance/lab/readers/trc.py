@@ -6,8 +6,8 @@ from itertools import product
 from pathlib import Path
 
 from biodance.errors import FileRefused
-from biodance.lab.opensim.ground_forces import has_plates, plates_of
 from biodance.lab.opensim.mot import TimeTable, columns_of, read_mot
+from biodance.lab.opensim.plate_columns import has_plates, plates_of
 from biodance.lab.opensim.trc import read_trc
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.readers import head_text
@@ -18,6 +18,7 @@ NAME = "markers of OpenSim"
 EXTENSIONS = (".trc",)
 PREFERENCE = 10
 _FORCES_BESIDE = ("", "_grf", "_GRF", "_forces", "_ground_forces")
+_TABLES = (".mot", ".sto")
 
 _MARKER_FOLDER = re.compile(r"marker|mocap|trc", flags=re.IGNORECASE)
 _FORCE_FOLDER = re.compile(r"force|grf|^id$|kinetic|^mot$|inverse.?dynamics", flags=re.IGNORECASE)
@@ -38,17 +39,39 @@ def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
 def beside(path: Path) -> Path | None:
     """Return the .mot or .sto file with plate columns that belongs to a .trc file (or should, but is damaged), in its
     folder or in the one for forces beside it (MarkerData/ and ForceData/ or ID/); None if there is none.
+
+    It has the stem of the markers with a usual ending, else it is the only one whose stem goes on behind theirs.
     """
-    for place in (path.parent, *_places_of_forces(path.parent)):
-        for ending, suffix in product(_FORCES_BESIDE, (".mot", ".sto")):
+    places = (path.parent, *_places_of_forces(path.parent))
+    for place in places:
+        for ending, suffix in product(_FORCES_BESIDE, _TABLES):
             candidate = place / f"{path.stem}{ending}{suffix}"
-            if candidate.is_file():
-                try:
-                    if has_plates(columns_of(candidate)):
-                        return candidate
-                except FileRefused:
-                    return candidate
-    return None
+            if candidate.is_file() and _may_hold_forces(candidate):
+                return candidate
+    longer = [table for place in places for table in _going_on(path, place) if _may_hold_forces(table)]
+    return longer[0] if len(longer) == 1 else None
+
+
+def _may_hold_forces(table: Path) -> bool:
+    """Return whether a table has plate columns, or is damaged."""
+    try:
+        return has_plates(columns_of(table))
+    except FileRefused:
+        return True
+
+
+def _going_on(markers: Path, place: Path) -> list[Path]:
+    """Return the tables of a folder whose stem is that of the markers and more (``walk_GRF_2plates`` for ``walk``, not
+    ``walk2``), and of no other markers with a longer stem.
+    """
+    stems = [path.stem for path in markers.parent.glob("*.trc")]
+
+    def fits(stem: str, table: Path) -> bool:
+        return table.stem.startswith(stem) and not table.stem[len(stem) : len(stem) + 1].isalnum()
+
+    tables = [path for path in sorted(place.iterdir()) if path.suffix.lower() in _TABLES and path.is_file()]
+    own = [table for table in tables if fits(markers.stem, table) and table.stem != markers.stem]
+    return [table for table in own if not any(len(s) > len(markers.stem) and fits(s, table) for s in stems)]
 
 
 def _places_of_forces(markers: Path) -> list[Path]:
@@ -62,13 +85,13 @@ def _with_forces(trial: Trial, path: Path) -> Trial:
     """Return the trial with the plates of the table beside it; a damaged table is a warning, the markers stay."""
     try:
         table = read_mot(path)
-        plates, said = plates_of(table, where=str(path))
+        plates, said, doubts = plates_of(table, where=str(path))
     except FileRefused as error:
         return replace(trial, warnings=(*trial.warnings, f"The forces beside the markers were left out. {error}"))
     digest = sha256((trial.source.sha256 + sha256(read_bytes(path))).encode())
     source = replace(trial.source, format="TRC + MOT", sha256=digest, analog_rate=plates_rate(plates))
-    history = (*trial.history, f"Forces were read from {path.name} beside it.", *said)
-    warnings = (*trial.warnings, *table.warnings, *_out_of_step(trial, table))
+    history = tuple(dict.fromkeys((*trial.history, f"Forces were read from {path.name} beside it.", *said)))
+    warnings = (*trial.warnings, *table.warnings, *doubts, *_out_of_step(trial, table))
     return replace(trial, plates=plates, source=source, history=history, warnings=warnings)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, SessionRefused
-from biodance.lab.plain_text import cells, parse_number, read_bytes, read_text, sha256
+from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_bytes, read_text, sha256, with_points
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.readers import extensions
 from biodance.lab.session.file import read_session_file
@@ -124,7 +124,8 @@ def read_plate_text(path: Path) -> Trial:
     FileRefused
         The header does not name six channels with units that are known, or a cell is no number.
     """
-    lines = [line for line in read_text(path).splitlines() if line.strip()]
+    text, commas = with_points(read_text(path))
+    lines = [line for line in text.splitlines() if line.strip()]
     columns: dict[str, tuple[int, float]] = {}
     for i, cell in enumerate(_cells(lines[0])):
         name = _CHANNEL.fullmatch(cell)
@@ -144,7 +145,7 @@ def read_plate_text(path: Path) -> Trial:
     how = f"{said}; the table does not tell where the plate lies: axes and origin are the plate's own."
     plate = Plate("plate1", 0, np.full((4, 3), np.nan), Wrench(np.asarray(time), sign * wrench), (how,))
     source = Source(path, sha256(read_bytes(path)), "text")
-    return Trial(path.stem, "fit", None, (plate,), source, history=(how,))
+    return Trial(path.stem, "fit", None, (plate,), source, history=(*[COMMAS_READ] * commas, how))
 
 
 def _cells(line: str) -> list[str]:

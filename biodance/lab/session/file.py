@@ -24,12 +24,16 @@ which segment.
 (`lab.shape`), ``scan = "body.obj"`` names the closed surface of the standing person, in m (``scan_up`` its axis
 that points up, by default z).
 
+``[plates.plate1]`` gives or corrects a force plate: ``corners_m``, ``type``, ``channels``, ``sensitivity``,
+``origin_m``, the ``foot`` that stands on it, ``use = false`` (`plate_entry`).
+
 ``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
 
 A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
 the session's own file leaves out.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date as day
 from datetime import datetime
@@ -41,6 +45,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.plates.told import Told, ToldPlate
+from biodance.lab.session.plate_entry import PlateEntry, told_plate
 from biodance.lab.shape import legal_girths, traced_outline, typed_outline
 from biodance.library import read_toml
 from biodance.records import FootSizes, Role
@@ -109,6 +115,7 @@ class _Contents(_Entry):
     subject: SubjectEntry = SubjectEntry()
     markers: MarkersEntry = MarkersEntry()
     trials: dict[str, TrialEntry] = {}
+    plates: dict[str, PlateEntry] = {}
     settings: dict[str, Any] = {}
 
 
@@ -116,7 +123,7 @@ class _Contents(_Entry):
 class SessionFile:
     """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
     ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or
-    file of the set that was worn, "" where none is said (see `read_marker_set`).
+    file of the set that was worn, "" where none is said (see `read_marker_set`); ``plates`` by name.
     """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
@@ -125,6 +132,12 @@ class SessionFile:
     settings: Settings = USUAL
     marker_set: str = ""
     visit: VisitEntry = field(default_factory=VisitEntry)
+    plates: Mapping[str, ToldPlate] = field(default_factory=dict)
+
+    @property
+    def told(self) -> Told:
+        """What readers of forces must know."""
+        return Told(self.plates, self.subject.mass_kg)
 
     def role(self, name: str) -> Role | None:
         """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case
@@ -161,13 +174,22 @@ def read_session_file(folder: Path) -> SessionFile:
     contents = [_read(path) for path in paths]
     said: dict[str, Any] = {}
     visit: dict[str, Any] = {}
+    plates: dict[str, PlateEntry] = {}
     for content in contents:
+        plates |= {name: _over(plates.get(name), entry) for name, entry in content.plates.items()}
         said |= content.subject.model_dump(exclude_none=True)
         visit |= content.session.model_dump(exclude_none=True)
     trials = tuple((key, entry) for content in reversed(contents) for key, entry in content.trials.items())
     worn = [name for path, content in zip(paths, contents, strict=True) if (name := _marker_set(path, content.markers))]
     settings, marker_set = _settings(paths, contents), (worn or [""])[-1]
-    return SessionFile(SubjectEntry(**said), trials, tuple(paths), settings, marker_set, VisitEntry(**visit))
+    told = {name: told_plate(name, entry) for name, entry in plates.items()}
+    return SessionFile(SubjectEntry(**said), trials, tuple(paths), settings, marker_set, VisitEntry(**visit), told)
+
+
+def _over(earlier: PlateEntry | None, entry: PlateEntry) -> PlateEntry:
+    """Return what an inner file says of a plate, filled in by an outer one."""
+    said = earlier.model_dump(exclude_none=True) if earlier is not None else {}
+    return PlateEntry(**{**said, **entry.model_dump(exclude_none=True)})
 
 
 def _settings(paths: list[Path], contents: list[_Contents]) -> Settings:
@@ -195,11 +217,15 @@ def _read(path: Path) -> _Contents:
     try:
         found = _beside(path, _Contents.model_validate(_whole_numbers_are_numbers(raw)))
         _ = found.subject.girths, found.subject.outlines
-        return found
     except SessionRefused as error:
         raise SessionRefused(f"{path}: [subject] {error}") from None
     except ValidationError as error:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
+    try:
+        _ = [told_plate(name, entry) for name, entry in found.plates.items()]
+    except SessionRefused as error:
+        raise SessionRefused(f"{path}: {error}") from None
+    return found
 
 
 def _beside(path: Path, found: _Contents) -> _Contents:
@@ -237,6 +263,7 @@ _TABLES: dict[str, type[BaseModel]] = {
     "subject": SubjectEntry,
     "trials": TrialEntry,
     "markers": MarkersEntry,
+    "plates": PlateEntry,
 }
 _HELP = {
     "mass_kg": "Give the body mass in kg.",
@@ -249,5 +276,7 @@ _HELP = {
     "foot_outline": "Write {length = 26, breadth = 10, heel_breadth = 7} in cm, or the path of a CSV file.",
     "file": 'Write the path of a marker set, for example "my_set.toml".',
     "map": 'Write {LABEL = "left_asis", ...}.',
+    "foot": 'Write "left" or "right"; leave it out where both stand on the plate.',
+    "use": "Write false to leave the plate out.",
     "role": f"Legal are {', '.join(get_args(Role))}.",
 }

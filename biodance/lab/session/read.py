@@ -17,8 +17,10 @@ from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.archive import visit_date
 from biodance.lab.session.file import SessionFile, VisitEntry, read_session_file
 from biodance.lab.session.recordings import (
+    decimal_commas,
     each_once,
     find_recordings,
+    forces_apart,
     guess_static,
     of_one_person,
     recordings_below,
@@ -142,7 +144,9 @@ def read_session(
         if tell:
             tell(file.name)
         try:
-            trial = read_trial(file, role=role, subject=subject_name, readers=readers, markers=marker_set)
+            trial = read_trial(
+                file, role=role, subject=subject_name, readers=readers, markers=marker_set, told=file_says.told
+            )
             trial = _with_strikes(replace(trial, settings=chosen), operator)
         except BiodanceError as error:
             refused[file.name] = str(error)
@@ -151,7 +155,8 @@ def read_session(
         reasons[trials[-1].name] = reason
     if not trials:
         raise SessionRefused(_nothing_left(folder, files, refused, readers))
-    refuse_several_people(folder, trials)
+    refuse_several_people(folder, trials, file_says.subject)
+    notes += [*decimal_commas(trials), *forces_apart(trials)]
     trials = _settle_static(each_once(trials, notes), file_says, reasons, notes)
     trials, strangers = of_one_person(trials, file_says.subject)
     refused |= strangers

@@ -12,12 +12,13 @@ from statistics import median
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.markers.still import is_still, movement
+from biodance.lab.plain_text import COMMAS_READ
 from biodance.lab.read import read_head, sniffed
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.file import SubjectEntry
 from biodance.lab.session.subject import declared_mass, declared_stature
 from biodance.lab.vicon import EclipseNotes, read_enf, read_mp, read_vsk
-from biodance.records import Role, Trial
+from biodance.records import Array, Role, Trial
 from biodance.records.attention import WARNING
 
 _STATIC_WORDS = ("static", "cal", "calib", "calibration", "tpose", "npose")
@@ -238,9 +239,47 @@ def of_one_person(trials: Sequence[Trial], typed: SubjectEntry) -> tuple[list[Tr
     return [trial for trial in trials if trial.source.path.name not in strangers], strangers
 
 
-def refuse_several_people(folder: Path, trials: Sequence[Trial]) -> None:
-    """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people."""
-    for said, of, unit, alike in _PEOPLE:
+_SAME_START, _SAME_LENGTH = 0.1, 0.02
+"""s, share: what markers and forces of one recording, exported by two programs, may differ by."""
+
+
+def forces_apart(trials: Sequence[Trial]) -> list[str]:
+    """Return a sentence for every table of forces without markers that covers the time of one .trc file without forces:
+    what to call it, so that the two are read together.
+    """
+    said = []
+    alone = [one for one in trials if one.source.format == "TRC"]
+    for forces in (one for one in trials if one.source.format == "MOT" and one.plates):
+        span = forces.plates[0].wrench.time[[0, -1]]
+        fits = [one for one in alone if one.markers is not None and _same_span(one.markers.time[[0, -1]], span)]
+        if len(fits) == 1:
+            file, name = forces.source.path, f"{fits[0].source.path.stem}_grf{forces.source.path.suffix}"
+            said.append(
+                f"{WARNING}{file.name} looks like the forces of {fits[0].source.path.name}: both cover "
+                f"{span[0]:.2f} to {span[1]:.2f} s. Rename it {name}, and they are read together."
+            )
+    return said
+
+
+def _same_span(one: Array, other: Array) -> bool:
+    length = other[1] - other[0]
+    return bool(abs(one[0] - other[0]) < _SAME_START and abs(one[1] - one[0] - length) < _SAME_LENGTH * length + 0.02)
+
+
+def decimal_commas(trials: Sequence[Trial]) -> list[str]:
+    """Return one sentence for all files whose numbers have decimal commas."""
+    read = [one.source.path.name for one in trials if COMMAS_READ in one.history]
+    more = f" and {len(read) - 1} more" if len(read) > 1 else ""
+    return [f"{COMMAS_READ.removesuffix('.')} ({read[0]}{more})."] if read else []
+
+
+def refuse_several_people(folder: Path, trials: Sequence[Trial], typed: SubjectEntry) -> None:
+    """Raise SessionRefused where the recordings of two parts of a session declare masses or statures of two people;
+    what was ``typed`` in session.toml is believed of all of them.
+    """
+    for (said, of, unit, alike), told in zip(_PEOPLE, (typed.mass_kg, typed.height_m), strict=True):
+        if told is not None:
+            continue
         parts: dict[Path, list[float]] = {}
         for trial in trials:
             if math.isfinite(value := said(trial.measurements)):

@@ -1,4 +1,4 @@
-"""A session's own files: ``biodance init`` writes what was guessed into session.toml, to be confirmed or corrected;
+"""A session's own files: ``biodance init`` writes what is declared into session.toml, and what was guessed as comments;
 markers and registered plates are written as an ordinary session, one C3D file with both.
 """
 
@@ -29,7 +29,8 @@ FILE = "session.toml"
 
 
 def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict[str, Any]:
-    """Read a session and write what was found and guessed of it into its session.toml.
+    """Read a session and write what is declared of it into its session.toml, and what was guessed as comments, to be
+    confirmed or corrected.
 
     Parameters
     ----------
@@ -115,8 +116,9 @@ def _why(session: Session, trial: Trial) -> str:
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines of the file; every guess and every doubt is a comment beside what it is about."""
-    yield "# Written by biodance init: what the recordings say, and what was guessed. Correct what is wrong."
+    """Yield the lines of the file; every guess and every doubt is a comment: what stands here is believed."""
+    yield "# Written by biodance init: what the recordings say. What was guessed has a # before it and says nothing:"
+    yield "# take the # away where it is right, or correct it."
     for note in found["notes"]:
         if " has the role " not in note and "the map was guessed" not in note:
             yield f"# {note}"
@@ -127,10 +129,14 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
     guessed = {"mass_kg": "mass", "height_m": "stature", "sex": "sex"}
     for key in ("mass_kg", "height_m", "sex", "age"):
         value = subject[key]
-        remark = "  # guessed" if guessed.get(key) in subject["guessed"] else ""
-        yield f"{key} = {json.dumps(value)}{remark}" if value is not None else f"# {key} =   not known"
+        if value is None:
+            yield f"# {key} =   not known"
+        elif guessed.get(key) in subject["guessed"]:
+            yield f"# {key} = {json.dumps(value)}  # guessed"
+        else:
+            yield f"{key} = {json.dumps(value)}"
     for trial in {trial["name"]: trial for trial in found["trials"]}.values():
-        yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'role = "{trial["role"]}"  # {trial["why"]}')
+        yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'# role = "{trial["role"]}"  # {trial["why"]}')
     yield from ("", *_marker_lines(found))
     for plate in found["plates"]:
         yield f"# {plate['trial']}: {plate['name']}, TYPE {plate['type']}. {' '.join(plate['decisions'])}".rstrip()
@@ -152,15 +158,15 @@ def _begun_map(session: Session, found: dict[str, Any]) -> Iterator[str]:
 def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
     if found["marker_map"] is None:
         worn = found["marker_set"]
-        yield "[markers]" if worn else '# [markers]  no marker set is known; file = "set.toml", or map = {...}'
+        yield '# [markers]  no marker set is known; file = "set.toml", or map = {...}' if not worn else "[markers]"
         if worn:
-            yield f"file = {json.dumps(worn)}  # recognised by its labels"
+            yield f"# file = {json.dumps(worn)}  # recognised by its labels"
     else:
         yield "# Guessed from the names and from where the markers are on the standing person; a wrong map is worse"
         yield "# than none: compare it with what you placed. Legal are landmarks (left_asis) and segments (left_thigh)."
-        yield "[markers.map]"
+        yield "# [markers.map]"
         for label, place in sorted(found["marker_map"].items(), key=lambda item: (item[1].split("_")[-2:], item[0])):
-            yield f"{json.dumps(label)} = {json.dumps(place)}"
+            yield f"# {json.dumps(label)} = {json.dumps(place)}"
     yield ""
 
 

@@ -6,72 +6,20 @@ measured if every foot that may touch lies over plates with its whole sole; over
 around it, what sticks out hangs in the air.
 """
 
-from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.contact.footing import (
-    Footing,
-    Surfaces,
-    cop_outside,
-    dilate,
-    find_surfaces,
-    footing,
-    inside,
-    overhang_notes,
-    resting,
-    speeds,
-)
+from biodance.motion.contact.belts import belts, dilate, resting, speeds
+from biodance.motion.contact.footing import Footing, cop_outside, footing, overhang_notes
 from biodance.motion.contact.soles import Soles
-from biodance.motion.contact.support import carried_elsewhere, flight
+from biodance.motion.contact.surfaces import Surfaces, find_surfaces
+from biodance.motion.contact.unmeasured import by_reason, unmeasured_frames, unmeasured_notes
 from biodance.motion.dynamics import distribute
-from biodance.records import SIDES, Array, Mask, Trial, Wrench
+from biodance.records import SIDES, Array, LeftOut, Mask, Trial, Wrench
 from biodance.settings import ContactRules
-
-_SLOWEST = 0.2
-"""m/s: a slower belt is none; feet creep that much in standing and at the edges of stance."""
-_RIGID = 0.25
-"""m/s: a sole whose points move more evenly than this lies flat on something."""
-_LOW = 0.03
-"""m over its lowest height in which a sole stands."""
-_EVEN = 0.15
-"""m/s around the median in which most flat soles move on a belt of constant speed."""
-_MOST = 0.6
-_FEWEST = 10
-"""Frames of flat soles that tell a belt."""
-
-
-def belts(trial: Trial, soles: Soles, load: Mask) -> tuple[Array, tuple[str, ...]]:
-    """Return the velocity (P, 3) m/s of what the feet stand on, per plate, and a sentence for each belt; zero where it
-    does not move.
-
-    ``load`` (T, P) True where a plate is loaded. A belt is what nearly all flat, low soles on a loaded plate move with;
-    its speed is taken as constant.
-    """
-    found, notes = np.zeros((len(trial.plates), 3)), []
-    if soles.time.size < _FEWEST:
-        return found, ()
-    velocity = np.gradient(soles.outline, soles.time, axis=0)
-    spread = np.linalg.norm(velocity - velocity.mean(axis=2, keepdims=True), axis=-1).max(axis=2)
-    height = soles.outline[..., 2].mean(axis=2)
-    flat = (spread < _RIGID) & (height < np.nanmin(height, axis=0, initial=np.inf) + _LOW)
-    for index, plate in enumerate(trial.plates):
-        over = inside(plate, soles.centre) > 0
-        here = flat & over & load[:, index, None]
-        moving = velocity.mean(axis=2)[here]
-        if len(moving) < _FEWEST:
-            continue
-        middle = np.median(moving, axis=0)
-        same = np.linalg.norm(moving - middle, axis=1) < _EVEN
-        if np.linalg.norm(middle) > _SLOWEST and same.mean() >= _MOST:
-            found[index] = moving[same].mean(axis=0)
-            notes.append(
-                f"The soles on {plate.name} move with it at {np.linalg.norm(found[index]):.2f} m/s: a belt; contact is "
-                f"judged by the speed relative to it."
-            )
-    return found, tuple(notes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +30,8 @@ class Contact:
     of a touching foot is over a plate; ``measured`` (T,) True where the plates measure all that the ground does;
     ``cop_outside`` (T, P) m, distance of a plate's centre of pressure from the soles on it (0 = inside), NaN = hardly
     loaded; ``notes`` how many frames remain, and why no others; ``told`` (T, 2) True where the plates tell what the
-    ground does to this foot, whatever the other one stands on.
+    ground does to this foot, whatever the other one stands on; ``left_out`` the frames (T,) that are not measured, by
+    every reason that holds for them.
     """
 
     time: Array
@@ -92,6 +41,7 @@ class Contact:
     cop_outside: Array
     notes: tuple[str, ...]
     told: Mask
+    left_out: Mapping[LeftOut, Mask] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,16 +115,12 @@ def feet_on_ground(trial: Trial, soles: Soles, *, mass: float = float("nan")) ->
 def contact_with_plates(trial: Trial, soles: Soles, feet: FeetOnGround) -> Contact:
     """Return the ground contact of a prepared trial whose ``feet`` are known."""
     touching, surfaces = feet.touching, feet.surfaces
-    place = footing(trial.plates, soles, surfaces, touching)
-    faults = _faults(trial, place, touching, feet.rests, feet.load)
-    elsewhere = carried_elsewhere(trial, weight=feet.weight)
-    faults.append(
-        ("the person is still and the plates carry too little: a chair or a hand carries the rest", elsewhere)
-    )
-    measured = ~np.any([mask for _, mask in faults], axis=0)
+    place = footing(trial.plates, soles, surfaces, touching, feet.load)
+    found = unmeasured_frames(trial, place, touching, feet.rests, feet.load, weight=feet.weight)
+    measured = ~np.any([one.frames for one in found], axis=0)
     outside = cop_outside(trial.plates, soles, place, feet.pressed)
     notes = (
-        _notes(measured, faults)
+        unmeasured_notes(measured, found)
         + _unplaced(trial)
         + feet.belted
         + surfaces.notes
@@ -182,7 +128,7 @@ def contact_with_plates(trial: Trial, soles: Soles, feet: FeetOnGround) -> Conta
         + _cop_notes(trial, outside, measured, feet.rules)
     )
     told = measured[:, None] | _told(trial, place, touching, feet.rests, feet.load)
-    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told)
+    return Contact(soles.time, touching, place.on_plate, measured, outside, notes, told, by_reason(found))
 
 
 def _told(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> Mask:
@@ -203,45 +149,6 @@ def _touching(soles: Soles, speed: Array, surfaces: Surfaces, rules: ContactRule
     found = (low & (speed < rules.speed)).any(axis=2)
     frames = 0 if soles.time.size < 2 else int(np.ceil(rules.around / np.median(np.diff(soles.time))))
     return dilate(found, frames) | unseen
-
-
-def _faults(trial: Trial, place: Footing, touching: Mask, rests: Mask, load: Mask) -> list[tuple[str, Mask]]:
-    """Return every reason why frames are not fully measured, with its frames (T,)."""
-    faults: list[tuple[str, Mask]] = [
-        ("no plate is loaded", ~load.any(axis=1) & ~flight(trial, touching, load)),
-        ("a plate's force is unknown", np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))),
-    ]
-    for foot, side in enumerate(SIDES):
-        apart = touching[:, foot] & ~place.covered[:, foot]
-        hidden = place.unseen[:, foot]
-        faults.append((f"the {side} foot was not seen", hidden))
-        faults.append(
-            (f"the {side} foot may touch the ground beside the plates", apart & ~hidden & (place.share[:, foot] == 0))
-        )
-        faults.append(
-            (
-                f"the {side} foot may stand partly on a plate, partly beside it",
-                apart & ~hidden & (place.share[:, foot] > 0),
-            )
-        )
-    for index, plate in enumerate(trial.plates):
-        on = place.on_plate[:, :, index]
-        faults.append((f"{plate.name} is loaded but no foot is over it", load[:, index] & ~on.any(axis=1)))
-        for foot, side in enumerate(SIDES):
-            alone = on[:, foot] & (place.on_plate[:, foot].sum(axis=1) == 1)
-            faults.append(
-                (
-                    f"the {side} foot rests on {plate.name}, which reads nothing",
-                    alone & rests[:, foot] & ~load[:, index],
-                )
-            )
-    return faults
-
-
-def _notes(measured: Mask, faults: list[tuple[str, Mask]]) -> tuple[str, ...]:
-    counts = Counter({text: int(mask.sum()) for text, mask in faults if mask.any()})
-    first = f"{int(measured.sum())} of {measured.size} frames are fully measured by the plates."
-    return (first, *(f"Left out, {count} of {measured.size}: {text}." for text, count in counts.most_common()))
 
 
 def _unplaced(trial: Trial) -> tuple[str, ...]:

@@ -19,10 +19,10 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
+    beside_sliding_skin,
     elsewhere,
     evaluate_joints,
     fit_joints,
-    marker_slopes,
     spread_postures,
 )
 from biodance.motion.ik.joint_unknowns import (
@@ -108,8 +108,8 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     found = fit_joints(scaling, postures, start, shown, noise=noise)
     spared: dict[str, tuple[str, float]] = {}
     for _ in range(_FAULTS):
-        slopes = marker_slopes(scaling, postures, found, noise=noise)
-        wrong = elsewhere(scaling, found.theta, (found.gradient, found.information), slopes, shown)
+        cost, slopes = beside_sliding_skin(scaling, postures, found, noise=noise)
+        wrong = elsewhere(scaling, found.theta, cost, slopes, shown)
         if wrong is None:
             break
         if wrong.marker:

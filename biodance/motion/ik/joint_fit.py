@@ -25,7 +25,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.inverse_kinematics import FrameStatus, solve_ik
 from biodance.motion.ik.joint_unknowns import FAULTY, SIZE, JointUnknowns, own_unknowns
-from biodance.motion.kinematics import Poses, place_jacobian, poses
+from biodance.motion.kinematics import Poses, neighbours, place_jacobian, poses
 from biodance.records import Array, Index, Markers
 
 _MORE_PROBABLE = 10.0
@@ -180,24 +180,53 @@ def evaluate_joints(
     return CalibrationState(theta, found.q, solved, cost, gradient, information, rms)
 
 
-def marker_slopes(scaling: Scaling, postures: Markers, found: CalibrationState, *, noise: float) -> MarkerSlopes:
-    """Return what the ``postures`` say at ``found`` of the place of every marker that counts."""
+def beside_sliding_skin(
+    scaling: Scaling, postures: Markers, found: CalibrationState, *, noise: float
+) -> tuple[tuple[Array, Array], MarkerSlopes]:
+    """Return gradient (37,) and information (37, 37) of the cost at ``found``, and what the ``postures`` say there of
+    the place of every marker that counts, both beside skin that slides over bone: whatever goes with the angles beside
+    a marker's segment, counted from the static posture, is neither a joint elsewhere nor a marker that has moved. A
+    shoulder marker rides up with the arm, by as much in every second of a dance with raised arms.
+
+    With the slides S (whitened, of unknown size with the standard deviation s m/rad of `sizes.csv`) taken out of the
+    rows X of everything else, X'X becomes X'X - X'S (S'S + 1/s²)^-1 S'X.
+    """
     unknowns = JointUnknowns(scaling.centres)
     body, stand = scaling.with_centres(unknowns.moved(found.theta))
     at = _Linear.of(body, postures, found.q, found.solved, noise=noise)
     joints = at.left_open(unknowns.slope(body, stand, at.pose, at.points, found.theta))
     kept = np.flatnonzero(body.markers.weight > 0)
-    own = np.zeros((*at.points.shape, len(kept), 3))
+    markers = at.left_open(_places(body, at.pose, kept))
+    angles = (found.q[found.solved] - stand)[:, body.nq - len(body.joints) :]
+    slides = _slides(body, markers, angles, kept)
+    rows = np.concatenate([markers, joints, at.residual[..., None]], axis=2).reshape(len(slides), -1)
+    shared, own = slides.T @ rows, slides.T @ slides
+    own[np.diag_indices_from(own)] += error_size("slide", "marker") ** -2
+    square = rows.T @ rows - shared.T @ np.linalg.solve(own, shared)
+    each, place = 3 * len(kept), np.arange(3 * len(kept)).reshape(-1, 3)
+    prior, slope = unknowns.prior(found.theta)
+    of_joints = slice(each, each + SIZE)
+    cost = square[of_joints, -1] + slope.T @ prior, square[of_joints, of_joints] + slope.T @ slope
+    names = tuple(body.markers.names[marker] for marker in kept)
+    inside = square[place[:, :, None], place[:, None, :]]
+    return cost, MarkerSlopes(names, square[place, -1], inside, square[:each, of_joints].reshape(-1, 3, SIZE))
+
+
+def _places(body: Body, pose: Poses, kept: Index) -> Array:
+    """Return (T, 3M, 3K): how the markers move per metre of each of the K ``kept`` along the axes of its segment."""
+    own = np.zeros((len(pose.rotation), len(body.markers.names), 3, len(kept), 3))
     for place, marker in enumerate(kept):
-        own[:, marker, :, place] = at.pose.rotation[:, body.markers.segment[marker]]
-    shape = (len(at.points), at.rows.shape[1], 3 * len(kept))
-    free = at.left_open(own.reshape(shape)).reshape(*shape[:2], len(kept), 3)
-    return MarkerSlopes(
-        tuple(body.markers.names[marker] for marker in kept),
-        np.einsum("trki,tr->ki", free, at.residual),
-        np.einsum("trki,trkj->kij", free, free),
-        np.einsum("trki,trp->kip", free, joints, optimize=True),
-    )
+        own[:, marker, :, place] = pose.rotation[:, body.markers.segment[marker]]
+    return own.reshape(len(own), -1, 3 * len(kept))
+
+
+def _slides(body: Body, markers: Array, angles: Array, kept: Index) -> Array:
+    """Return (T r, s): the columns ``markers`` (T, r, 3K) of the ``kept`` ones times every one of the ``angles`` (T, n)
+    beside their segments.
+    """
+    beside = np.repeat(neighbours(body)[:, list(body.markers.segment)][:, kept] > 0, 3, axis=1)
+    parts = [markers[:, :, near] * angle[:, None, None] for near, angle in zip(beside, angles.T, strict=True)]
+    return np.concatenate(parts, axis=2).reshape(markers.shape[0] * markers.shape[1], -1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,8 +32,14 @@ def attention_document(found: Sequence[Attention]) -> list[dict[str, Any]]:
 
 
 def judged_document(found: Sequence[Judged]) -> list[dict[str, Any]]:
-    """Return what a verdict rests on, and of what it does not why; ``missed``: it should have."""
-    return [keyed(one, "trial seconds") | {"why_not": one.why_not or None, "missed": one.missed} for one in found]
+    """Return what a verdict rests on, and of what it does not why; ``missed``: it should have; ``left_out`` s by
+    reason.
+    """
+    return [
+        keyed(one, "trial seconds left_out_s")
+        | {"why_not": one.why_not or None, "missed": one.missed, "left_out": dict(one.left_out)}
+        for one in found
+    ]
 
 
 def _finding(one: Finding) -> dict[str, Any]:
@@ -116,16 +122,15 @@ def _masses(found: Identification | None) -> list[dict[str, Any]] | None:
 
 
 def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
-    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen); ``doubt``
-    is why nothing can be told, "" where it can.
-    """
+    """Return all that the diagnosis found; null where a number is not finite (a limit of null: never seen)."""
     one = found.diagnosis
     return {
         "attention": attention_document(one.attention),
         "judged": judged_document(one.judged),
         "verdict": one.verdict,
         "told": one.told,
-        "doubt": one.doubt,
+        "status": one.status,
+        "reasons": one.reasons,
         "findings": [_finding(finding) for finding in one.findings],
         "resembles": [_finding(finding) for finding in one.resembles],
         "within_tolerance": [_finding(finding) for finding in one.tolerated],

@@ -1,0 +1,95 @@
+"""What a diagnosis ends with and why it says no more: enums, which are compared; words are made for the reader alone
+(`pipeline.reason_words`).
+"""
+
+from collections.abc import Collection
+from enum import StrEnum
+
+
+class DiagnosisStatus(StrEnum):
+    """Nothing is wrong, something is named, something is wrong that nobody can name, or nobody can tell."""
+
+    CLEAN = "clean"
+    NAMED = "named"
+    UNKNOWN = "unknown"
+    CANNOT_TELL = "cannot tell"
+
+
+class Reason(StrEnum):
+    """Why a diagnosis says no more than it does."""
+
+    ONLY_STANDING = "only standing"
+    """Nothing but quiet standing could be compared with the whole body: it names no cause that has a size."""
+    NOT_COMPARED = "not compared"
+    """No movement could be compared with a body."""
+    MOVEMENT_NOT_JUDGED = "movement not judged"
+    """None of the movement could be judged, not even by its steps."""
+    BODY_DOUBTFUL = "body doubtful"
+    """What was measured or declared of the body contradicts itself; forces fit a wrong body as well."""
+    UNDESCRIBED_JOINTS = "undescribed joints"
+    """The body moves at joints for which nobody has learned yet what is usual."""
+    UNSEEN_JOINTS = "unseen joints"
+    """No marker shows what moves at some joints, and the plates measure it."""
+    TOLERANCES_DO_NOT_HOLD = "tolerances do not hold"
+    """The markers move more on the body than where tolerances were learned."""
+    EXCLUDED_BY_WITNESSES = "excluded by witnesses"
+    """Feet, clocks and weights exclude the only cause that the simulation names."""
+    UNUSUAL_BODY = "unusual body"
+    """The forces fit only a body that is more unlike the table than people are."""
+    OUTSIDE_TOLERANCES = "outside tolerances"
+    """They fit only if something that is small in every laboratory is many times as large here."""
+    OUTSIDE_EVERY_LABORATORY = "outside every laboratory"
+    """... and is none of what is small even in a laboratory twice as loud."""
+    WITHOUT_RESEMBLED = "judged without what it resembles"
+    """What is only resembled explains nothing: what is left is judged without it."""
+    SEVERAL_CROSSTALKS = "several cross-talks"
+    """Several channels would have to disturb each other at once."""
+    SIZE_VARIES = "size varies"
+    """The size of a cause is not constant, as that of a true one is."""
+    MAY_NOT_MATTER = "may not matter"
+    """A cause is known so poorly that what is there may be less than what matters."""
+    FORCES_LEFT = "forces left"
+    """What is left of the forces matters and is unlike sessions without fault."""
+    LOUD_LABORATORY = "loud laboratory"
+    """What no cause explains is larger than where tolerances were learned, in most bands and channels alike."""
+
+
+DOUBTS = frozenset(
+    (
+        Reason.ONLY_STANDING,
+        Reason.NOT_COMPARED,
+        Reason.MOVEMENT_NOT_JUDGED,
+        Reason.BODY_DOUBTFUL,
+        Reason.UNDESCRIBED_JOINTS,
+        Reason.UNSEEN_JOINTS,
+        Reason.TOLERANCES_DO_NOT_HOLD,
+        Reason.EXCLUDED_BY_WITNESSES,
+    )
+)
+"""Reasons for which no cause can be told, whatever is left."""
+STRANGE = frozenset((Reason.UNUSUAL_BODY, Reason.OUTSIDE_TOLERANCES, Reason.WITHOUT_RESEMBLED))
+"""Reasons that alone speak of nothing wrong: how unlike the table people are, and how large what is small everywhere,
+was learned from few laboratories, and clean sessions of others are beyond it.
+"""
+OF_RESIDUAL = frozenset(
+    (
+        *STRANGE,
+        Reason.OUTSIDE_EVERY_LABORATORY,
+        Reason.SEVERAL_CROSSTALKS,
+        Reason.SIZE_VARIES,
+        Reason.MAY_NOT_MATTER,
+        Reason.FORCES_LEFT,
+    )
+)
+"""Reasons that come of what is left beside the causes named."""
+
+
+def status_of(reasons: Collection[Reason], *, named: bool, clean: bool) -> DiagnosisStatus:
+    """Return what a diagnosis ends with: whether anything is ``named``, nothing is wrong (``clean``), or why neither
+    is.
+    """
+    if named or clean:
+        return DiagnosisStatus.NAMED if named else DiagnosisStatus.CLEAN
+    left = not {Reason.FORCES_LEFT, Reason.OUTSIDE_EVERY_LABORATORY}.isdisjoint(reasons)
+    strange = not left and not STRANGE.isdisjoint(reasons)
+    return DiagnosisStatus.CANNOT_TELL if strange or not DOUBTS.isdisjoint(reasons) else DiagnosisStatus.UNKNOWN

@@ -1,0 +1,106 @@
+"""The place of the markers on both feet as a look-alike of plates that lie elsewhere: `effects.toe_landmark`.
+
+It is a habit of a laboratory and no fault of an instrument, so it is among the errors that every fit allows for. It is
+told where it is clearly shown, with the plates that would look the same, and it stands in the set of a plate whose
+evidence beside it is small.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.diagnosis.candidates import SCALE
+from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
+from biodance.diagnosis.naming import TOGETHER
+from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_fit import explain, fit_known, is_told, typical_size
+from biodance.effects.toe_landmark import ToeLandmark
+from biodance.records import SIDES, Array
+from biodance.witnesses import LANDMARK, shift_per_sd
+
+_SHOWN = 2.0
+"""Natural logarithm of the evidence from which it is told, and standard deviations of its size."""
+_USUAL = 0.010
+"""m: a marker beside the second ray, or a heel marker on a thick sole, is as anywhere."""
+_VISIBLE = 1.0
+
+Names = tuple[tuple[str, str], ...]
+
+
+def landmark_alias(evidence: WitnessEvidence, value: Array, named: Names, cause: tuple[str, str]) -> tuple[Alias, ...]:
+    """Return the feet's markers as a look-alike of a ``cause`` that only feet on plates show, beside the causes
+    ``named`` before it; () where they explain nothing of the values (n,) minus expectation.
+    """
+    where = _columns(evidence)
+    feet = (evidence.shared[:, where] != 0).any(axis=1)
+    if not (feet & (evidence.traces.get(cause, np.zeros(len(feet))) != 0)).any():
+        return ()
+    bayes = _evidence(evidence, value, named, where)
+    return (Alias(ToeLandmark.name, _target(evidence), bayes),) if bayes > 0 else ()
+
+
+def landmark_finding(evidence: WitnessEvidence, value: Array, named: Names) -> tuple[Finding, ...]:
+    """Return how far the markers of both feet lie beside where they are expected, where the values (n,) minus
+    expectation clearly show it, with all plates that look the same; the causes ``named`` are allowed for.
+    """
+    where = _columns(evidence)
+    feet = (evidence.shared[:, where] != 0).any(axis=1)
+    contacts = {one.contact for one, foot in zip(evidence.observations, feet, strict=True) if foot}
+    bayes = _evidence(evidence, value, named, where)
+    if len(contacts) < 2 or bayes < _SHOWN:
+        return ()
+    shown = tuple(
+        one for one in _sizes(evidence, value, named, where) if abs(one.value) > max(_USUAL + one.sd, _SHOWN * one.sd)
+    )
+    if not shown:
+        return ()
+    own = Alias(ToeLandmark.name, _target(evidence), bayes)
+    alike = (own, *_plates_alike(evidence, value, named, where, bayes))
+    return (Finding(own.effect, own.target, shown, alike, _VISIBLE, advice=ToeLandmark.advice),)
+
+
+def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> tuple[Estimate, ...]:
+    """Return how far the markers lie beside where they are expected, each kind with the causes ``named`` allowed for."""
+    norms = [name for name, one in zip(evidence.norms, where, strict=True) if one]
+    Z = np.column_stack([evidence.shared[:, where], *(evidence.traces[name] for name in named)])
+    size = np.array([1.0] * len(norms) + [SCALE * typical_size(*name) for name in named])
+    found = fit_known(evidence, value, Z, size, without=where)
+    return tuple(
+        Estimate(_quantity(norm), float(per * found.theta[i]), float(per * found.covariance[i, i] ** 0.5), "m")
+        for i, (norm, per) in enumerate(zip(norms, map(shift_per_sd, norms), strict=True))
+    )
+
+
+def _plates_alike(
+    evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_], bayes: float
+) -> list[Alias]:
+    """Return the causes that explain the values nearly as well where the markers are as expected."""
+    before, found = explain(evidence, value, named, without=where).log_evidence, []
+    for names in evidence.causes:
+        if names in named or not evidence.traces[names].any():
+            continue
+        alone = explain(evidence, value, (*named, names), without=where)
+        if bayes - (alone.log_evidence - before) <= TOGETHER and is_told(evidence, names, alone):
+            found.append(Alias(*names, alone.log_evidence - before))
+    return sorted(found, key=lambda alias: -alias.log_bayes_factor)
+
+
+def _evidence(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> float:
+    """Return the log Bayes factor of unknown places of the feet's markers against the expected ones."""
+    free, fixed = explain(evidence, value, named), explain(evidence, value, named, without=where)
+    return free.log_evidence - fixed.log_evidence
+
+
+def _columns(evidence: WitnessEvidence) -> NDArray[np.bool_]:
+    """Return (k,) which shared errors are those of where markers sit on both feet."""
+    return np.array([LANDMARK in name for name in evidence.norms], dtype=bool)
+
+
+def _quantity(norm: str) -> str:
+    """Return the parameter of the effect that a shared error is."""
+    return "backwards" if norm.endswith("along") else "inwards"
+
+
+def _target(evidence: WitnessEvidence) -> str:
+    """Return the side of the only foot seen on plates, or both."""
+    seen = [side for side in SIDES if any(name.startswith(f"person {side} ") for name in evidence.norms)]
+    return seen[0] if len(seen) == 1 else "both"

@@ -1,0 +1,30 @@
+"""The markers of the feet sit elsewhere than on the second ray and the heel: a habit of a laboratory, the same on both feet.
+
+Signature: the pressure lies outwards (or inwards) of the line from heel to toe marker in BOTH feet, half as far early
+in stance, or ahead of the heel marker in both. Look-alikes: with the right foot on one plate and the left foot on
+another, two plates that lie elsewhere in opposite directions, or one that does. Separated by the same foot on two
+plates, walks both ways, and two toe markers, on the first and the fifth ray.
+"""
+
+from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+
+
+class ToeLandmark(DiscreteEffect):
+    """The toe markers lie ``inwards`` (m) of the middle of the forefoot, the heel markers ``backwards`` (m) of the heel;
+    target: the side, or ``both``. No fault of an instrument.
+    """
+
+    name = "toe_landmark"
+    separated_by = "The same foot on both plates, walks in both directions, markers on the first and the fifth ray."
+    advice = (
+        "Nothing is broken: put a second marker on the fifth ray of each foot, or walk over the plates both ways, so "
+        "that feet and plates are told apart."
+    )
+
+    @classmethod
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
+        """Return no check: what both feet share is seen by the witnesses (`diagnosis.witness_landmark`)."""
+        return ()
+
+
+EFFECT = ToeLandmark
