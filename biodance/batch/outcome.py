@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import os
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -138,3 +139,8 @@ def outcome_of(task: SessionTask) -> Outcome | None:
     except (OSError, ValueError, TypeError, KeyError):
         return None
     return outcome if outcome.fingerprint == task.fingerprint else None
+
+
+def readable(path: Path | str) -> str:
+    """Return a path as text that every file can hold: a byte that is no UTF-8 becomes its code."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")

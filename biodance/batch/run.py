@@ -16,7 +16,16 @@ from pathlib import Path
 from typing import Any
 
 from biodance.batch.engines import Work, run_here, run_on_dask
-from biodance.batch.outcome import Outcome, SessionStatus, SessionTask, Why, fingerprint_of, outcome_of, untold
+from biodance.batch.outcome import (
+    Outcome,
+    SessionStatus,
+    SessionTask,
+    Why,
+    fingerprint_of,
+    outcome_of,
+    readable,
+    untold,
+)
 from biodance.batch.summary import SESSIONS, folder_name, write_summary
 from biodance.batch.work import PART, process_session
 from biodance.errors import BiodanceError
@@ -245,11 +254,6 @@ def _name(session: Path, archive: Path) -> str:
     """Return the name of a session: its folder below the archive, that of the archive where it is one session."""
     below = session.relative_to(archive)  # as it is called there, also where it is a link to another disk
     return readable(below if below.parts else archive.resolve().name)
-
-
-def readable(path: Path | str) -> str:
-    """Return a path as text that every file can hold: a byte that is no UTF-8 becomes its code."""
-    return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
 def summary_of(run: BatchRun) -> dict[str, Any]:

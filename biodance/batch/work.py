@@ -16,7 +16,18 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from biodance.batch.outcome import OUTCOME, Outcome, Rows, SessionStatus, SessionTask, Why, only_row, outcome_of, untold
+from biodance.batch.outcome import (
+    OUTCOME,
+    Outcome,
+    Rows,
+    SessionStatus,
+    SessionTask,
+    Why,
+    only_row,
+    outcome_of,
+    readable,
+    untold,
+)
 from biodance.errors import BiodanceError
 
 PART = ".part-"
@@ -40,7 +51,7 @@ def process_session(task: SessionTask) -> Outcome:
     started, place = time.perf_counter(), Path(task.out)
     place.parent.mkdir(parents=True, exist_ok=True)
     part = Path(tempfile.mkdtemp(prefix=PART, dir=place.parent))
-    with (part / _LOG).open("w", encoding="utf-8") as log:
+    with (part / _LOG).open("w", encoding="utf-8", errors="backslashreplace") as log:
 
         def tell(text: str) -> None:
             log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
@@ -96,6 +107,7 @@ def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> Ou
     except Exception as error:
         tell(traceback.format_exc())
         why, reason = Why.SESSION, f"biodance itself failed ({type(error).__name__}: {error}); see {_LOG}."
+    reason = readable(reason)
     tell(f"{status}: {reason}")
     return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why)
 
