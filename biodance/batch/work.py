@@ -2,7 +2,6 @@
 
 import errno
 import json
-import os
 import resource
 import shutil
 import signal
@@ -29,6 +28,8 @@ from biodance.batch.outcome import (
     untold,
 )
 from biodance.errors import BiodanceError
+from biodance.lab.session.manifest import write_manifest
+from biodance.lab.session.results_folder import inputs_of, put_in_place
 
 PART = ".part-"
 """Beginning of the name of a folder that is still being written."""
@@ -64,29 +65,11 @@ def process_session(task: SessionTask) -> Outcome:
     try:
         (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
         put_in_place(part, place)
+        shutil.rmtree(part, ignore_errors=True)  # of an earlier version of these recordings
     except OSError as error:
         shutil.rmtree(part, ignore_errors=True)
         return untold(task, SessionStatus.FAILED, f"{place}: {error.strerror or error}.", Why.MACHINE)
     return outcome
-
-
-def put_in_place(part: Path, place: Path) -> None:
-    """Flush a finished folder ``part`` to the disk and let it take the ``place`` of an earlier one."""
-    for path in (*part.rglob("*"), part):
-        flush(path)
-    if place.exists():  # of an earlier version of these recordings
-        shutil.rmtree(place)
-    part.replace(place)
-    flush(place.parent)
-
-
-def flush(path: Path) -> None:
-    """Return when a file or folder is on the disk."""
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> Outcome:
@@ -130,13 +113,16 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     from biodance.report.write import write_report
     from biodance.settings import assignments
 
-    result = examine(read_session(task.session, settings=assignments(task.chosen), tell=tell), tell=tell)
+    session = read_session(task.session, settings=assignments(task.chosen), tell=tell)
+    result = examine(session, tell=tell)
     found = diagnosed(result, tell=tell)
     result = as_diagnosed(result, found.diagnosis) if found else result
     tell("writing")
     document = write_report(result, folder, diagnosis=found, movement=session_movement(result), drawn=task.pages)
     first = document["attention"][0]["text"] if document["attention"] else ""
     status = SessionStatus.NEEDS_A_PERSON if result.needs_a_person else SessionStatus.DONE
+    read = {trial.source.path: trial.source.sha256 for trial in session.trials}
+    write_manifest(folder, session.folder, inputs_of(read, session.folder), growing=_LOG)
     tell(f"{status}: {first}")
     return status, first, rows_of(document)
 
