@@ -27,8 +27,8 @@ from pathlib import Path
 import pandas as pd
 
 import biodance
+from biodance.batch.outcome import OUTCOME
 from biodance.batch.run import LEDGER
-from biodance.batch.work import OUTCOME
 
 DATA = Path(os.environ.get("BIODANCE_DATA", "")).resolve()
 REAL = (*(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55)), "adl_gait", "pycgm", "c3d_parser_Sydney",

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from biodance import library
+from biodance.child_process import run_python
 from biodance.errors import BiodanceError
 
 _PATIENCE = 60.0
@@ -74,14 +75,12 @@ def run_probe(probe: Probe) -> MachineFinding:
     how to mend it.
     """
     try:
-        child = subprocess.run(
-            [sys.executable, "-c", probe.code], capture_output=True, text=True, timeout=_PATIENCE, check=False
-        )
+        child = run_python("-c", probe.code, timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
         return MachineFinding(probe.name, False, probe.needed, f"gives no answer within {_PATIENCE:g} s. {probe.mend}")
+    said, lines = (text.decode(errors="replace").strip().splitlines() for text in (child.stdout, child.stderr))
     if child.returncode == 0:
-        return MachineFinding(probe.name, True, probe.needed, (child.stdout.strip().splitlines() or ["works"])[-1])
-    lines = child.stderr.strip().splitlines()
+        return MachineFinding(probe.name, True, probe.needed, (said or ["works"])[-1])
     why = lines[-1] if child.returncode > 0 and lines else f"the process died (code {child.returncode})"
     return MachineFinding(probe.name, False, probe.needed, f"{why}. {probe.mend}")
 

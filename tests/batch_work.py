@@ -7,12 +7,13 @@ import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from biodance.batch.work import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of, process_session
+from biodance.batch.outcome import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of
+from biodance.batch.work import process_session
 
 
 def count(task: SessionTask) -> Outcome:
     """Write down who worked on a session, and its outcome; nothing else."""
-    if found := outcome_of(task):
+    if (found := outcome_of(task)) and found.is_final(task):
         return found
     with (Path(task.session) / "worked.log").open("a") as log:
         log.write(f"{os.getpid()}\n")

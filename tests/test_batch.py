@@ -1,7 +1,9 @@
 """Archives go through whole: nothing twice, nothing lost, whatever dies."""
 
+import errno
 import json
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -10,6 +12,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import batch_work
@@ -18,11 +21,13 @@ import pytest
 
 import biodance
 from biodance.batch.engines import TRIES, _submitted
+from biodance.batch.outcome import Outcome, SessionStatus, SessionTask, fingerprint_of
 from biodance.batch.run import LEDGER, Ledger, run_batch
 from biodance.batch.summary import outliers, summary_table
-from biodance.batch.work import ROW_TYPES, Outcome, SessionStatus, SessionTask, process_session, rows_of
+from biodance.batch.work import ROW_TYPES, process_session, rows_of
 from biodance.cli import run
 from biodance.errors import BiodanceError
+from biodance.pipeline.trial import attempt
 
 
 def archive_of(folder: Path, count: int) -> Path:
@@ -159,7 +164,7 @@ def test_a_session_that_takes_too_long_is_given_up(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("biodance.batch.work._examined", lambda *_: time.sleep(20))
     session = archive_of(tmp_path / "a", 1) / "s0"
     found = process_session(SessionTask("s0", str(session), str(tmp_path / "out" / "s0"), "f", limit=0.2))
-    assert (found.status, found.reason) == ("failed", "Given up after 0 s; see --limit.")
+    assert (found.status, found.reason) == ("failed", "Given up after 0 s; a higher --limit tries again.")
     assert "Given up" in (tmp_path / "out" / "s0" / "log.txt").read_text()
 
 
@@ -262,3 +267,94 @@ def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None
     pytest.importorskip("distributed")
     with pytest.raises(BiodanceError, match="no Dask scheduler answers there"):
         run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", workers="nobody://x", work=batch_work.count)
+
+
+@pytest.mark.parametrize(
+    ("raised", "status", "again"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "failed", True),
+        (MemoryError(), "failed", True),
+        (BiodanceError("broken header"), "refused", False),
+        (ZeroDivisionError("a fault of ours"), "failed", False),
+    ],
+)
+def test_only_what_hangs_on_the_recordings_is_final(tmp_path: Path, monkeypatch, raised, status, again) -> None:
+    def fails(*_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr("biodance.batch.work._examined", fails)
+    task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f")
+    assert process_session(task).status == status
+    monkeypatch.setattr("biodance.batch.work._examined", lambda *_: (SessionStatus.DONE, "", ()))
+    assert process_session(task).status == ("done" if again else status)
+
+
+def test_a_refusal_for_want_of_room_is_the_machines(tmp_path: Path, monkeypatch) -> None:
+    def fails(*_: object) -> None:
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        except OSError as error:
+            raise BiodanceError("results.json cannot be written") from error
+
+    monkeypatch.setattr("biodance.batch.work._examined", fails)
+    task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f")
+    found = process_session(task)
+    assert (found.status, found.why) == ("refused", "machine")
+    assert not found.is_final(task)
+
+
+def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monkeypatch) -> None:
+    def slow(*_: object) -> tuple[SessionStatus, str, tuple]:
+        steps: list = []
+        attempt(steps, "track", lambda: time.sleep(20))
+        return SessionStatus.DONE, "ran on without its step", ()
+
+    monkeypatch.setattr("biodance.batch.work._examined", slow)
+    task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f", limit=0.2)
+    found = process_session(task)
+    assert (found.status, found.why, found.limit) == ("failed", "limit", 0.2)
+    assert found.is_final(task)
+    assert found.is_final(replace(task, limit=0.1))
+    assert not found.is_final(replace(task, limit=0.3))
+
+
+@pytest.mark.parametrize("damage", ["deleted", "empty", "cut"])
+def test_a_missing_or_damaged_outcome_is_done_again(tmp_path: Path, damage: str) -> None:
+    archive, out = archive_of(tmp_path / "a", 3), tmp_path / "out"
+    run_batch(archive, out, workers=1, pages=False)
+    victim = out / "sessions" / "s1" / "outcome.json"
+    if damage == "deleted":
+        shutil.rmtree(victim.parent)
+    else:
+        victim.write_bytes(victim.read_bytes()[: 0 if damage == "empty" else 40])
+    again = run_batch(archive, out, workers=1, pages=False)
+    assert (again.fresh, again.counts) == (1, {"refused": 3})
+    assert all(one.rows for one in again.outcomes)
+
+
+def test_settings_and_times_of_files_belong_to_the_fingerprint(tmp_path: Path) -> None:
+    session = archive_of(tmp_path / "a", 1) / "s0"
+    before = fingerprint_of(session, ())
+    assert fingerprint_of(session, ("filter.cutoff=6",)) != before
+    (session / "walk.c3d").write_bytes(b"other number")  # as long as before
+    os.utime(session / "walk.c3d", ns=(1, 1))
+    assert fingerprint_of(session, ()) != before
+
+
+def test_what_a_killed_run_left_half_written_is_cleared(tmp_path: Path) -> None:
+    archive, out = archive_of(tmp_path / "a", 1), tmp_path / "out"
+    run_batch(archive, out, workers=1, pages=False)
+    (out / "sessions" / ".part-xyz").mkdir()
+    (out / "sessions" / ".part-xyz" / "log.txt").write_text("half")
+    run_batch(archive, out, workers=1, pages=False)
+    assert sorted(path.name for path in (out / "sessions").iterdir()) == ["s0"]
+
+
+def test_a_folder_name_that_is_no_utf8_does_not_end_the_archive(tmp_path: Path) -> None:
+    archive = archive_of(tmp_path / "a", 1)
+    strange = Path(os.fsdecode(os.fsencode(archive) + b"/M\xfcller"))
+    strange.mkdir()
+    (strange / "walk.c3d").write_bytes(b"no recording")
+    found = run_batch(archive, tmp_path / "out", workers=1, pages=False)
+    assert [one.name for one in found.outcomes] == ["M\\xfcller", "s0"]
+    assert found.counts == {"refused": 2}

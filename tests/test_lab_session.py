@@ -183,9 +183,10 @@ def test_real_session_finds_static_and_subject(place, static, subject, data):
 
 def test_results_get_a_folder_of_their_own(folder):
     made = results_folder(folder / "biodance", folder)
-    assert made == (folder / "biodance").resolve()
-    assert made.is_dir()
-    (made / "results.json").write_text("{}")
+    assert made.place == (folder / "biodance").resolve()
+    (made.part / "results.json").write_text("{}")
+    assert read_session(folder).refused == {}
+    assert made.finish(folder, {}) is None
     with pytest.raises(SessionRefused, match="nothing is overwritten"):
         results_folder(folder / "biodance", folder)
     assert results_folder(folder / "biodance", folder, force=True) == made
@@ -261,16 +262,16 @@ def test_markers_and_forces_in_folders_of_their_own_and_copies(tmp_path):
 
 def test_two_runs_never_write_into_one_folder(tmp_path, folder):
     out = results_folder(tmp_path / "out", folder)
-    assert results_folder(out, folder) == out  # this process holds it
-    lock = next(out.glob(".*lock"))
+    assert results_folder(tmp_path / "out", folder) == out  # this process holds it
+    lock = next(out.part.glob(".*lock"))
     other = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     try:
         lock.write_text(f"{other.pid} {platform.node()}")
         with pytest.raises(SessionRefused, match=f"process {other.pid} on .* is writing there"):
-            results_folder(out, folder)
+            results_folder(tmp_path / "out", folder)
     finally:
         other.communicate(b"\n")
-    assert results_folder(out, folder) == out  # that one has ended
+    assert results_folder(tmp_path / "out", folder) == out  # that one has ended
     assert lock.read_text().startswith(f"{os.getpid()} ")
 
 

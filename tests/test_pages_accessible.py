@@ -16,8 +16,9 @@ from plate_archives import Step, draw
 from small_dances import small_dance
 
 import biodance
+from biodance.batch.outcome import Outcome
 from biodance.batch.summary import write_summary
-from biodance.batch.work import Outcome, rows_of
+from biodance.batch.work import rows_of
 from biodance.cli import run
 from biodance.cli.app import NOT_DONE
 from biodance.dance.problem.plan import read_plan

@@ -12,6 +12,7 @@ from identified_sessions import session_result
 from scipy.spatial.transform import Rotation
 
 from biodance.body.solids import shape_parts
+from biodance.child_process import run_python
 from biodance.identification.added_mass import added_mass
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 from biodance.motion.kinematics import poses
@@ -131,9 +132,8 @@ def test_pictures_are_drawn_where_the_machine_can(result):
     "code", ["import os; os.abort()", "print('[]')", "print('no json')", "import time; time.sleep(30)"]
 )
 def test_a_child_without_gl_is_no_crash_and_no_hang(result, monkeypatch, code):
-    run = solid.subprocess.run
     monkeypatch.setattr(solid, "_PATIENCE", 1.5)
-    monkeypatch.setattr(solid.subprocess, "run", lambda words, **kind: run([words[0], "-c", code], **kind))
+    monkeypatch.setattr(solid, "run_python", lambda *_, **kind: run_python("-c", code, **kind))
     assert sheet_png([posture_still(result.body, result.body.neutral, "one")]) is None
 
 

@@ -9,7 +9,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING
 
-from biodance.batch.work import Outcome, SessionStatus, SessionTask, untold
+from biodance.batch.outcome import Outcome, SessionStatus, SessionTask, Why, untold
+from biodance.child_process import keep_children_safe
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -80,11 +81,12 @@ def _submitted(pool: ProcessPoolExecutor, work: Work, task: SessionTask) -> Futu
 def _killed(task: SessionTask) -> Outcome:
     """Return the outcome of a session that nobody survives."""
     why = f"Its process was ended from outside {TRIES} times (memory?). Report it alone to see why."
-    return untold(task.name, task.fingerprint, SessionStatus.FAILED, why)
+    return untold(task, SessionStatus.FAILED, why, Why.MACHINE)
 
 
 def _process() -> ProcessPoolExecutor:
     """Return one process that ends with us, even when we are killed."""
+    keep_children_safe()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["biodance.pipeline.front", "biodance.report.write"])
     return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)

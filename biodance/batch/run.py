@@ -5,6 +5,7 @@ What is done is written into one SQLite file in the results' folder, under a loc
 
 import fcntl
 import os
+import shutil
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -15,8 +16,18 @@ from pathlib import Path
 from typing import Any
 
 from biodance.batch.engines import Work, run_here, run_on_dask
+from biodance.batch.outcome import (
+    Outcome,
+    SessionStatus,
+    SessionTask,
+    Why,
+    fingerprint_of,
+    outcome_of,
+    readable,
+    untold,
+)
 from biodance.batch.summary import SESSIONS, folder_name, write_summary
-from biodance.batch.work import Outcome, SessionStatus, SessionTask, fingerprint_of, outcome_of, process_session, untold
+from biodance.batch.work import PART, process_session
 from biodance.errors import BiodanceError
 from biodance.lab.session.archive import archive_folders
 from biodance.settings import assignments
@@ -66,7 +77,7 @@ class Ledger:
             ) from None
         self._book = sqlite3.connect(known)
         self._book.executescript(_TABLE)
-        place = str(archive.resolve())
+        place = readable(archive.resolve())
         with self._book:
             self._book.execute("INSERT INTO archive SELECT ? WHERE NOT EXISTS (SELECT 1 FROM archive)", (place,))
         (owner,) = self._book.execute("SELECT folder FROM archive").fetchone()
@@ -74,16 +85,18 @@ class Ledger:
             self.close()
             raise BiodanceError(f"{folder}: holds the results of another archive ({owner}). Choose another --out.")
 
-    def open_tasks(self, tasks: Iterable[SessionTask]) -> list[SessionTask]:
-        """Return the tasks that are not written down as done with the recordings as they are now."""
-        known = dict(self._book.execute("SELECT name, fingerprint FROM sessions"))
-        return [task for task in tasks if known.get(task.name) != task.fingerprint]
-
     def write(self, outcome: Outcome) -> None:
         """Write down what became of a session; it is on disk when this returns."""
         row = attrgetter("name", "fingerprint", "status", "reason", "seconds", "memory_mb")(outcome)
         with self._book:
             self._book.execute(_WRITE, row)
+
+    def note(self, outcomes: Iterable[Outcome]) -> None:
+        """Write down what lies in the sessions' folders and is not in the book."""
+        known = dict(self._book.execute("SELECT name, fingerprint FROM sessions"))
+        for outcome in outcomes:
+            if known.get(outcome.name) != outcome.fingerprint:
+                self.write(outcome)
 
     def told(self, task: SessionTask) -> Outcome | None:
         """Return what is written down of a session that has no folder of its own (its process died each time)."""
@@ -91,7 +104,7 @@ class Ledger:
         row = self._book.execute(query, (task.name,)).fetchone()
         if row is None or row[0] != task.fingerprint:
             return None
-        return untold(task.name, row[0], SessionStatus(row[1]), row[2])
+        return untold(task, SessionStatus(row[1]), row[2], Why.MACHINE)
 
     def close(self) -> None:
         """Close the book and let others in."""
@@ -192,12 +205,14 @@ def run_batch(
     for path in sessions:
         if results not in (path.resolve(), *path.resolve().parents):
             name, fingerprint = _name(path, archive), fingerprint_of(path, chosen)
-            place = str(folder / SESSIONS / folder_name(name))
-            tasks.append(SessionTask(name, str(path), place, fingerprint, chosen, pages, limit))
+            place = os.path.abspath(folder / SESSIONS / folder_name(name))  # workers of a cluster work elsewhere
+            tasks.append(SessionTask(name, os.path.abspath(path), place, fingerprint, chosen, pages, limit))
     if not tasks:
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
     with closing(Ledger(folder, archive)) as ledger:
+        for left in (folder / SESSIONS).glob(f"{PART}*"):  # of a run that was killed
+            shutil.rmtree(left, ignore_errors=True)
         fresh = _work_off(tasks, ledger, workers, work, tell)
         outcomes = tuple(found for task in tasks if (found := outcome_of(task) or ledger.told(task)))
         left_out = tuple(str(path.relative_to(archive)) for path in indices)
@@ -213,11 +228,13 @@ def _work_off(
     work: Work,
     tell: Callable[[str, int, int], None],
 ) -> int:
-    """Go through all tasks that are open, write down each as it is finished, and return how many were open."""
-    for task in ledger.open_tasks(tasks):
-        if found := outcome_of(task):  # finished when the run was killed
-            ledger.write(found)
-    open_tasks = ledger.open_tasks(tasks)
+    """Go through all tasks that are open, write down each as it is finished, and return how many were open.
+
+    What counts is the outcome in a session's folder: where it is missing, damaged, or not final, the session is open.
+    """
+    known = {task.name: found for task in tasks if (found := outcome_of(task))}
+    open_tasks = [task for task in tasks if not (task.name in known and known[task.name].is_final(task))]
+    ledger.note(known.values())  # finished when a run was killed
     done = len(tasks) - len(open_tasks)
     tell("beginning", done, len(tasks))
     if not open_tasks:
@@ -236,7 +253,7 @@ def _work_off(
 def _name(session: Path, archive: Path) -> str:
     """Return the name of a session: its folder below the archive, that of the archive where it is one session."""
     below = session.relative_to(archive)  # as it is called there, also where it is a link to another disk
-    return below.as_posix() if below.parts else archive.resolve().name
+    return readable(below if below.parts else archive.resolve().name)
 
 
 def summary_of(run: BatchRun) -> dict[str, Any]:

@@ -9,7 +9,8 @@ from urllib.parse import quote
 
 import numpy as np
 
-from biodance.batch.work import ROW_TYPES, Outcome
+from biodance.batch.outcome import Outcome
+from biodance.batch.work import ROW_TYPES
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 from biodance.report.files import write_files

@@ -1,173 +1,106 @@
 """One session of an archive, in a process of its own: page, numbers, log, and an outcome that is there whole or not."""
 
-import hashlib
+import errno
 import json
 import resource
 import shutil
 import signal
+import tempfile
 import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from enum import StrEnum
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from biodance.batch.outcome import (
+    OUTCOME,
+    Outcome,
+    Rows,
+    SessionStatus,
+    SessionTask,
+    Why,
+    only_row,
+    outcome_of,
+    readable,
+    untold,
+)
 from biodance.errors import BiodanceError
-from biodance.version import __version__
+from biodance.lab.session.manifest import write_manifest
+from biodance.lab.session.results_folder import inputs_of, put_in_place
 
-OUTCOME = "outcome.json"
-"""Written last into a session's folder: where it is, the session is done."""
+PART = ".part-"
+"""Beginning of the name of a folder that is still being written."""
 _LOG = "log.txt"
-Rows = tuple[dict[str, Any], ...]
-"""One row of plain values for each trial."""
+_OF_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EROFS)
 
 
-class SessionStatus(StrEnum):
-    """What became of a session. Refused: the recordings cannot be used. Failed: biodance, or the machine, did not get
-    through.
-    """
-
-    DONE = "done"
-    NEEDS_A_PERSON = "needs a person"
-    REFUSED = "refused"
-    FAILED = "failed"
-
-
-@dataclass(frozen=True)
-class SessionTask:
-    """One session to go through.
-
-    Parameters
-    ----------
-    name : str
-        The session's folder below the archive.
-    session, out : str
-        Folders of the recordings and of the results.
-    fingerprint : str
-        Of the recordings, the settings and the version (`fingerprint_of`).
-    chosen : tuple of str
-        Settings, such as ``filter.cutoff=6``.
-    pages : bool
-        Whether the page is drawn; numbers are written always.
-    limit : float
-        s after which the session is given up.
-    """
-
-    name: str
-    session: str
-    out: str
-    fingerprint: str
-    chosen: tuple[str, ...] = ()
-    pages: bool = True
-    limit: float = 1800.0
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one session.
-
-    Parameters
-    ----------
-    name, fingerprint : str
-        Of its `SessionTask`.
-    status : SessionStatus
-        What became of it.
-    reason : str
-        Why, where it is not done; else the first thing that a person must see.
-    rows : tuple of dict
-        One for each trial, of plain values.
-    seconds, memory_mb : float
-        It took, and the process had at most.
-    """
-
-    name: str
-    fingerprint: str
-    status: SessionStatus
-    reason: str = ""
-    rows: Rows = ()
-    seconds: float = 0.0
-    memory_mb: float = 0.0
-
-    @property
-    def unread(self) -> bool:
-        """Whether nothing can be said of the session."""
-        return self.status in (SessionStatus.REFUSED, SessionStatus.FAILED)
-
-
-def untold(name: str, fingerprint: str, status: SessionStatus, reason: str) -> Outcome:
-    """Return the outcome of a session of which nothing but the reason can be told."""
-    return Outcome(name, fingerprint, status, reason, ({"trial": "", "status": str(status), "reason": reason},))
-
-
-def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
-    """Return what changes when recordings, settings or version change: of names, sizes and times of the files."""
-    seen = hashlib.sha256(repr((__version__, sorted(chosen))).encode())
-    for path in sorted(session.rglob("*")):
-        if path.is_file():
-            known = path.stat()
-            seen.update(repr((str(path.relative_to(session)), known.st_size, known.st_mtime_ns)).encode())
-    return seen.hexdigest()[:24]
-
-
-def outcome_of(task: SessionTask) -> Outcome | None:
-    """Return what became of a session in this or an earlier run; None where it is not done as it is now."""
-    try:
-        found = json.loads((Path(task.out) / OUTCOME).read_text(encoding="utf-8"))
-        outcome = Outcome(**{**found, "status": SessionStatus(found["status"]), "rows": tuple(found["rows"])})
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-    return outcome if outcome.fingerprint == task.fingerprint else None
+class _OutOfTimeError(BaseException):
+    """A session takes too long; no step of it may take that for a fault of its own."""
 
 
 def process_session(task: SessionTask) -> Outcome:
     """Go through one session and return what became of it; nothing but a signal gets out of here.
 
-    All is written beside and put in place at once, so that a killed process leaves nothing half done. A session that
-    was finished meanwhile is not gone through again.
+    All is written beside, flushed to the disk, and put in place at once, so that neither a killed process nor a power
+    cut leaves anything half done. A session that was finished meanwhile is not gone through again.
     """
-    if found := outcome_of(task):
+    if (found := outcome_of(task)) and found.is_final(task):
         return found
     started, place = time.perf_counter(), Path(task.out)
-    part = place.with_name(f".{place.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    with (part / _LOG).open("w", encoding="utf-8") as log:
+    place.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=PART, dir=place.parent))
+    with (part / _LOG).open("w", encoding="utf-8", errors="backslashreplace") as log:
 
         def tell(text: str) -> None:
             log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
             log.flush()
 
-        status, reason, rows = _attempt(task, part, tell)
+        outcome = _attempt(task, part, tell)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     seconds = time.perf_counter() - started
-    outcome = Outcome(task.name, task.fingerprint, status, reason, rows, round(seconds, 2), round(memory, 1))
-    (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
-    shutil.rmtree(place, ignore_errors=True)  # of an earlier version of these recordings
-    part.replace(place)
+    outcome = replace(outcome, seconds=round(seconds, 2), memory_mb=round(memory, 1), limit=task.limit)
+    try:
+        (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
+        put_in_place(part, place)
+        shutil.rmtree(part, ignore_errors=True)  # of an earlier version of these recordings
+    except OSError as error:
+        shutil.rmtree(part, ignore_errors=True)
+        return untold(task, SessionStatus.FAILED, f"{place}: {error.strerror or error}.", Why.MACHINE)
     return outcome
 
 
-def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
-    """Return status, reason and rows of a session; what is raised becomes a status."""
+def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> Outcome:
+    """Return what became of a session; what is raised becomes a status."""
+    status, why = SessionStatus.FAILED, Why.MACHINE
     try:
         with _limited(task.limit):
-            return _examined(task, folder, tell)
+            status, reason, rows = _examined(task, folder, tell)
+            return Outcome(task.name, task.fingerprint, status, reason, rows)
     except BiodanceError as error:
-        status, reason = SessionStatus.REFUSED, str(error)
-    except TimeoutError:
-        status, reason = SessionStatus.FAILED, f"Given up after {task.limit:.0f} s; see --limit."
+        status, why, reason = SessionStatus.REFUSED, _hangs_on(error), str(error)
+    except _OutOfTimeError:
+        why, reason = Why.LIMIT, f"Given up after {task.limit:.0f} s; a higher --limit tries again."
     except MemoryError:
-        status, reason = SessionStatus.FAILED, "The memory of the machine was not enough. Take fewer workers."
+        reason = "The memory of the machine was not enough. Take fewer workers."
     except OSError as error:
-        status, reason = SessionStatus.FAILED, f"{error.filename or folder}: {error.strerror or error}."
+        reason = f"{error.filename or folder}: {error.strerror or error}."
     except Exception as error:
         tell(traceback.format_exc())
-        status, reason = SessionStatus.FAILED, f"biodance itself failed ({type(error).__name__}: {error}); see {_LOG}."
+        why, reason = Why.SESSION, f"biodance itself failed ({type(error).__name__}: {error}); see {_LOG}."
+    reason = readable(reason)
     tell(f"{status}: {reason}")
-    return status, reason, ({"trial": "", "status": str(status), "reason": reason},)
+    return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why)
+
+
+def _hangs_on(error: BaseException) -> Why:
+    """Return whether a refusal comes of the recordings, or of a machine without room: by what raised it."""
+    cause = error.__cause__ or error.__context__
+    if isinstance(cause, MemoryError) or (isinstance(cause, OSError) and cause.errno in _OF_MACHINE):
+        return Why.MACHINE
+    return _hangs_on(cause) if cause else Why.SESSION
 
 
 def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
@@ -180,7 +113,8 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     from biodance.report.write import write_report
     from biodance.settings import assignments
 
-    result = examine(read_session(task.session, settings=assignments(task.chosen), tell=tell), tell=tell)
+    session = read_session(task.session, settings=assignments(task.chosen), tell=tell)
+    result = examine(session, tell=tell)
     found = diagnosed(result, tell=tell)
     result = as_diagnosed(result, found.diagnosis) if found else result
     tell("writing")
@@ -188,13 +122,15 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     first = document["attention"][0]["text"] if document["attention"] else ""
     well = all(row["level"] == "note" for row in document["attention"])
     status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON
+    read = {trial.source.path: trial.source.sha256 for trial in session.trials}
+    write_manifest(folder, session.folder, inputs_of(read, session.folder), growing=_LOG)
     tell(f"{status}: {first}")
     return status, first, rows_of(document)
 
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError when what follows takes longer; in a thread that is not the main one, as those of a Dask
+    """Raise `_OutOfTimeError` when what follows takes longer; in a thread that is not the main one, as those of a Dask
     worker, nothing can be interrupted and there is no limit.
     """
     if threading.current_thread() is not threading.main_thread():
@@ -202,7 +138,7 @@ def _limited(seconds: float) -> Iterator[None]:
         return
 
     def stop(*_: object) -> None:
-        raise TimeoutError
+        raise _OutOfTimeError
 
     before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, seconds)

@@ -1,5 +1,6 @@
 """Commands on the archive of a laboratory: all its sessions, its plates over time, its own tolerances."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from biodance.cli.app import (
     app,
     print_json,
     progress,
+    put_results,
     say,
     show,
     whole,
@@ -83,10 +85,11 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     from biodance.report.pages.plates import write_plates
 
     with progress() as tell:
-        folder = results_folder(out, archive_folder(archive), force=force)
+        place = results_folder(out, archive_folder(archive), force=force)
         found = judge_plates(archive, tell=tell)
         tell("writing the page")
-        document = write_plates(found, folder)
+        document = write_plates(found, place.part)
+        folder = put_results(place, archive_folder(archive), {})
     show(document, print_plates, json=json, path=folder / "report.html")
     return NEEDS_A_PERSON if found.judgement.findings or found.refused else DONE
 
@@ -114,3 +117,30 @@ def learn_command(
         write_lab_file(found, out)
     show(learned_document(found), print_learned, json=json, path=out)
     return NEEDS_A_PERSON if found.left_out else DONE
+
+
+@app.command(name="verify")
+def verify_command(place: Path, *, json: JsonOption = False) -> int:
+    """Check, years later too, that results are whole, of one run, and of the recordings as they lie there now.
+
+    Parameters
+    ----------
+    place
+        A results folder, or a folder that contains results folders at any depth.
+    """
+    from dataclasses import asdict
+
+    from biodance.errors import BiodanceError
+    from biodance.lab.session.manifest import results_below, verify
+
+    folders = results_below(place) if place.is_dir() else ()
+    if not folders:
+        raise BiodanceError(f"{place}: holds no results with a manifest.json (earlier versions wrote none).")
+    found = [one for folder in folders if (one := verify(folder))]
+    if json:
+        print_json([{**asdict(one), "folder": str(one.folder), "whole": one.whole} for one in found])
+    for one in () if json else found:
+        wrong = {"missing": one.missing, "changed": one.changed, "recordings changed or not there": one.inputs_changed}
+        said = "; ".join(f"{what}: {', '.join(names)}" for what, names in wrong.items() if names)
+        sys.stdout.write(f"{one.folder}: {said or 'whole'}, biodance {one.manifest.version}\n")
+    return DONE if all(one.whole and not one.inputs_changed for one in found) else NEEDS_A_PERSON

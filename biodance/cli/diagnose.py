@@ -97,15 +97,17 @@ def diagnose_command(
     from biodance.report.write import write_diagnosis
 
     with progress() as tell:
-        place, carried = results.make_tables_folder(session), read_lab(reading.lab)
-        result, before, folder = examine_with_reference(session, reading, results, tell)
+        tables, carried = results.make_tables_folder(session), read_lab(reading.lab)
+        result, before, place = examine_with_reference(session, reading, results, tell)
+        recorded, folder = result.session, place.part
         found = front.diagnose(result, reference=before, tolerances=carried.tolerances, accept=accept, tell=tell)
         result = found.mended.result if found.mended is not None else result
         result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
         moved = describe_movement(result, lab=reading.lab, tell=tell)
-        tabled(result, place, found.diagnosis, movement=moved)
+        tabled(result, tables, found.diagnosis, movement=moved)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
+        folder = results.finish(place, recorded)
     results.show_page(folder)
     show(document, print_diagnosis, json=results.json, path=folder / "report.html")
     return NEEDS_A_PERSON if document["failures"] else exit_code(document)

@@ -16,6 +16,7 @@ from biodance.cli.app import (
     RobotFile,
     app,
     progress,
+    put_results,
     show,
 )
 from biodance.cli.session import examine_with_reference, exit_code, tabled
@@ -42,10 +43,11 @@ def examine_robot(
         raise BiodanceError(f"{', '.join(for_people)} cannot be used with --urdf: they are for sessions of people.")
     with progress() as tell:
         both = named_feet(feet)
-        folder = results_folder(results.out, recording, force=results.force)
+        place = results_folder(results.out, recording, force=results.force)
         result = identify_robot(recording, urdf=urdf, feet=both, mend=robot.mend, tell=tell)
         tell("writing the page")
-        found = write_robot(result, folder)
+        found = write_robot(result, place.part)
+        folder = put_results(place, recording, {})
     results.show_page(folder)
     return result, folder, found
 
@@ -89,17 +91,18 @@ def identify_command(
     from biodance.report.write import write_identification
 
     with progress() as tell:
-        place = results.make_tables_folder(session)
+        tables = results.make_tables_folder(session)
         shown = None if dance is None else Dance.load(dance)
-        result, _, folder = examine_with_reference(session, reading, results, tell, dance=shown)
+        result, _, place = examine_with_reference(session, reading, results, tell, dance=shown)
         found = front.identify(result, dance=shown)
         result = replace(result, identification=found)
         tell("checking units, signs, labels and clocks")
         checks = failed_checks(result)
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tell("writing the page")
-        tabled(result, place, movement=moved)
-        document = write_identification(result, found, folder, checks=checks, movement=moved)
+        tabled(result, tables, movement=moved)
+        document = write_identification(result, found, place.part, checks=checks, movement=moved)
+        folder = results.finish(place, result.session)
     results.show_page(folder)
     return _told_identified(result, folder, document, results.json)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from biodance.dance.dance import Dance
     from biodance.diagnosis.diagnosis import Diagnosis
+    from biodance.lab.session.results_folder import ResultsFolder
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
@@ -102,9 +103,9 @@ def examine_with_reference(
     tell: "Callable[[str], None]",
     *,
     dance: "Dance | None" = None,
-) -> "tuple[SessionResult, SessionIdentification | None, Path]":
+) -> "tuple[SessionResult, SessionIdentification | None, ResultsFolder]":
     """Examine a session beside an earlier one of the same person; return what was found, what that one said, and the
-    results' folder.
+    results' folder in the making.
 
     What cannot be read or written is said before the long work starts, and so is a ``dance`` for which the plates are
     too small.
@@ -122,11 +123,11 @@ def examine_with_reference(
     lab, known = read_lab(reading.lab), known_body(reading.body)
     earlier = lab.corrected(reading.read(reading.reference, tell)) if reading.reference else None
     recording = lab.corrected(reading.read(session, tell))
-    folder = results_folder(results.out, session, force=results.force)
+    place = results_folder(results.out, session, force=results.force)
     if dance is not None and (why := plates_too_small(dance, recording)):
         say(f"look: {why}")
     before = identify(earlier, tell=tell) if earlier else None
-    return examine(recording, reference=before, known=known, tell=tell), before, folder
+    return examine(recording, reference=before, known=known, tell=tell), before, place
 
 
 @app.command(name="report")
@@ -152,10 +153,11 @@ def report_command(
         Session folder: the static trial and the other trials.
     """
     with progress() as tell:
-        place = results.make_tables_folder(session)
-        result, before, folder = examine_with_reference(session, reading, results, tell)
+        tables = results.make_tables_folder(session)
+        result, before, place = examine_with_reference(session, reading, results, tell)
         result, found = report_session(
-            result, folder, tell, tables=place, reference=before, lab=reading.lab, for_subject=subject_page
+            result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=subject_page
         )
+        folder = results.finish(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)

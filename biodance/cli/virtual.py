@@ -7,7 +7,18 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from biodance.cli.app import DONE, NOBODY, ForceOption, OutOption, PersonFacts, app, not_negative, progress, whole
+from biodance.cli.app import (
+    DONE,
+    NOBODY,
+    ForceOption,
+    OutOption,
+    PersonFacts,
+    app,
+    not_negative,
+    progress,
+    put_results,
+    whole,
+)
 from biodance.cli.session import print_reported, report_session
 
 
@@ -99,8 +110,10 @@ def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -
     with progress() as tell:
         tell("simulating a session")
         session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
-        folder = results_folder(out / "report", session, force=force)
-        result, found = report_session(examine(read_session(session, tell=tell), tell=tell), folder, tell)
+        place = results_folder(out / "report", session, force=force)
+        result, found = report_session(examine(read_session(session, tell=tell), tell=tell), place.part, tell)
+        inputs = {trial.source.path: trial.source.sha256 for trial in result.session.trials}
+        folder = put_results(place, session, inputs)
     return print_reported(result, folder, found, False)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.errors import FileRefused, SessionRefused, TrialRefused
+from biodance.lab.session.manifest import refuse_mixture
 from biodance.lab.session.read import read_session
 from biodance.motion.contact.contact import ground_contact
 from biodance.motion.contact.soles import soles_from_body
@@ -91,7 +92,10 @@ def known_body(body: Body | str | Path | None) -> Body | None:
     if body is None or isinstance(body, Body):
         return body
     path = Path(body)
-    return read_body(path / "body.json" if path.is_dir() else path)[0]
+    if path.is_dir():
+        refuse_mixture(path, (BODY,))
+        path = path / BODY
+    return read_body(path)[0]
 
 
 def read_kept(folder: Path) -> KeptResults:
@@ -102,8 +106,9 @@ def read_kept(folder: Path) -> KeptResults:
     SessionRefused
         It keeps no motions: it was made by an earlier version, or no trial gave one.
     FileRefused
-        A file in it is none of biodance's.
+        A file in it is none of biodance's, or not of the run that wrote the others.
     """
+    refuse_mixture(folder, (BODY, SCALED, MOTIONS))
     body, source = read_body(kept_body(folder))
     if not (folder / MOTIONS).is_file():
         raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder instead.")

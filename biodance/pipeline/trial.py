@@ -35,13 +35,16 @@ def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
     """Do ``work``, append what became of it to ``steps`` and return its result; None where it was refused or failed.
 
     A `BiodanceError` is a refusal: the data cannot carry this step. Any other exception is a fault of biodance: it is
-    named as such, its traceback goes to the log (level debug), and the remaining steps are done all the same.
+    named as such, its traceback goes to the log (level debug), and the remaining steps are done all the same. Memory
+    that is short ends the session.
     """
     try:
         value = work()
     except BiodanceError as error:
         steps.append(Step(name, "refused", str(error)))
         return None
+    except MemoryError:
+        raise  # of the machine, not of this step
     except Exception as error:
         log.debug("step %s failed", name, exc_info=True)
         fault = (

@@ -4,13 +4,13 @@ process.
 
 import io
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.child_process import run_python
 from biodance.lab.c3d.layout import Layout
 from biodance.lab.c3d.parameters import MIPS, doubles, floats
 from biodance.records import Array, any_coordinate
@@ -86,9 +86,7 @@ def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
         How biodance understood the data section.
     """
     try:
-        child = subprocess.run(
-            [sys.executable, "-c", READ, str(path)], capture_output=True, timeout=_PATIENCE, check=False
-        )
+        child = run_python("-c", READ, str(path), timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
         return f"ezc3d gives no answer within {_PATIENCE:g} s"
     except OSError as error:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from biodance.child_process import run_python
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.declared import texts
 from biodance.lab.c3d.raw import RawC3d, read_raw
@@ -150,11 +151,9 @@ def _in_file(output: Output, unit: str, metres: float, turn: Array) -> Array:
 
 def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:
     """Have the child write the copy; whatever goes wrong in it refuses the file."""
-    words = [sys.executable, "-m", "biodance.lab.c3d.results", str(original), str(made)]
+    words, asked = ("-m", "biodance.lab.c3d.results", str(original), str(made)), json.dumps(question).encode()
     try:
-        child = subprocess.run(
-            words, input=json.dumps(question).encode(), capture_output=True, timeout=_PATIENCE, check=False
-        )
+        child = run_python(*words, input=asked, timeout=_PATIENCE)
     except (subprocess.TimeoutExpired, OSError) as error:
         raise FileRefused(
             f"{original}: ezc3d gives no copy of it ({error}). Export the trial again from the recording software."

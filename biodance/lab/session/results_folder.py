@@ -1,25 +1,131 @@
-"""Where results go: a folder of their own, never over or among the raw recordings."""
+"""Where results go: a folder of their own, never over or among the raw recordings, there whole or not at all.
+
+A run writes into a folder beside its place (`ResultsFolder.part`). When all is written and on the disk, the two change
+places in one step: whoever looks sees the earlier results or the new ones, never a mixture.
+"""
 
 import atexit
+import ctypes
 import os
 import platform
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from biodance.errors import SessionRefused
 from biodance.lab.readers import extensions
+from biodance.lab.session.manifest import MANIFEST, files_in, read_manifest, write_manifest
 from biodance.lab.session.recordings import RESULTS, TEXT
 
+_LOCK = ".biodance.lock"
+_EXCHANGE, _HERE = 2, -100
+"""RENAME_EXCHANGE and AT_FDCWD of renameat2(2): both names change places at once."""
 
-def results_folder(out: str | Path, session: str | Path, *, force: bool = False) -> Path:
-    """Return the folder for the results of a session, made if missing.
 
-    ``force`` allows a folder that holds results of an earlier run (a results.json or report.html); they are overwritten
-    one by one.
+@dataclass(frozen=True)
+class ResultsFolder:
+    """A folder of results in the making: ``part``, into which everything is written, takes the ``place``."""
+
+    place: Path
+    part: Path
+
+    def finish(self, session: Path, inputs: Mapping[str, str]) -> Path | None:
+        """Bind what was written to the recordings of a ``session`` (``inputs``: name -> SHA-256) and put it in place.
+
+        Return the folder to which the files of an earlier run's folder went that were not biodance's; None if there
+        were none.
+
+        Raises
+        ------
+        SessionRefused
+            The disk is full, or the place cannot be written to; what was there is as before.
+        """
+        try:
+            write_manifest(self.part, session, inputs)
+            (self.part / _LOCK).unlink(missing_ok=True)
+            put_in_place(self.part, self.place)
+            return _cleared(self.part, ours=files_in(self.place)) if self.part.is_dir() else None
+        except OSError as error:
+            raise SessionRefused(
+                f"{self.place}: cannot be written ({error.strerror or error}). What was there is as before. Make room, "
+                f"or choose another --out, and run again."
+            ) from error
+
+
+def inputs_of(paths: Mapping[Path, str], session: Path) -> dict[str, str]:
+    """Return the hashes of recordings by their name below the ``session`` folder."""
+    return {os.path.relpath(path, session): sha for path, sha in paths.items() if sha}
+
+
+def put_in_place(part: Path, place: Path) -> None:
+    """Flush a finished folder to the disk and let it change places with what lies at ``place``, in one step; what lay
+    there is ``part`` then.
+    """
+    for path in (*part.rglob("*"), part):
+        flush(path)
+    if part.parent == place:  # a disk of its own: its folder cannot change its name
+        earlier, new = read_manifest(place), (*files_in(part), MANIFEST)
+        for name in new:
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (part / name).replace(place / name)
+        for name in set(earlier.outputs if earlier else RESULTS) - set(new):
+            (place / name).unlink(missing_ok=True)
+        shutil.rmtree(part)
+    elif place.exists() and any(place.iterdir()):
+        _exchange(part, place)
+    else:
+        part.replace(place)
+    flush(place.parent)
+
+
+def flush(path: Path) -> None:
+    """Return when a file or folder is on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _exchange(one: Path, other: Path) -> None:
+    """Let two folders change places; where the file system cannot do it at once, in three steps."""
+    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if rename is not None and rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0:
+        return
+    aside = one.with_name(f"{one.name}.earlier")
+    other.replace(aside)
+    one.replace(other)
+    aside.replace(one)
+
+
+def _cleared(folder: Path, *, ours: list[str]) -> Path | None:
+    """Remove the files of an earlier run; return the folder in which those that biodance did not write are kept."""
+    earlier = read_manifest(folder)
+    known = set(earlier.outputs) if earlier else {*ours, *RESULTS}
+    for name in known | {MANIFEST, _LOCK}:
+        (folder / name).unlink(missing_ok=True)
+    left = files_in(folder)
+    if not left:
+        shutil.rmtree(folder)
+        return None
+    base = folder.name.removeprefix(".").removesuffix(".part")
+    names = (f"{base}-kept{number}" for number in ("", *range(2, 10_000)))
+    kept = next(path for path in map(folder.with_name, names) if not path.exists())
+    folder.replace(kept)
+    return kept
+
+
+def results_folder(out: str | Path, session: str | Path, *, force: bool = False) -> ResultsFolder:
+    """Return where the results of a session are written, before they take their place.
+
+    ``force`` allows a place that holds results of an earlier run (a results.json or report.html); all of them are
+    replaced, and files that are not of biodance are kept beside it.
 
     Raises
     ------
     SessionRefused
-        Another run is writing there; the folder is the session folder or one above it, is a file, holds recordings,
+        Another run is writing there; the place is the session folder or one above it, is a file, holds recordings,
         holds anything at all without ``force``, or holds only files that biodance did not write.
     """
     session = Path(os.path.realpath(session))  # unlike Path.resolve, it takes a circle of links
@@ -45,8 +151,9 @@ def results_folder(out: str | Path, session: str | Path, *, force: bool = False)
         raise SessionRefused(
             f"{folder}: holds files that biodance did not write ({files[0].name}). Give another folder."
         )
-    _lock(made_folder(folder))
-    return folder
+    part = folder / ".part" if os.path.ismount(folder) else folder.with_name(f".{folder.name}.part")
+    _taken(part, folder)
+    return ResultsFolder(folder, part)
 
 
 def made_folder(folder: Path) -> Path:
@@ -67,34 +174,25 @@ def new_folder(folder: Path) -> Path:
     return made_folder(folder)
 
 
-_LOCK = ".biodance.lock"
-
-
-def _lock(folder: Path) -> None:
-    """Take a folder for this process until it ends; SessionRefused where another one, still alive, has taken it."""
-    lock = folder / _LOCK
-    mine = f"{os.getpid()} {platform.node()}"
-    for _ in range(2):
-        try:
-            with open(lock, "x", encoding="ascii", errors="replace") as stream:
-                stream.write(mine)
-        except FileExistsError:
-            holder = _text(lock)
-            if holder == mine:
-                return
-            if _is_alive(holder):
-                raise SessionRefused(
-                    f"{folder}: another run of biodance (process {holder.replace(' ', ' on ')}) is writing there. "
-                    f"Wait for it, or give another folder; if it is not running any more, delete {lock}."
-                ) from None
-            lock.unlink(missing_ok=True)
-        except OSError as error:
-            raise SessionRefused(
-                f"{folder}: cannot be written to ({error.strerror or error}). Choose a place where you may write."
-            ) from error
-        else:
-            atexit.register(lock.unlink, missing_ok=True)
-            return
+def _taken(part: Path, place: Path) -> None:
+    """Make the folder ``part`` for this process, empty; SessionRefused where another one, still alive, has it."""
+    lock, mine = part / _LOCK, f"{os.getpid()} {platform.node()}"
+    holder = _text(lock)
+    if holder and holder != mine and _is_alive(holder):
+        raise SessionRefused(
+            f"{place}: another run of biodance (process {holder.replace(' ', ' on ')}) is writing there. "
+            f"Wait for it, or give another folder; if it is not running any more, delete {part}."
+        )
+    try:
+        shutil.rmtree(part, ignore_errors=True)  # of a run that was killed
+        made_folder(part)
+        with open(lock, "x", encoding="ascii", errors="replace") as stream:
+            stream.write(mine)
+    except OSError as error:
+        raise SessionRefused(
+            f"{place}: cannot be written to ({error.strerror or error}). Choose a place where you may write."
+        ) from error
+    atexit.register(shutil.rmtree, part, ignore_errors=True)
 
 
 def _text(path: Path) -> str:

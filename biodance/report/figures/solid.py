@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.solids import box_solid
+from biodance.child_process import run_python
 from biodance.display import BLACK, GREEN
 from biodance.pipeline.results import Still
 from biodance.report.figures.style import SIDE_COLOURS
@@ -36,13 +37,7 @@ def sheet_png(stills: Sequence[Still]) -> bytes | None:
     if find_spec("pyvista") is None or not stills:
         return None
     try:
-        child = subprocess.run(
-            [sys.executable, "-m", "biodance.report.figures.solid"],
-            input=pickle.dumps(list(stills)),
-            capture_output=True,
-            timeout=_PATIENCE,
-            check=False,
-        )
+        child = run_python("-m", "biodance.report.figures.solid", input=pickle.dumps(list(stills)), timeout=_PATIENCE)
     except (subprocess.TimeoutExpired, OSError):
         return None
     return child.stdout if child.returncode == 0 and child.stdout.startswith(PNG) else None

@@ -1,0 +1,40 @@
+"""The Python processes that biodance starts: none imports a module from the folder in which somebody works, where files
+of strangers may lie (CWE-427).
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+_OWN = str(Path(__file__).resolve().parent.parent)
+_SAFE = "PYTHONSAFEPATH"
+
+
+def run_python(*arguments: str, timeout: float, input: bytes | None = None) -> "subprocess.CompletedProcess[bytes]":
+    """Run this Python with ``arguments`` and return what became of it, with its output.
+
+    It imports from where this process does, but for the working folder.
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        It gives no answer within ``timeout`` s; it is ended.
+    OSError
+        It cannot be started.
+    """
+    here = os.path.realpath(os.getcwd())
+    kept = [place for place in sys.path if os.path.isabs(place) and (place == _OWN or os.path.realpath(place) != here)]
+    return subprocess.run(
+        [sys.executable, *arguments],
+        env=os.environ | {_SAFE: "1", "PYTHONPATH": os.pathsep.join(kept)},
+        input=input,
+        capture_output=True,
+        timeout=timeout,
+        check=False,
+    )
+
+
+def keep_children_safe() -> None:
+    """Let processes that the standard library starts from now on (forkserver) leave out the working folder, too."""
+    os.environ[_SAFE] = "1"
