@@ -9,7 +9,7 @@ import pytest
 from biodance.cli import run as command
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session import results_folder as rooms
-from biodance.lab.session.manifest import file_hash, read_manifest, refuse_mixture, verify
+from biodance.lab.session.manifest import check_results, file_hash, read_manifest, refuse_mixture
 from biodance.lab.session.results_folder import inputs_of, results_folder
 
 
@@ -95,7 +95,7 @@ def test_a_stop_at_any_step_leaves_the_earlier_or_the_new_results(session: Path,
                 stopped = True
         now = content(out)
         assert now in (FIRST, SECOND), done
-        found = verify(out)
+        found = check_results(out)
         assert found is not None
         assert found.whole
         seen.add(now == SECOND)
@@ -154,7 +154,7 @@ def test_the_manifest_binds_the_parts_and_the_recordings(session: Path, tmp_path
         refuse_mixture(out, ("motions.npz",))
     (out / "subject.html").unlink()
     (session / "walk.c3d").write_bytes(b"exported again")
-    found = verify(out)
+    found = check_results(out)
     assert found is not None
     assert (found.changed, found.missing, found.foreign) == (("body.json",), ("subject.html",), ("motions.npz",))
     assert [Path(one).name for one in found.inputs_changed] == ["walk.c3d"]

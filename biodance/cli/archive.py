@@ -131,12 +131,12 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
     from dataclasses import asdict
 
     from biodance.errors import BiodanceError
-    from biodance.lab.session.manifest import results_below, verify
+    from biodance.lab.session.manifest import check_results, results_below
 
     folders = results_below(place) if place.is_dir() else ()
     if not folders:
         raise BiodanceError(f"{place}: holds no results with a manifest.json (earlier versions wrote none).")
-    found = [one for folder in folders if (one := verify(folder))]
+    found = [one for folder in folders if (one := check_results(folder))]
     if json:
         print_json([{**asdict(one), "folder": str(one.folder), "whole": one.whole} for one in found])
     for one in () if json else found:

@@ -92,7 +92,7 @@ def refuse_mixture(folder: Path, names: tuple[str, ...]) -> None:
             )
 
 
-def verify(folder: Path) -> Verified | None:
+def check_results(folder: Path) -> Verified | None:
     """Return how a results folder stands beside its manifest; None where it has none."""
     manifest = read_manifest(folder)
     if manifest is None:
