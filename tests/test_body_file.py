@@ -1,5 +1,6 @@
 """A body survives its file without loss; what is no such file is refused in a sentence."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -52,3 +53,23 @@ def test_another_file_is_refused(text: str, word: str, tmp_path) -> None:
         read_body(path)
     with pytest.raises(FileRefused, match="cannot be read"):
         read_body(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("where", "number"),
+    [(place, number) for place in ("mass", "joint", "marker") for number in (np.nan, np.inf, 1e30)]
+    + [("mass", -40.0), ("covariance", np.nan), ("covariance", np.inf)],
+)
+def test_a_number_of_no_body_is_refused_with_what_is_legal(where: str, number: float, tmp_path) -> None:
+    raw = json.loads(body_text(WOMAN, "identified"))
+    held, index = {
+        "mass": (raw["sip"]["phi"], 0),
+        "joint": (raw["joints"][3]["translation"], 1),
+        "marker": (raw["markers"]["position"][2], 0),
+        "covariance": (raw["sip"]["covariance"][5], 5),
+    }[where]
+    held[index] = number
+    path = tmp_path / "body.json"
+    path.write_text(json.dumps(raw), encoding="utf-8")
+    with pytest.raises(FileRefused, match=r"is no number|legal are up to"):
+        read_body(path)

@@ -48,7 +48,7 @@ def test_identify_writes_page_numbers_and_body(lab, no_page, capsys):
     code = run(["identify", str(lab / "S01"), "--out", str(lab / "out"), "--json"])
     told = json.loads(capsys.readouterr().out)
     assert code == NEEDS_A_PERSON
-    files = ["body.json", "methods.md", "motions.npz", "report.html", "results.json"]
+    files = ["body.json", "manifest.json", "methods.md", "motions.npz", "report.html", "results.json"]
     assert sorted(path.name for path in (lab / "out").glob("[!.]*")) == files
     assert told == json.loads((lab / "out" / "results.json").read_text())
     assert told["status"] == "solved"

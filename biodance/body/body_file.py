@@ -14,6 +14,10 @@ from biodance.library import refuse_special
 from biodance.records import Sip
 
 _VERSION = 1
+_HEAVIEST = 1000.0
+"""kg of a whole body: people, and robots that stand on force plates."""
+_FARTHEST = 10.0
+"""m of a place in a segment, or of a joint from its parent."""
 
 
 def body_text(body: Body, source: str) -> str:
@@ -49,7 +53,7 @@ def parse_body(text: str, where: str) -> tuple[Body, str]:
         raw: dict[str, Any] = json.loads(text)
         if raw.get("biodance_body") != _VERSION:
             raise FileRefused(f"{where}: is no body of version {_VERSION}. Run biodance identify again.")
-        return _body(raw), str(raw["source"])
+        return _possible(_body(raw)), str(raw["source"])
     except FileRefused:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, BiodanceError) as error:
@@ -79,3 +83,31 @@ def _body(raw: dict[str, Any]) -> Body:
         girths={segment: tuple(names) for segment, names in raw.get("girths", {}).items()},
         parts=tuple(Part(**part) for part in raw.get("parts", ())),
     )
+
+
+def _possible(body: Body) -> Body:
+    """Return the body.
+
+    Raises
+    ------
+    ValueError
+        A number is none, or of no body: says where, its value and what is legal.
+    """
+    sip = body.sip
+    places = {
+        "centre of mass": sip.com,
+        "place of a joint": np.array([joint.translation for joint in body.joints]),
+        "place of a marker": body.markers.position,
+    }
+    for what, array in {"parameters": sip.phi, "covariance of the parameters": sip.covariance, **places}.items():
+        if not np.isfinite(array).all():
+            raise ValueError(f"{what}: {np.ravel(array)[~np.isfinite(np.ravel(array))][0]} is no number")
+    for what, array in places.items():
+        if np.abs(array).max(initial=0.0) > _FARTHEST:
+            raise ValueError(f"{what}: {np.abs(array).max():.3g} m; legal are up to {_FARTHEST:g} m")
+    worst, whole = float(sip.mass.min()), float(sip.mass.sum())
+    if worst < 0 or not 0 < whole <= _HEAVIEST:
+        raise ValueError(
+            f"mass: {whole:.3g} kg in all, least {worst:.3g}; legal are up to {_HEAVIEST:g} kg, none below 0"
+        )
+    return body

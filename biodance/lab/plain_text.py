@@ -38,7 +38,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def write_new(path: Path, content: bytes) -> Path:
-    """Write a file that does not exist yet, and return its path.
+    """Write a file that does not exist yet, whole or not at all, and return its path.
 
     Raises
     ------
@@ -51,6 +51,8 @@ def write_new(path: Path, content: bytes) -> Path:
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
+        if path.is_file():
+            path.unlink()  # ours, cut off: the disk is full
         raise FileRefused(
             f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
         ) from error

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from biodance.body.body import Body
-from biodance.body.body_file import read_body
 from biodance.body.export import formats, write_model
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.solids import SegmentSolids, segment_solids
@@ -16,7 +15,7 @@ from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
 from biodance.pipeline.program_folders import opensim_coordinates, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import kept_body, kept_trials, read_kept
+from biodance.pipeline.saved_results import kept_body, kept_trials, read_kept, read_kept_body
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial import prepare_trial
 from biodance.pipeline.trial_files import results_into_c3d, write_rerun
@@ -177,7 +176,7 @@ class _Target:
 def _of_kept(folder: Path, trial: str | None, target: _Target) -> tuple[Path, str]:
     """Write what a results folder keeps; nothing is tracked or identified again."""
     if target.format not in MOTION_FORMATS:
-        return target.body(*read_body(kept_body(folder)))
+        return target.body(*read_kept_body(folder))
     if folder.is_file():
         raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder to export {target.format}.")
     kept = read_kept(folder)

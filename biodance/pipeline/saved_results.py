@@ -81,6 +81,19 @@ def kept_body(folder: Path) -> Path:
     )
 
 
+def read_kept_body(folder: Path) -> tuple[Body, str]:
+    """Return the body of a results folder, or of a body.json, and where it comes from in words.
+
+    Raises
+    ------
+    FileRefused
+        The file is no body, or not the one that the run of the folder wrote.
+    """
+    if folder.is_dir():
+        refuse_mixture(folder, (BODY, SCALED))
+    return read_body(kept_body(folder))
+
+
 def known_body(body: Body | str | Path | None) -> Body | None:
     """Return an earlier body: as given, or of a body.json or the folder that holds one; None without one.
 
@@ -92,10 +105,7 @@ def known_body(body: Body | str | Path | None) -> Body | None:
     if body is None or isinstance(body, Body):
         return body
     path = Path(body)
-    if path.is_dir():
-        refuse_mixture(path, (BODY,))
-        path = path / BODY
-    return read_body(path)[0]
+    return read_kept_body(path)[0] if (path / BODY).is_file() else read_body(path / BODY if path.is_dir() else path)[0]
 
 
 def read_kept(folder: Path) -> KeptResults:
@@ -108,10 +118,10 @@ def read_kept(folder: Path) -> KeptResults:
     FileRefused
         A file in it is none of biodance's, or not of the run that wrote the others.
     """
-    refuse_mixture(folder, (BODY, SCALED, MOTIONS))
-    body, source = read_body(kept_body(folder))
+    body, source = read_kept_body(folder)
     if not (folder / MOTIONS).is_file():
         raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder instead.")
+    refuse_mixture(folder, (MOTIONS,))
     try:
         with np.load(folder / MOTIONS, allow_pickle=False) as held:
             motions = {str(name): _motion(held, k) for k, name in enumerate(held["trials"])}
