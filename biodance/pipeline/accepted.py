@@ -80,6 +80,9 @@ def _session_toml(session: Session) -> str:
     own = {trial.marker_set for trial in session.trials if trial.marker_set.endswith(".toml")}
     for file in own:
         lines += ["", "[markers]", f"file = {json.dumps(str(Path(file).resolve()))}"]
+    feet = {f"plate{n}": plate.foot for trial in session.trials for n, plate in enumerate(trial.plates, start=1)}
+    for name, foot in feet.items():
+        lines += ["", f"[plates.{name}]", f'foot = "{foot}"'] * bool(foot)
     for trial in session.trials:
         lines += ["", f"[trials.{json.dumps(trial.name)}]", f'role = "{trial.role}"']
     return "\n".join(lines) + "\n"

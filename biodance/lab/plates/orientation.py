@@ -3,6 +3,7 @@ witnesses.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,16 +64,30 @@ def _distances_between(points: Array, feet: Array) -> Array:
 
 
 UNDER_THE_FOOT, NOT_UNDER = 0.06, 0.15  # m from the feet: believed; contradicted
+_FZ_ALONE = (
+    "Fz alone was turned round: its sign is another one than on the other plates, and with the other channels as they "
+    "are the load lies under the feet that the markers show."
+)
 Said = tuple[str, ...]
 
 
+class Oriented(NamedTuple):
+    """A plate in the lab frame, what a person should look at, and whether its Fz alone had the wrong sign."""
+
+    plate: Plate
+    warnings: Said
+    fz_alone: bool
+
+
 def oriented(
-    reading: PlateReading, time: Array, *, markers: Markers | None, alone: bool, otherwise: int
-) -> tuple[Plate, Said]:
+    reading: PlateReading, time: Array, *, markers: Markers | None, alone: bool, otherwise: int, odd: bool
+) -> Oriented:
     """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings.
 
     ``time`` (S,) s; ``markers`` are asked where the feet are; ``alone`` says that no other plate is loaded, so that the
-    sway of a standing person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything.
+    sway of a standing person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything;
+    ``odd`` says that the other plates have another sign: axes turned half round are then a wrong sign of Fz alone,
+    since both together turn no channel but Fz, and Mz, which is turned back.
 
     Raises
     ------
@@ -95,8 +110,12 @@ def oriented(
     elif sign and axes[2, 2] > 0:
         seen, warnings = _upwards_said(reading)
         said = (*said, seen)
+    angle = 0
     if markers is not None and sign:
-        axes, checked, warned = _under_feet(reading, wrench, time, axes, markers)
+        axes, angle, checked, warned = _under_feet(reading, time, axes, markers)
+        if odd and angle == 180:
+            wrench = wrench * np.array([1, 1, 1, 1, 1, -1])
+            checked, warned = (_FZ_ALONE,), (f"Plate {reading.plate.number}: {_FZ_ALONE} Check its cabling.",)
         said, warnings = (*said, *checked), (*warnings, *warned)
     value = wrench_in_lab(wrench, axes, sign or otherwise, reading.corners.mean(axis=0))
     value[~reading.known] = np.nan
@@ -105,7 +124,8 @@ def oriented(
     zero = (sign or otherwise) * axes @ reading.empty
     where = (reading.plate.name, reading.plate.type, reading.corners)
     plate = Plate(*where, Wrench(time, value), decisions, zero, foot=reading.plate.told.foot)
-    return plate, (*reading.warnings, *(f"Plate {reading.plate.number}: {one}" for one in moved), *warnings)
+    told = (*reading.warnings, *(f"Plate {reading.plate.number}: {one}" for one in moved), *warnings)
+    return Oriented(plate, told, odd and angle == 180)
 
 
 def _origin_under_feet(
@@ -150,16 +170,16 @@ def _unmirrored(reading: PlateReading, time: Array, axes: Array, markers: Marker
     return axes * [1, 1, -1], f"{why}; {kept}"
 
 
-def _under_feet(
-    reading: PlateReading, wrench: Array, time: Array, axes: Array, markers: Markers
-) -> tuple[Array, Said, Said]:
-    """Return the axes, by quarter turns where only that puts the load under the feet; decisions and warnings."""
+def _under_feet(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> tuple[Array, int, Said, Said]:
+    """Return the axes, by quarter turns where only that puts the load under the feet; by how many degrees; decisions
+    and warnings.
+    """
     distance = _distance(reading, time, axes, markers)
     if distance is None:
-        return axes, (), ()
+        return axes, 0, (), ()
     if distance <= NOT_UNDER:
         near = f"The centre of pressure lies {1000 * distance:.0f} mm (median) from the feet that the markers show."
-        return axes, (near,), ()
+        return axes, 0, (near,), ()
     turns = {90 * k: axes @ turn for k, turn in enumerate(_QUARTER_TURNS, start=1)}
     found = {angle: _distance(reading, time, turned, markers) for angle, turned in turns.items()}
     good = [angle for angle, d in found.items() if d is not None and d <= UNDER_THE_FOOT]
@@ -169,10 +189,11 @@ def _under_feet(
             f"The load lies {distance:.2f} m from the feet that the markers show, and under them when the corners are "
             f"counted from another one: the plate axes were turned by {good[0]} degrees."
         )
-        return turns[good[0]], (said,), (f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS.",)
+        correct = f"Plate {number}: {said} Correct the order of FORCE_PLATFORM:CORNERS."
+        return turns[good[0]], good[0], (said,), (correct,)
     said = f"The load lies {distance:.2f} m (median) from the feet that the markers show"
     check = "check CORNERS, ORIGIN and whether a foot without markers stood there."
-    return axes, (f"{said}.",), (f"Plate {number}: {said}: {check}",)
+    return axes, 0, (f"{said}.",), (f"Plate {number}: {said}: {check}",)
 
 
 def _distance(reading: PlateReading, time: Array, axes: Array, markers: Markers) -> float | None:

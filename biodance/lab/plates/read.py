@@ -23,10 +23,8 @@ from biodance.lab.plates.undescribed import undescribed_plates
 from biodance.lab.plates.wrench import gravity_sign
 from biodance.records import Array, Defect, Markers, Plate, Wrench
 from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
-from biodance.spatial import wrench_about_origin, wrench_about_point
 
 _AS_POUNDS = 0.03
-_HALF_ROUND = "were turned by 180 degrees"
 
 
 class ReadPlates(NamedTuple):
@@ -176,39 +174,20 @@ def _oriented(
     signs = [gravity_sign(r.sensor, a, r.rate) for r, a in zip(readings, axes, strict=True)]  # any point: forces alone
     # the sign belongs to the plate's z: a plate whose z points the other way has the other sign
     votes = [sign * np.sign(a[2, 2]) for sign, a in zip(signs, axes, strict=True)]
-    plates, warnings, mended = [], [], []
+    plates, warnings, mended = [], [], False
     for reading, sign, a in zip(readings, signs, axes, strict=True):
         otherwise = int(np.sign(sum(votes)) * np.sign(a[2, 2])) or 1
         alone = bool(sign) and sum(map(abs, signs)) == 1
+        odd = bool(sign) and any(other == -sign * np.sign(a[2, 2]) for other in votes)
         try:
-            plate, said = oriented(reading, time, markers=markers, alone=alone, otherwise=otherwise)
+            done = oriented(reading, time, markers=markers, alone=alone, otherwise=otherwise, odd=odd)
         except TrialRefused as error:
             warnings.append(_left_out(reading.plate.number, error))
             continue
-        odd = bool(sign) and any(other == -sign * np.sign(a[2, 2]) for other in votes)
-        if odd and any(_HALF_ROUND in one for one in plate.decisions):
-            plate, said = _vertical_alone(plate, said)
-            mended.append(reading)
-        plates.append(plate)
-        warnings += said
-    doubts = () if mended else _two_signs(readings, votes)
-    return tuple(plates), (*doubts, *warnings)
-
-
-def _vertical_alone(plate: Plate, warnings: tuple[str, ...]) -> tuple[Plate, tuple[str, ...]]:
-    """Return a plate of another sign than its neighbours as one whose Fz alone has the wrong sign, where its axes were
-    turned half round, too: both together turn no channel but Fz, and Mz, which is turned back here; and warnings.
-    """
-    said = (
-        "Fz alone was turned round: its sign is another one than on the other plates, and with the other channels as "
-        "they are the load lies under the feet that the markers show."
-    )
-    mirrored = wrench_about_point(plate.wrench.value, plate.centre) * [1, 1, 1, 1, 1, -1]
-    wrench = Wrench(plate.wrench.time, wrench_about_origin(mirrored, plate.centre))
-    decisions = tuple(said if _HALF_ROUND in one else one for one in plate.decisions)
-    kept = tuple(one for one in warnings if _HALF_ROUND not in one)
-    number = plate.name.removeprefix("plate")
-    return replace(plate, wrench=wrench, decisions=decisions), (*kept, f"Plate {number}: {said} Check its cabling.")
+        plates.append(done.plate)
+        warnings += done.warnings
+        mended = mended or done.fz_alone
+    return tuple(plates), (*(() if mended else _two_signs(readings, votes)), *warnings)
 
 
 def _left_out(number: int, error: TrialRefused) -> str:

@@ -43,7 +43,7 @@ def already_scaled(scaled: Sequence[PlateReading], plain: Sequence[PlateReading]
     if len(plain) < len(scaled) or abs(whole - 1) > _WHOLE:
         return ""
     return (
-        f"Read with ANALOG:SCALE the plates carry {share:.2g} of the weight ({mass:.4g} kg), without it all of it "
+        f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
         f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
         f"ANALOG:SCALE, or export the file again."
     )

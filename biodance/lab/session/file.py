@@ -159,6 +159,12 @@ class SessionFile:
                 said.append(f"{WARNING}[trials.{key}] fits no recording of the session.{hint}")
         return said
 
+    def unused_plates(self, names: set[str]) -> list[str]:
+        """Return a sentence for each ``[plates.NAME]`` that fits none of the plates that were read."""
+        idle = [name for name, plate in self.plates.items() if plate.use and name not in names]
+        legal = f"The plates read are {', '.join(sorted(names))}." if names else "No plate was read."
+        return [f"{WARNING}[plates.{name}] fits no plate of the session. {legal}" for name in idle]
+
 
 def read_session_file(folder: Path) -> SessionFile:
     """Return what ``session.toml`` (and ``subject.toml`` or ``session.toml`` in the folder above) says; empty where

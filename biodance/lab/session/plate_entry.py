@@ -101,7 +101,7 @@ def _channels(value: Any, kind: int | None, where: str) -> tuple[str | int, ...]
     legal = 'labels or numbers of analog channels, from 1: ["Fx1", "Fy1", ...] or [1, 2, 3, 4, 5, 6]'
     listed = value if isinstance(value, list) else [None]
     channels: list[Any] = [int(c) if isinstance(c, float) and c == round(c) and c >= 1 else c for c in listed]
-    if not all((isinstance(c, str) and c.strip()) or (isinstance(c, int) and c is not True) for c in channels):
+    if not all((isinstance(c, str) and c.strip()) or (type(c) is int and c >= 1) for c in channels):
         raise SessionRefused(f"{where} channels = {value!r} is not legal. Write {legal}.")
     counts = {CHANNELS_OF_TYPE[kind]} if kind else set(CHANNELS_OF_TYPE.values())
     if len(channels) not in counts or len(set(channels)) < len(channels):

@@ -169,6 +169,7 @@ def read_session(
     read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]
     slips = file_says.unused([file.stem for file in files])
+    slips += file_says.unused_plates({plate.name for trial in trials for plate in trial.plates})
     return Session(subject, tuple(trials), folder, refused, (*read, *slips, *roles, *notes, *guesses))
 
 

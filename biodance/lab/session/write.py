@@ -21,6 +21,7 @@ from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.session.file import FILES
+from biodance.lab.session.plate_lines import plate_lines
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import made_folder
 from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench
@@ -64,7 +65,7 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
     _refuse_existing(target)
-    lines = [" ".join(line.split()) for line in (*_lines(found), *_begun_map(session, found))]
+    lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
     with open(target, "x", encoding="utf-8") as stream:
         stream.write("\n".join(lines) + "\n")
     return found
