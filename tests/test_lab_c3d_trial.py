@@ -7,6 +7,7 @@ from c3d_files import File, real, text, whole
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import model_outputs
 from biodance.lab.c3d.read import read_c3d
+from biodance.lab.inspect import inspect_file
 
 
 def _sided(*places):
@@ -161,6 +162,19 @@ def test_two_subjects_need_a_choice(read):
     trial = read(both, subject="berta")
     assert trial.markers.names == LABELS
     np.testing.assert_allclose(trial.markers.xyz, person() + AWAY, atol=1e-6)
+
+
+@pytest.mark.parametrize("who", ["Anna:", ""])
+@pytest.mark.parametrize("count", [3, 6])
+def test_a_thing_with_a_few_markers_is_no_second_person(read, tmp_path, who, count):
+    """A club of three to six markers beside a person whose labels have a prefix, or none."""
+    points = np.concatenate([person(), person()[:, :count] + AWAY], axis=1)
+    labels = [*(f"{who}{name}" for name in LABELS), *(f"club:c{k}" for k in range(count))]
+    trial = read(file(points, labels))
+    assert trial.markers.names == LABELS
+    assert any(f"{count} points of club left out" in line for line in trial.history)
+    (tmp_path / "club.c3d").write_bytes(file(points, labels).bytes())
+    assert inspect_file(tmp_path / "club.c3d")["subjects"] == ([who[:-1]] if who else [])
 
 
 def test_repeated_labels(read):

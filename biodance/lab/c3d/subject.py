@@ -3,7 +3,8 @@ person's - and the measures (groups PROCESSING, SUBJECTS and SUBJECT), in m and 
 """
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -98,10 +99,30 @@ class MarkerLabels:
     warnings: tuple[str, ...]
 
 
+_OBJECT = 6
+"""Markers of a thing at most (a club, a wheel, a probe): three on each of two rigid parts. Fewer than seven markers show
+no pelvis with two legs.
+"""
+
+
 def subjects_of(raw: RawC3d) -> tuple[str, ...]:
-    """Return the names of the subjects in a file: label prefixes, or SUBJECTS:NAMES where labels have none."""
-    prefixes = dict.fromkeys(prefix for label in raw.labels if (prefix := split_label(label)[0]))
-    return tuple(prefixes) or tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
+    """Return the names of the subjects in a file: label prefixes (`people_of`), or SUBJECTS:NAMES where labels have
+    none.
+    """
+    nameless = set(unlabelled(raw.labels))
+    labels = [label for i, label in enumerate(raw.labels) if i not in nameless]
+    if any(split_label(label)[0] for label in labels):
+        return people_of(labels)
+    return tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
+
+
+def people_of(labels: Iterable[str]) -> tuple[str, ...]:
+    """Return the prefixes of labels that name people: not those of things, which carry few markers; all of them where
+    nobody carries more.
+    """
+    counts = Counter(split_label(label)[0] for label in labels)
+    enough = {prefix for prefix, count in counts.items() if count > _OBJECT}
+    return tuple(prefix for prefix in counts if prefix and (prefix in enough or not enough))
 
 
 def poses_only(raw: RawC3d) -> str:
@@ -139,7 +160,8 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
 
 def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: list[str]) -> list[int]:
     """Return the columns whose label belongs to the chosen subject."""
-    prefixes = tuple(dict.fromkeys(prefix for i in columns if (prefix := split_label(raw.labels[i])[0])))
+    prefixes = people_of(raw.labels[i] for i in columns)
+    columns = _without_things(raw, columns, prefixes, history)
     if subject is None and len(prefixes) > 1:
         raise FileRefused(
             f"{raw.path}: holds markers of {len(prefixes)} subjects ({', '.join(prefixes)}) and none was chosen. "
@@ -160,6 +182,17 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
     history.append(
         f"Markers of subject {match!r} taken, the prefix removed; {len(columns) - len(own)} points of others left out."
     )
+    return own
+
+
+def _without_things(raw: RawC3d, columns: list[int], people: tuple[str, ...], history: list[str]) -> list[int]:
+    """Return the columns of labels without prefix or of people; what else there is is said."""
+    own = [i for i in columns if split_label(raw.labels[i])[0] in ("", *people)]
+    things = dict.fromkeys(split_label(raw.labels[i])[0] for i in columns if i not in set(own))
+    if things:
+        history.append(
+            f"{len(columns) - len(own)} points of {', '.join(things)} left out: so few markers are those of a thing."
+        )
     return own
 
 
