@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from biodance.effects._base.quality_check import QualityCheck, Recorded
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.markers.signals import MarkerFault, FaultyMarker, faulty_markers
+from biodance.lab.markers.signals import FaultyMarker, MarkerFault, faulty_markers
 from biodance.records import Markers, Trial
 
 
