@@ -6,7 +6,7 @@ on the ground (its camera noise goes on), a recording that hung (all markers sta
 
 from biodance.effects._base.marker_faults import marker_checks
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.lab.markers.signals import Fault
+from biodance.lab.markers.signals import MarkerFault
 
 
 class FrozenMarkers(DiscreteEffect):
@@ -22,7 +22,7 @@ class FrozenMarkers(DiscreteEffect):
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return one check for each such marker, or one that says there is none."""
-        return marker_checks(recorded, Fault.FROZEN, cls.name)
+        return marker_checks(recorded, MarkerFault.FROZEN, cls.name)
 
 
 EFFECT = FrozenMarkers

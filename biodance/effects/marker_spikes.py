@@ -7,7 +7,7 @@ longer (`labels_swapped`). Separated by the marker's path.
 
 from biodance.effects._base.marker_faults import marker_checks
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.lab.markers.signals import Fault
+from biodance.lab.markers.signals import MarkerFault
 
 
 class MarkerSpikes(DiscreteEffect):
@@ -23,7 +23,7 @@ class MarkerSpikes(DiscreteEffect):
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return one check for each such marker, or one that says there is none."""
-        return marker_checks(recorded, Fault.SPIKE, cls.name)
+        return marker_checks(recorded, MarkerFault.SPIKE, cls.name)
 
 
 EFFECT = MarkerSpikes

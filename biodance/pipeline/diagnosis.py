@@ -15,7 +15,7 @@ from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason
-from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
+from biodance.diagnosis.repairs import by_checks, named_first, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
 from biodance.discovery import Chosen
@@ -138,9 +138,9 @@ def diagnose_session(
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
-    whole = _named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
+    whole = named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
     if mended is not None:
-        whole, found = _named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
+        whole, found = named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
         whole = replace(whole, checks=(*mended.checks, *whole.checks))
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
@@ -160,20 +160,6 @@ def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, st
         one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
         for one in naming.screening.suspects
     }
-
-
-def _named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
-    """Return the diagnosis with what was put right before all else was judged named first."""
-    named = {(one.effect, one.target) for one in diagnosis.findings}
-    found = tuple(failed_check(quality) for quality in checks if (quality.effect, quality.target) not in named)
-    if not found:
-        return diagnosis
-    return replace(
-        diagnosis,
-        verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*found, *diagnosis.findings),
-        notes=(*notes, *diagnosis.notes),
-    )
 
 
 def _diagnosed(

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from biodance.effects._base.quality_check import QualityCheck, Recorded
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.markers.signals import Fault, FaultyMarker, faulty_markers
+from biodance.lab.markers.signals import FaultyMarker, MarkerFault, faulty_markers
 from biodance.records import Markers, Trial
 
 
-def marker_checks(recorded: Recorded, fault: Fault, effect: str) -> tuple[QualityCheck, ...]:
+def marker_checks(recorded: Recorded, fault: MarkerFault, effect: str) -> tuple[QualityCheck, ...]:
     """Return a failed check for each marker with this ``fault``, with the trials and seconds, or one that says none
     has it. Preparing a trial takes these frames out (`prepare`), so the rest is judged.
     """

@@ -38,7 +38,7 @@ _TOLD = 8
 """Times that are told one by one."""
 
 
-class Fault(Enum):
+class MarkerFault(Enum):
     """What a marker does that nobody can."""
 
     FROZEN = "frozen"
@@ -52,19 +52,19 @@ class FaultyMarker:
     """
 
     label: str
-    fault: Fault
+    fault: MarkerFault
     spans: tuple[tuple[int, int], ...]
     size: float
 
     def when(self, time: Array) -> str:
         """Return the seconds of its frames among ``time`` (T,) s in words."""
-        long = self.fault is Fault.FROZEN
+        long = self.fault is MarkerFault.FROZEN
         at = [f"{time[start]:.2f}" + f" to {time[stop - 1]:.2f}" * long for start, stop in self.spans]
         return ", ".join(at[:_TOLD]) + (f" and {len(at) - _TOLD} times more" if len(at) > _TOLD else "") + " s"
 
     def sentence(self, where: str) -> str:
         """Return what was seen ``where`` (trials and seconds in words)."""
-        if self.fault is Fault.FROZEN:
+        if self.fault is MarkerFault.FROZEN:
             seen = (
                 f"stands still to the last bit while the others move: {where}. A gap was filled by holding the marker"
             )
@@ -79,11 +79,11 @@ def faulty_markers(markers: Markers) -> tuple[FaultyMarker, ...]:
     """Return the markers that stand still to the last bit while the others move, and those that jump."""
     frozen = _frozen(markers.xyz)
     clean = np.where(frozen[:, :, None], np.nan, markers.xyz)
-    found = [_faulty(label, Fault.FROZEN, frozen[:, k], float("nan")) for k, label in enumerate(markers.names)]
+    found = [_faulty(label, MarkerFault.FROZEN, frozen[:, k], float("nan")) for k, label in enumerate(markers.names)]
     step = 1 / markers.rate if markers.time.size > 1 else np.nan
     for k in np.flatnonzero(_suspects(clean, step)):
         jumps, size = _spikes(clean[:, k], step)
-        found.append(_faulty(markers.names[k], Fault.SPIKE, jumps, size))
+        found.append(_faulty(markers.names[k], MarkerFault.SPIKE, jumps, size))
     return tuple(one for one in found if one.spans)
 
 
@@ -99,7 +99,7 @@ def without_faults(markers: Markers, faults: tuple[FaultyMarker, ...]) -> Marker
     return Markers(markers.names, markers.time, xyz)
 
 
-def _faulty(label: str, fault: Fault, frames: Mask, size: float) -> FaultyMarker:
+def _faulty(label: str, fault: MarkerFault, frames: Mask, size: float) -> FaultyMarker:
     return FaultyMarker(label, fault, tuple(runs(frames)), size)
 
 
