@@ -102,6 +102,17 @@ class SessionIdentification(Sendable):
         """Whether the fit was solved; a failed one keeps the table's values and says so."""
         return self.identification.status
 
+    @property
+    def proven(self) -> Sip | None:
+        """The identified inertial parameters where trials that were kept from the fit prove them better than the
+        table's: the 95 % intervals of their gain, of forces and of moments, lie above 1. None otherwise: a body that
+        nobody proved must not change joint moments.
+        """
+        if self.status != "solved" or self.gain is None:
+            return None
+        low = min(self.gain.force_interval[0], self.gain.moment_interval[0])
+        return self.identification.sip if low > 1 else None
+
     @cached_property
     def torques(self) -> TorqueBands | None:
         """Joint torques with bands in the trial ``shown``, computed when asked for; None without one."""

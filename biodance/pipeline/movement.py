@@ -33,7 +33,8 @@ class SessionMovement:
     trials : tuple of TrialMovement
         Of all trials that give a motion.
     parameters : {"identified", "table"}
-        Whose inertial parameters the moments and powers are computed with.
+        Whose inertial parameters the moments and powers are computed with: the identified ones where trials kept from
+        the fit prove them better (`SessionIdentification.proven`).
     mass : float
         kg that moments and powers are divided by: of that body.
     left_out : mapping
@@ -167,9 +168,7 @@ def describe_movement(
 @one_thread()
 def session_movement(session: SessionResult, *, tell: Callable[[str], None] = lambda _: None) -> SessionMovement:
     """Return what moved in an examined session; see `describe_movement`."""
-    found = session.identification
-    solved = found is not None and found.status == "solved"
-    sip = found.identification.sip if found is not None and solved else None
+    sip = session.identification.proven if session.identification else None
     trials, left_out = [], {}
     for k, one in enumerate(session.trials, 1):
         tell(f"describing {one.name}, {k} of {len(session.trials)}")

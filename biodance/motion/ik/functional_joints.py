@@ -26,6 +26,7 @@ from biodance.motion.ik.joint_fit import (
     spread_postures,
 )
 from biodance.motion.ik.joint_unknowns import (
+    FARTHEST,
     FAULTY,
     HINGES,
     MISSED,
@@ -105,7 +106,7 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     noise = max(skin, fresh.rms / np.sqrt(3)) * np.sqrt(alike)
     start = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q, noise=noise)
     shown = excited(scaling.centres, start.theta, start.information)
-    found = fit_joints(scaling, postures, start, shown, noise=noise)
+    found, refused = _inside_the_body(scaling, postures, start, shown, noise=noise)
     spared: dict[str, tuple[str, float]] = {}
     for _ in range(_FAULTS):
         cost, slopes = beside_sliding_skin(scaling, postures, found, noise=noise)
@@ -120,8 +121,31 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
             scaling = replace(scaling, centres=doubted(scaling.centres, (*scaling.centres.contradicted, wrong.joint)))
             shown[own_unknowns(wrong.joint)] = True
         again = evaluate_joints(scaling, postures, found.theta, found.q, noise=noise)
-        found = fit_joints(scaling, postures, again, shown, noise=noise)
-    return _told(scaling, start, found, shown, spared)
+        found, beyond = _inside_the_body(scaling, postures, again, shown, noise=noise)
+        refused |= beyond
+    return _told(scaling, start, found, shown, spared, refused)
+
+
+def _inside_the_body(
+    scaling: Scaling, postures: Markers, start: CalibrationState, shown: NDArray[np.bool_], *, noise: float
+) -> tuple[CalibrationState, dict[str, float]]:
+    """Return the fit over the unknowns ``shown`` (37,) without the joints that it would put outside the body
+    (`FARTHEST`), which stay where the static trial puts them and are taken out of ``shown``; joint -> m how far it
+    would go. A joint that the movement contradicts is another matter: it is named.
+    """
+    refused: dict[str, float] = {}
+    while True:
+        found = fit_joints(scaling, postures, start, shown, noise=noise)
+        far = {joint: float(np.linalg.norm(found.theta[own_centre(joint)])) for joint in JOINTS}
+        beyond = {j: m for j, m in far.items() if m > FARTHEST and j not in scaling.centres.contradicted}
+        if not beyond:
+            return found, refused
+        worst = max(beyond, key=lambda joint: beyond[joint])
+        refused[worst] = beyond[worst]
+        shown[own_unknowns(worst)] = False
+        theta = start.theta.copy()
+        theta[own_unknowns(worst)] = 0.0
+        start = evaluate_joints(scaling, postures, theta, start.q, noise=noise)
 
 
 def _marker_distance(scaling: Scaling, postures: Markers, found: CalibrationState) -> Array:
@@ -173,9 +197,10 @@ def _told(
     found: CalibrationState,
     shown: NDArray[np.bool_],
     spared: Mapping[str, tuple[str, float]],
+    refused: Mapping[str, float],
 ) -> FunctionalJoints:
     """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
-    far that would lie with them.
+    far that would lie with them; ``refused`` how far joints would go that were kept.
     """
     covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
     deviation = np.sqrt(np.diag(covariance))
@@ -205,15 +230,25 @@ def _told(
         each = [f"{joint.replace('_', ' ')} {1e3 * far:.0f} mm{turns.get(joint, '')}" for joint, far in moved.items()]
         fits = f"{len(found.q)} postures, marker distance {1e3 * start.rms:.1f} to {1e3 * found.rms:.1f} mm"
         notes.append(f"{PLACED} ({fits}), from the static trial's place, axis turned: {', '.join(each)}.")
-    if kept:
-        names = ", ".join(joint.replace("_", " ") for joint in kept)
+    unseen = [joint for joint in kept if joint not in refused]
+    if unseen:
+        names = ", ".join(joint.replace("_", " ") for joint in unseen)
         notes.append(f"Joints that the movement does not show, kept where the static trial puts them: {names}.")
+    notes += [_outside(joint, far) for joint, far in refused.items()]
     notes += [_contradiction(joint, moved[joint]) for joint in wrong]
     notes += [_moved_since(joint, *own) for joint, own in spared.items()]
     notes += knees_elsewhere(scaling.centres, found.theta, found.information, shown, known=(*wrong, *spared))
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
     return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+
+
+def _outside(joint: str, far: float) -> str:
+    """Return what is said of a joint that the movement would put ``far`` m away from the static trial's place."""
+    return (
+        f"The movement would put the {joint.replace('_', ' ')} joint {1e3 * far:.0f} mm from the static trial's place, "
+        f"outside the body (at most {1e3 * FARTHEST:.0f} mm): it stays where the static trial puts it."
+    )
 
 
 def _contradiction(joint: str, far: float) -> str:

@@ -39,6 +39,13 @@ to 25 mm (Davis; Mantovani 2016).
 """
 
 
+FARTHEST = 0.1
+"""m: no joint centre lies farther from where the static trial puts it. Half the depth of an adult's waist (0.23 m,
+ANSUR II 2012) and half the length of the lumbar spine (0.18 m) are hardly more, half the breadth of a limb is less: a
+place beyond is outside the body. What asks for it is no joint centre, but skin, a bent spine or a chair.
+"""
+
+
 def centre_sd(joint: str, *, contradicted: bool = False) -> float:
     """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any
     movement; of a hinge about the place that its lateral marker and its axis give it; wider where the movement has
