@@ -25,7 +25,7 @@ def test_clean_walks_and_standing_name_nothing() -> None:
     evidence = collect_evidence(session(standing(), walk(), walk(name="again")))
     assert infer_causes(evidence).findings == ()
     rows = {(row.effect, row.target): row for row in cause_visibilities(evidence)}
-    assert rows["plate_position", "plate1:y"].sd < 0.004
+    assert rows["plate_position", "plate1:y"].sd < 0.005
     assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
     assert rows["plate_gain", "plate2:Fx"].witnesses == ()
 
@@ -54,7 +54,7 @@ def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str
     if size is not None:
         low, high = found[0].parameters[0].interval
         assert low <= size <= high
-        assert found[0].parameters[0].sd < 0.3 * size
+        assert found[0].parameters[0].sd < 0.35 * size
 
 
 def test_putting_a_delay_right_gives_back_what_was_seen_without_it() -> None:

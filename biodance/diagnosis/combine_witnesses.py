@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.diagnosis import HABITS, Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
@@ -54,9 +54,26 @@ def combine_findings(
 ) -> Diagnosis:
     """Return the diagnosis combined with the findings of the witnesses; ``judged``: whether the simulation was
     available; ``measured``: by effect and target what it tells of every cause where nothing was named (empty: it
-    looked for none, or is not believed).
+    looked for none, or is not believed). What is a habit of the laboratory is told beside it and changes no verdict.
     """
+    habits = tuple(finding for finding in by_witnesses.findings if finding.effect in HABITS)
+    faults = replace(by_witnesses, findings=tuple(f for f in by_witnesses.findings if f not in habits))
     one = replace(one, witnesses=evidence if evidence.observations else None)
+    found = _with_faults(one, faults, evidence, judged, measured)
+    told = {_names(alias) for finding in found.findings for alias in (finding, *finding.set)}
+    raw = any(finding.effect in _RAW for finding in found.findings)
+    beside = () if raw else tuple(one for one in habits if not told & {_names(alias) for alias in one.set})
+    return replace(found, findings=(*found.findings, *beside))
+
+
+def _with_faults(
+    one: Diagnosis,
+    by_witnesses: WitnessFindings,
+    evidence: WitnessEvidence,
+    judged: bool,
+    measured: Mapping[tuple[str, str], SimulatedSize],
+) -> Diagnosis:
+    """Return the diagnosis with what the witnesses find wrong, see `combine_findings`."""
     raw = any(finding.effect in _RAW for finding in one.findings)
     if raw:
         known = {(finding.effect, finding.target) for finding in one.findings}

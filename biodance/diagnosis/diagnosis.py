@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
+HABITS = ("toe_landmark",)
+"""Effects that are no fault of an instrument: told as findings, and nothing is wrong with them alone."""
 ABOUT = "diagnosis"
 """What the one of a diagnosis's sentences is about that says the verdict."""
 
@@ -235,12 +237,17 @@ class Diagnosis:
     @property
     def status(self) -> DiagnosisStatus:
         """What it ends with."""
-        return status_of(self.why, named=bool(self.findings), clean=self.verdict == "nothing wrong")
+        return status_of(self.why, named=bool(self.faults), clean=self.verdict == "nothing wrong")
+
+    @property
+    def faults(self) -> tuple[Finding, ...]:
+        """The findings without what is only a habit of the laboratory."""
+        return tuple(one for one in self.findings if one.effect not in HABITS)
 
     @property
     def told(self) -> str:
         """Verdict and names of the causes in one line."""
-        causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.findings)
+        causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.faults)
         said = [one.level for one in self.attention if one.about == ABOUT]
         part = self.verdict == "nothing wrong" and said not in ([], ["note"])
         return f"{self.verdict}{' in what could be judged' if part else ''}{f': {causes}' if causes else ''}"

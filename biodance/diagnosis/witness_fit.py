@@ -5,6 +5,7 @@ because about one step in twenty is an outlier. The evidence of a set of causes 
 Laplace's method (Bishop 2006, section 4.4).
 """
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,13 @@ from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import Effect, causes
 from biodance.records import Array
 
+THRESHOLD = 2.0
+"""Natural logarithm of the evidence with its prior odds (`prior_odds`) from which a cause is named."""
+_RARER = {"plate_crosstalk": 1.0}
+"""Natural logarithm: so much rarer than other faults is cross-talk that looks like a plate beside its place."""
+_MISSTEP = 3.0
+"""Natural logarithm of twenty: one contact in twenty is odd, so that a cause that one contact alone tells needs as much
+more evidence."""
 _TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
 _STEPS = 30
@@ -106,6 +114,19 @@ def fit_known(
     sd = np.array([one.sd for one in evidence.observations])[kept]
     shared = evidence.shared if without is None else evidence.shared[:, ~without]
     return fit_laplace(value[kept], sd, shared[kept], Z[kept], size)
+
+
+def prior_odds(evidence: WitnessEvidence) -> dict[tuple[str, str], float]:
+    """Return by cause what its evidence must make up for (natural logarithm, none above 0): the number of targets at
+    which it could be seen, how rare it is, and that a single contact may be a misstep.
+    """
+    count = Counter(names[0] for names in evidence.causes if evidence.seen_by(names))
+    return {
+        names: -float(np.log(max(1, count[names[0]])))
+        - _RARER.get(names[0], 0.0)
+        - (_MISSTEP if evidence.contacts(names) == 1 else 0.0)
+        for names in evidence.causes
+    }
 
 
 def typical_size(effect: str, target: str) -> float:

@@ -7,7 +7,6 @@ a plate, and nothing is named by a single contact. The sign of a channel has no 
 and the witnesses observe it again.
 """
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -18,10 +17,13 @@ from biodance.diagnosis.naming import TOGETHER
 from biodance.diagnosis.witness_evidence import WitnessEvidence, undo_causes
 from biodance.diagnosis.witness_fit import (
     ALIKE,
+    THRESHOLD,
     LaplaceFit,
     explain,
     fit_known,
+    is_beyond_usual,
     is_told,
+    prior_odds,
     typical_size,
 )
 from biodance.diagnosis.witness_landmark import landmark_alias, landmark_finding
@@ -30,16 +32,8 @@ from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.records import Array
 
-THRESHOLD = 2.0
-"""Natural logarithm of the evidence, less that of the number of targets that are seen, from which a cause is named."""
 _RARE = 3.0
-_RARER = {"plate_crosstalk": 1.0}
-"""Natural logarithms: so much rarer than other faults are a channel of the wrong sign, and cross-talk that looks like a
-plate beside its place."""
-_MISSTEP = 3.0
-"""Natural logarithm of twenty: one contact in twenty is odd, so that a cause that one contact alone tells needs as much
-more; a session of a single contact tells none.
-"""
+"""Natural logarithm: so much rarer than other faults is a channel of the wrong sign."""
 _BROAD = 10.0
 """Typical sizes: that large ones are rare counts for a name; the size itself is told as the witnesses show it."""
 _AGAIN = 2
@@ -117,16 +111,13 @@ def _ranked(
 ) -> list[Hypothesis]:
     """Return every further cause with its evidence, given the ``named`` ones, most probable first."""
     before = explain(evidence, value, named)
-    count = Counter(names[0] for names in evidence.causes if evidence.seen_by(names))  # who is not seen is not mistaken
-    found = []
+    odds, found = prior_odds(evidence), []
     for names in evidence.causes:
         if names in named or not np.abs(evidence.traces[names]).any():
             continue
         one = explain(evidence, value, (*named, names))
         bayes = one.log_evidence - before.log_evidence
-        odd = _MISSTEP if evidence.contacts(names) == 1 else 0.0
-        score = bayes - float(np.log(max(1, count[names[0]]))) - _RARER.get(names[0], 0.0) - odd
-        found.append(Hypothesis(names, bayes, score, one))
+        found.append(Hypothesis(names, bayes, bayes + odds[names], one))
     for names, turned in evidence.turned.items() if signs else ():
         known = np.isfinite(turned)
         one = explain(evidence, turned, named, known)
@@ -161,7 +152,7 @@ def _is_told(evidence: WitnessEvidence, one: Hypothesis) -> bool:
 def _findings(
     evidence: WitnessEvidence, value: Array, named: list[tuple[Hypothesis, tuple[Alias, ...]]]
 ) -> tuple[Finding, ...]:
-    """Return the named causes with jointly fitted sizes."""
+    """Return the named causes with jointly fitted sizes, if these are still more than laboratories have."""
     sized = tuple(one.names for one, _ in named if one.names in evidence.causes)
     last, found = _fit_sizes(evidence, value, sized), []
     for one, near in named:
@@ -169,8 +160,10 @@ def _findings(
         estimates: tuple[Estimate, ...] = ()
         if one.names in sized:
             i, cause = sized.index(one.names), evidence.causes[one.names]
-            sd = float(np.hypot(last.covariance[i, i] ** 0.5, ALIKE.get(cause.effect, 0.0)))
-            estimates = (Estimate(cause.parameter, float(last.theta[i]), sd, cause.unit),)
+            size, sd = float(last.theta[i]), float(last.covariance[i, i] ** 0.5)
+            if not is_beyond_usual(evidence, one.names, size, sd):
+                continue
+            estimates = (Estimate(cause.parameter, size, float(np.hypot(sd, ALIKE.get(cause.effect, 0.0))), cause.unit),)
             visible = _visible_share(evidence, one.names)
         found.append(
             Finding(*one.names, estimates, near, visible, advice=f"{_carried_by(evidence, one.names)} {kind.advice}")

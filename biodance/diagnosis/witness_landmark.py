@@ -12,7 +12,7 @@ from biodance.diagnosis.candidates import SCALE
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.diagnosis.naming import TOGETHER
 from biodance.diagnosis.witness_evidence import WitnessEvidence
-from biodance.diagnosis.witness_fit import explain, fit_known, is_told, typical_size
+from biodance.diagnosis.witness_fit import THRESHOLD, explain, fit_known, is_told, prior_odds, typical_size
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.records import SIDES, Array
 from biodance.witnesses import LANDMARK, shift_per_sd
@@ -39,23 +39,23 @@ def landmark_alias(evidence: WitnessEvidence, value: Array, named: Names, cause:
 
 
 def landmark_finding(evidence: WitnessEvidence, value: Array, named: Names) -> tuple[Finding, ...]:
-    """Return how far the markers of both feet lie beside where they are expected, where the values (n,) minus
-    expectation clearly show it, with all plates that look the same; the causes ``named`` are allowed for.
+    """Return how far the markers of both feet lie beside where they are expected, with all plates that look the same:
+    where the values (n,) minus expectation clearly show it, or would name a plate if markers were as expected. The
+    causes ``named`` are allowed for.
     """
     where = _columns(evidence)
     feet = (evidence.shared[:, where] != 0).any(axis=1)
-    contacts = {one.contact for one, foot in zip(evidence.observations, feet, strict=True) if foot}
-    bayes = _evidence(evidence, value, named, where)
-    if len(contacts) < 2 or bayes < _SHOWN:
+    if len({one.contact for one, foot in zip(evidence.observations, feet, strict=True) if foot}) < 2:
         return ()
-    shown = tuple(
-        one for one in _sizes(evidence, value, named, where) if abs(one.value) > max(_USUAL + one.sd, _SHOWN * one.sd)
-    )
-    if not shown:
+    bayes, sizes = _evidence(evidence, value, named, where), _sizes(evidence, value, named, where)
+    shown = tuple(one for one in sizes if abs(one.value) > max(_USUAL + one.sd, _SHOWN * one.sd))
+    alike, odds = _plates_alike(evidence, value, named, where, bayes), prior_odds(evidence)
+    accused = any(a.log_bayes_factor + odds[a.effect, a.target] >= THRESHOLD for a in alike)
+    if not (accused or (shown and bayes >= _SHOWN)):
         return ()
     own = Alias(ToeLandmark.name, _target(evidence), bayes)
-    alike = (own, *_plates_alike(evidence, value, named, where, bayes))
-    return (Finding(own.effect, own.target, shown, alike, _VISIBLE, advice=ToeLandmark.advice),)
+    told = shown or (max(sizes, key=lambda one: abs(one.value) / one.sd),)
+    return (Finding(own.effect, own.target, told, (own, *alike), _VISIBLE, advice=ToeLandmark.advice),)
 
 
 def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> tuple[Estimate, ...]:
@@ -73,10 +73,11 @@ def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray
 def _plates_alike(
     evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_], bayes: float
 ) -> list[Alias]:
-    """Return the causes that explain the values nearly as well where the markers are as expected."""
+    """Return the causes that explain what feet on plates show nearly as well where the markers are as expected."""
     before, found = explain(evidence, value, named, without=where).log_evidence, []
+    feet = (evidence.shared[:, where] != 0).any(axis=1)
     for names in evidence.causes:
-        if names in named or not evidence.traces[names].any():
+        if names in named or not evidence.traces[names][feet].any():
             continue
         alone = explain(evidence, value, (*named, names), without=where)
         if bayes - (alone.log_evidence - before) <= TOGETHER and is_told(evidence, names, alone):

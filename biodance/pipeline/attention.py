@@ -5,12 +5,13 @@ first; what a session ends with beside all of that. Page, terminal and JSON show
 from collections.abc import Sequence
 from dataclasses import replace
 
-from biodance.diagnosis.diagnosis import Diagnosis, Finding
+from biodance.diagnosis.diagnosis import HABITS, Diagnosis, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import QualityCheck
 from biodance.identification.load_words import size_and_segments
+from biodance.pipeline.cause_words import alternatives, spoken
 from biodance.pipeline.finding_words import LOAD, cause_of, explained
 from biodance.pipeline.headline import headline
 from biodance.pipeline.reason_words import reason_notes
@@ -119,7 +120,14 @@ def session_attention(
     told = any(_WEIGHED in line.text for lines in said for line in lines)
     outside = [check for check in result.all_checks if not check.inside]
     found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(_WEIGHT))]
+    found += [_habit(one) for one in findings if one.effect in HABITS]
     return strongest_first([*found, *_load(result, findings)])
+
+
+def _habit(one: Finding) -> Attention:
+    """Return what a laboratory does otherwise than is expected, and what it cannot be told from."""
+    text = " or ".join([spoken(one).fact, *(f"it is {other}" for other in alternatives(one))]) + f". {one.advice}"
+    return Attention("warn" if len(one.set) > 1 else "note", f"{text[:1].upper()}{text[1:]}", about=one.effect)
 
 
 def _of_trial(trial: TrialResult, findings: Sequence[Finding]) -> list[Attention]:

@@ -82,9 +82,9 @@ def _clean(seen: str, missed: Sequence[str], *, well: bool) -> Iterator[str]:
 
 def _named(one: Diagnosis) -> Iterator[str]:
     """Yield the first cause with its size, its alternatives and what to do, ever shorter."""
-    first = one.findings[0]
-    together = _together(first, one.findings[1:])
-    told, more = spoken(first, together), len(one.findings) - len(together)
+    first = one.faults[0]
+    together = _together(first, one.faults[1:])
+    told, more = spoken(first, together), len(one.faults) - len(together)
     start = "" if more == 1 else f"{more} things are wrong. First, "
     also = alternatives(first)
     rest = ", and more is wrong" if not {Reason.FORCES_LEFT, Reason.UNUSUAL_BODY}.isdisjoint(one.why) else ""
@@ -94,7 +94,7 @@ def _named(one: Diagnosis) -> Iterator[str]:
         for alike in sets:
             yield _sentence(f"{start}{fact}{alike}{rest}. {told.do}")
     yield _sentence(f"{start}{told.plain}{sets[-1]}. {told.do}")
-    yield _sentence(f"{len(one.findings)} things are wrong, the first: {first.effect.replace('_', ' ')}. {_MEND}")
+    yield _sentence(f"{len(one.faults)} things are wrong, the first: {first.effect.replace('_', ' ')}. {_MEND}")
 
 
 def _together(first: Finding, rest: Sequence[Finding]) -> tuple[Finding, ...]:

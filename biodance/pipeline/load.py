@@ -66,7 +66,7 @@ def with_load(one: Diagnosis, search: LoadSearch | None) -> Diagnosis:
     alike = next((finding for finding in one.findings if finding.effect in CAUSES_OF_WEIGHT), None)
     if alike is not None:
         return _with(one, alike, replace(alike, set=(*alike.set, *load.set)))
-    told: Verdict = one.verdict if one.findings else "named, incomplete"
+    told: Verdict = one.verdict if one.faults else "named, incomplete"
     if one.verdict == "nothing wrong":
         told = "named, complete"
     return replace(one, verdict=told, findings=(*one.findings, load))

@@ -145,7 +145,7 @@ def _accepted(
     """Write the corrected trials; return what acceptance gave in words, and the texts of the files that are left to
     write.
     """
-    name, findings, files = result.session.folder.name, found.diagnosis.findings, {}
+    name, findings, files = result.session.folder.name, found.diagnosis.faults, {}
     if found.accepted is not None and found.accepted.status == "solved":
         named = ", ".join(f"{one.effect} {one.target}".strip() for one in findings)
         files[BODY] = body_text(found.accepted.identified, f"Session {name}: identified with {named} accepted.")
