@@ -114,6 +114,8 @@ class Finding:
         What accepting it changes in the body.
     varies_with : str
         Of one that is only resembled: what its size varies with, though a true cause has one size; "" for none.
+    trials : tuple of str
+        The trials in which it is, where it is not in all; () for all.
 
     Examples
     --------
@@ -130,6 +132,7 @@ class Finding:
     advice: str = ""
     changes: tuple[str, ...] = ()
     varies_with: str = ""
+    trials: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)

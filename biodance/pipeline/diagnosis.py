@@ -15,7 +15,7 @@ from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason
-from biodance.diagnosis.repairs import by_checks, failed_check, with_repairs
+from biodance.diagnosis.repairs import by_checks, named_first, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
 from biodance.discovery import Chosen
@@ -29,7 +29,8 @@ from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
-from biodance.pipeline.results import RightLabels, SessionResult
+from biodance.pipeline.results import MendedCopy, SessionResult
+from biodance.pipeline.undone import with_faults_undone
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _COPY = (
-    "The labels named were exchanged in a copy, and everything else was found in that copy. "
+    "What is named first was undone in a copy, and everything else was found in that copy. "
     "The recordings themselves are as they were."
 )
 
@@ -59,8 +60,9 @@ class SessionDiagnosis:
         What the body in use leaves of the kept trials, and what is left once the findings are accepted.
     failures : mapping
         What could not be computed ("what accepting changes"), with cause and cure.
-    mended : RightLabels or None
-        The copy with its labels exchanged, in which all else was found; None where no labels were mended.
+    mended : MendedCopy or None
+        The copy without large faults of forces, and with labels exchanged where that was asked for, in which all else
+        was found; None where nothing was undone.
     gain : Gain or None
         Of all findings together on the kept trials; each has its own.
 
@@ -76,7 +78,7 @@ class SessionDiagnosis:
     accepted: Identification | None = None
     left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
-    mended: RightLabels | None = None
+    mended: MendedCopy | None = None
     gain: Gain | None = None
 
     def __repr__(self) -> str:
@@ -118,7 +120,7 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
-    mended: RightLabels | None = None,
+    mended: MendedCopy | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
@@ -126,10 +128,13 @@ def diagnose_session(
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
     (``[MyEffect()]``) join the family; ``mended`` says which labels were put right where ``result`` is of a copy
-    (`with_right_labels`): they are named first.
+    (`with_right_labels`): they are named first. Faults too large for gates and statistics are undone in a copy, too.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
+    tell("looking for faults too large for statistics")
+    mended = with_faults_undone(result, mended, causes(effects), reference=reference, tell=tell)
+    result = result if mended is None else mended.result
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
@@ -138,9 +143,9 @@ def diagnose_session(
     whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
-    whole = _named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
+    whole = named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
     if mended is not None:
-        whole, found = _named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
+        whole, found = named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
         whole = replace(whole, checks=(*mended.checks, *whole.checks))
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
@@ -160,20 +165,6 @@ def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, st
         one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
         for one in naming.screening.suspects
     }
-
-
-def _named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
-    """Return the diagnosis with what was put right before all else was judged named first."""
-    named = {(one.effect, one.target) for one in diagnosis.findings}
-    found = tuple(failed_check(quality) for quality in checks if (quality.effect, quality.target) not in named)
-    if not found:
-        return diagnosis
-    return replace(
-        diagnosis,
-        verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*found, *diagnosis.findings),
-        notes=(*notes, *diagnosis.notes),
-    )
 
 
 def _diagnosed(

@@ -57,7 +57,9 @@ class FootAcross(Witness):
             value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
             what = f"{step.name}, {phase}"
             found.append(
-                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred)
+                Observation(
+                    self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred
+                )
             )
         return found
 

@@ -47,7 +47,9 @@ class FootAlong(Witness):
             value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(
-                Observation(self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred)
+                Observation(
+                    self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred
+                )
             )
         return found
 
