@@ -13,8 +13,8 @@ from biodance.diagnosis.reasons import Reason
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.provenance import provenance
-from biodance.pipeline.results import SessionResult, Still
-from biodance.pipeline.trial_result import Check, MarkerFit, Step, TrialResult, WrenchComparison
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import Check, MarkerFit, Step, Still, TrialResult, WrenchComparison
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 from biodance.report.pages.session import page
 

@@ -106,8 +106,7 @@ class Finding:
     set : tuple
         All causes that the data cannot tell apart, the named one first.
     visible_fraction : float
-        Share of its effect that remains visible when the body's own parameters and tolerances may adapt (0 = hides in
-        the body).
+        Share of its effect that remains visible when body and tolerances may adapt (0 = hides in the body).
     gain : Gain or None
         Its own on trials that were kept: accepted with all others, against the others alone; None without one.
     advice : str
@@ -115,7 +114,9 @@ class Finding:
     changes : tuple of str
         What accepting it changes in the body.
     varies_with : str
-        Of one that is only resembled: what its size varies with, though a true cause has one size; "" for none.
+        Of one that is only resembled: what its size varies with ("" for none), though a true cause has one size.
+    trials : tuple of str
+        The trials in which it is; () for all.
 
     Examples
     --------
@@ -132,6 +133,7 @@ class Finding:
     advice: str = ""
     changes: tuple[str, ...] = ()
     varies_with: str = ""
+    trials: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)

@@ -152,10 +152,24 @@ def by_checks(
 
 def failed_check(quality: QualityCheck) -> Finding:
     """Return a failed check as a finding."""
-    size = () if np.isnan(quality.size) else (Estimate(quality.quantity, quality.size, float("nan"), quality.unit),)
-    cause = Alias(quality.effect, quality.target, float("inf"))
-    return Finding(
-        quality.effect, quality.target, size, (cause,), 1.0, advice=f"{quality.text} {quality.advice}".strip()
+    size = () if np.isnan(quality.size) else (Estimate(quality.quantity, quality.size, quality.sd, quality.unit),)
+    alike = tuple(Alias(*names, float("inf")) for names in ((quality.effect, quality.target), *quality.alike))
+    advice = f"{quality.text} {quality.advice}".strip()
+    return Finding(quality.effect, quality.target, size, alike, 1.0, advice=advice, trials=quality.trials)
+
+
+def named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
+    """Return the diagnosis with what was put right before all else was judged named first."""
+    found = tuple(failed_check(quality) for quality in checks)
+    if not found:
+        return diagnosis
+    named = {(one.effect, one.target) for one in found}
+    rest = tuple(one for one in diagnosis.findings if (one.effect, one.target) not in named)
+    return replace(
+        diagnosis,
+        verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
+        findings=(*found, *rest),
+        notes=(*notes, *diagnosis.notes),
     )
 
 

@@ -15,6 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from biodance.diagnosis.candidates import SCALE
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import Effect, causes
+from biodance.effects.plate_offset import USUAL_ZERO, VERTICAL_ZERO
 from biodance.records import Array
 
 THRESHOLD = 2.0
@@ -32,7 +33,7 @@ _USUAL = {
     ("plate_position", "m"): 0.006,
     ("plate_rotation", "rad"): 0.03,
     ("plate_gain", "1"): 0.02,
-    ("plate_offset", "N"): 7.0,
+    ("plate_offset", "N"): USUAL_ZERO,
     ("plate_offset", "N·m"): 2.0,
     ("plate_crosstalk", "m"): 0.006,
     ("time_delay", "s"): 0.008,
@@ -48,8 +49,6 @@ ALIKE = {
     "time_delay": 0.002,
 }
 """Standard deviation of what careful laboratories have (same units): no size is surer against "as the file says"."""
-_VERTICAL = 18.0
-"""N of vertical zero, which readers take off: public recordings have up to 16."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +146,6 @@ def is_beyond_usual(evidence: WitnessEvidence, names: tuple[str, str], size: flo
     cause = evidence.causes[names]
     usual = _USUAL.get((cause.effect, cause.unit), 0.0)
     if cause.effect == "plate_offset" and cause.target.endswith("Fz"):
-        usual = _VERTICAL
+        usual = VERTICAL_ZERO
     whole = float(np.hypot(sd, ALIKE.get(cause.effect, 0.0)))
     return abs(size) > usual + whole and abs(size) > _SURE * whole

@@ -93,8 +93,6 @@ def check_quality(
     """
     recorded = Recorded(session, cases)
     found = [
-        replace(quality, advice=kind.advice)
-        for kind in discrete_effects(chosen).values()
-        for quality in kind.check(recorded)
+        replace(quality, advice=kind.advice) for kind in causes(chosen).values() for quality in kind.check(recorded)
     ]
     return tuple(sorted(found, key=lambda quality: quality.ok))

@@ -5,12 +5,25 @@ Look-alikes: another filter on forces than on markers. Separated by fast alterna
 on the plate.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.records import Array
+from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.motion.newton import LagAndMass
+from biodance.records import Array, Trial, Wrench
+
+_LARGE = 0.06
+"""s beyond which statistics do not look for a delay (``screened_at``): gates have then thrown away what shows it."""
+_EXPLAINS = 0.5
+"""Share of the rest at no lag that the lag must leave at most."""
+_SAME = 0.02
+"""s: lags of several trials that differ by less are one: trunk and centre of mass differ by 9 ms between movements."""
+_LABORATORY = 0.006
+"""s: standard deviation of the lag of clean recordings between laboratories (`witnesses.newton`)."""
 
 
 def moved_in_time(time: Array, value: Array, delay: Array) -> Array:
@@ -42,6 +55,41 @@ class TimeDelay(Effect):
         """Return what was measured less the same ``theta[0]`` seconds earlier."""
         value, time = case.trial.wrench.value, case.motion.time
         return value - moved_in_time(time, value, np.full(time.size, -float(np.ravel(theta)[0])))
+
+    @classmethod
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
+        """Return the delays that Newton shows and that are too large for statistics: one of all trials, or of some."""
+        told = {name: one for name, one in recorded.newton.items() if np.isfinite(one.lag)}
+        late = {name: one for name, one in told.items() if _is_late(one)}
+        lags = [one.lag for one in late.values()]
+        if not told:
+            return ()
+        if not late:
+            text = "The total force goes with the trunk to within 60 ms."
+            return (QualityCheck("clock of the forces", True, text),)
+        if len(late) == len(told) and np.ptp(lags) < _SAME:
+            return (cls._late(late, ()),)
+        return tuple(cls._late({name: one}, (name,)) for name, one in late.items())
+
+    @classmethod
+    def _late(cls, found: dict[str, LagAndMass], trials: tuple[str, ...]) -> QualityCheck:
+        weight = np.array([one.lag_sd**-2 for one in found.values()])
+        lag = float(weight @ [one.lag for one in found.values()] / weight.sum())
+        where = f"In {trials[0]}" if trials else "In all trials that tell"
+        text = f"{where} the forces come {1000 * abs(lag):.0f} ms {'late' if lag > 0 else 'early'}."
+        sd = float(np.hypot(weight.sum() ** -0.5, _LABORATORY))
+        return QualityCheck("clock of the forces", False, text, cls.name, "", lag, "delay", "s", sd=sd, trials=trials)
+
+    @classmethod
+    def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
+        """Return the trial with its forces moved to their instant: their times are."""
+        plates = tuple(replace(p, wrench=Wrench(p.wrench.time - found.size, p.wrench.value)) for p in trial.plates)
+        return replace(trial, plates=plates)
+
+
+def _is_late(one: LagAndMass) -> bool:
+    """Return whether the forces come so late that gates hide it, and clearly go with the trunk only then."""
+    return bool(abs(one.lag) > _LARGE and 1 - one.correlation**2 < _EXPLAINS * (1 - one.unmoved**2))
 
 
 EFFECT = TimeDelay

@@ -22,7 +22,7 @@ from biodance.lab.corrections import (
     joined_corrections,
 )
 from biodance.pipeline.judged_trials import all_windows, cases_of
-from biodance.pipeline.results import RightLabels, SessionResult
+from biodance.pipeline.results import MendedCopy, SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Session
 
@@ -88,7 +88,7 @@ def _session_toml(session: Session) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> RightLabels | None:
+def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> MendedCopy | None:
     """Return the session examined again with those labels exchanged that carry each other's names; None where none do.
 
     Proven before it is kept: a trial that the body follows clearly worse with other names (`WORSE`) keeps its own.
@@ -104,12 +104,12 @@ def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> 
             if before.fit and after.fit and after.fit.total_rms > WORSE * before.fit.total_rms
         } & found.keys()
         if not worse:
-            return RightLabels(mended, found, named_exchanges(result.session, found))
+            return MendedCopy(mended, found, named_exchanges(result.session, found))
         found = {name: pairs for name, pairs in found.items() if name not in worse}
     return None
 
 
-def write_mended(session: Session, right: RightLabels, folder: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def write_mended(session: Session, right: MendedCopy, folder: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Write a copy of every C3D file with exchanged labels put right into ``folder``/mended; return their names there,
     and why others could not be written. Every other byte is as in the recording.
     """

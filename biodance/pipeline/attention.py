@@ -17,6 +17,7 @@ from biodance.pipeline.headline import headline
 from biodance.pipeline.reason_words import reason_notes
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, TrialResult
+from biodance.pipeline.weighing import NOT_WEIGHED
 from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, Level, strongest_first, without_path
 
 _WEIGHED = "kg are declared: check the mass"
@@ -33,8 +34,6 @@ is said of them.
 """
 _NOTED = ("fully measured",)
 """Checks that ask nobody for anything: what was not measured is not judged, which is said of every trial."""
-_STRIDES = "stride_force"
-"""The witness that weighs whole strides, so that nobody has to stand still."""
 
 
 def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
@@ -53,7 +52,7 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     if one.verdict == "unexplained" and not (one.adequacy and any(row.seconds > 0 for row in judged)):
         one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
-    others = session_attention(result, one.findings, weighed=_weighed(one))
+    others = session_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)
     return replace(one, attention=(first, *others))
 
@@ -75,11 +74,6 @@ def _not_clean(
     return {reason: about for reason, about in why.items() if about}
 
 
-def _weighed(one: Diagnosis) -> bool:
-    """Return whether strides weighed the person, who then need not stand still."""
-    return one.witnesses is not None and any(o.witness == _STRIDES for o in one.witnesses.observations)
-
-
 def static_trials(result: SessionResult) -> frozenset[str]:
     """Return the names of the static trials."""
     return frozenset(one.trial.name for one in result.trials if one.trial.role == "static")
@@ -97,19 +91,15 @@ def is_well(one: Diagnosis) -> bool:
     return all(said.level == "note" for said in one.attention)
 
 
-def session_attention(
-    result: SessionResult, findings: Sequence[Finding] = (), *, weighed: bool = False
-) -> tuple[Attention, ...]:
+def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -> tuple[Attention, ...]:
     """Return every file refused, step refused, fit that failed, load found, warning, and check outside its limit; a
-    check that a finding may explain points to it. Nobody has to stand still where strides ``weighed``, nor to stand on
-    a plate in the static trial.
+    check that a finding may explain points to it. Nobody has to stand on a plate in the static trial.
     """
     found = [Attention("fail", without_path(why, file), file, "file") for file, why in result.session.refused.items()]
     found += [
-        Attention("note" if weighed and step.name == "standing" else _level(step.status), step.text, "", step.name)
-        for step in result.steps
-        if step.status != "done"
+        Attention(_level(step.status), step.text, "", step.name) for step in result.steps if step.status != "done"
     ]
+    found += [Attention("note", NOT_WEIGHED, "", "weighing")] if result.weighed is None else []
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
     ]

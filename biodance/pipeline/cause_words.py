@@ -110,6 +110,9 @@ SPOKEN: dict[str, CauseWords] = {
     "mains_hum": CauseWords("the mains hum in {it}, {size}", "Ground the amplifier, and record again.", "hum"),
     "frame_rate": CauseWords("the cameras' frames are not those that the file declares", _RECORD, "a wrong frame rate"),
     "plates_exchanged": CauseWords("{it} carry each other's signals", f"Exchange them, {_ACCEPT}", "exchanged plates"),
+    "unrelated_forces": CauseWords(
+        "{forces} not those of the movement", "Look whether they are another trial's.", "unrelated forces"
+    ),
     "dead_plate": CauseWords("{it} measures nothing", "Leave it out, or record again.", "a dead plate"),
     "toe_landmark": CauseWords(
         "the toe markers sit {size}{between} from the line of the foot",
@@ -151,19 +154,21 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
         return SpokenFinding(fact, f"{fact}{size.between}", f"{do}." if 0 < len(do.split()) <= _SHORT else _LISTED)
     whole, _, channel = finding.target.rpartition(":")
     first, _, other = channel.partition("->")
+    of = ", ".join(finding.trials) or place_in_words(finding.target)
     pairs = ", ".join(one.target.replace("/", " and ") for one in (finding, *others))
     shown = {
         "it": place_in_words(finding.target.partition("->")[0]),
         "plate": place_in_words(whole) if whole else "the plate",
         "axis": first,
         "other": other,
-        "forces": f"the forces of {place_in_words(finding.target)} are" if finding.target else "the forces are",
+        "forces": f"the forces of {of} are" if of else "the forces are",
         "pairs": pairs,
         "factor": f" by a factor of {digits(finding.parameters[0].value, 2)}" if finding.parameters else "",
         "size": size.value or "somewhat",
         "more": words.more[size.negative],
     }
-    plain, fact = (words.fact.format(**shown, between=between) for between in ("", size.between))
+    where = f" in {', '.join(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
+    plain, fact = (words.fact.format(**shown, between=between) + where for between in ("", size.between))
     return SpokenFinding(plain, fact, words.do)
 
 

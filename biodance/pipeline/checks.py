@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.identification.validation import TrialValidation
 from biodance.motion.quiet_standing import QuietStanding
-from biodance.pipeline.trial_result import Check, TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import Check, TrialResult, Weighing, WrenchComparison
 from biodance.records import Subject
 from biodance.settings import CheckLimits
 
@@ -49,13 +49,13 @@ def _group_check(by_group: Mapping[str, float], name: str, limits: CheckLimits, 
     return [Check(_GROUPS, name, value, f"at most {said} mm", by_group[worst] <= allowed[worst], advice)]
 
 
-def mass_check(subject: Subject, standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:
+def mass_check(subject: Subject, weighed: Weighing | None, limits: CheckLimits) -> list[Check]:
     """Compare the mass on the plates with the declared mass, where both are known."""
-    if standing is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
+    if weighed is None or not np.isfinite(subject.mass) or "mass" in subject.guessed:
         return []
-    difference = abs(100 * (standing.mass / subject.mass - 1))
-    advice = "Weigh again, or check the plates' zero."
-    return [_upper(_MASS, standing.trial, difference, limits.mass, "%", advice)]
+    difference = abs(100 * (weighed.mass / subject.mass - 1))
+    advice = f"{weighed.mass:.1f} ± {weighed.sd:.1f} kg by {weighed.by.value}: weigh again, or check the plates' zero."
+    return [_upper(_MASS, ", ".join(weighed.trials), difference, limits.mass, "%", advice)]
 
 
 def standing_check(standing: QuietStanding | None, limits: CheckLimits) -> list[Check]:

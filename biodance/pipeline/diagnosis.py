@@ -29,7 +29,8 @@ from biodance.pipeline.gains import accepted, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
-from biodance.pipeline.results import RightLabels, SessionResult
+from biodance.pipeline.results import MendedCopy, SessionResult
+from biodance.pipeline.undone import with_faults_undone
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _COPY = (
-    "The labels named were exchanged in a copy, and everything else was found in that copy. "
+    "What is named first was undone in a copy, and everything else was found in that copy. "
     "The recordings themselves are as they were."
 )
 
@@ -59,8 +60,9 @@ class SessionDiagnosis:
         What the body in use leaves of the kept trials, and what is left once the findings are accepted.
     failures : mapping
         What could not be computed ("what accepting changes"), with cause and cure.
-    mended : RightLabels or None
-        The copy with its labels exchanged, in which all else was found; None where no labels were mended.
+    mended : MendedCopy or None
+        The copy without large faults of forces, and with labels exchanged where that was asked for, in which all else
+        was found; None where nothing was undone.
     gain : Gain or None
         Of all findings together on the kept trials; each has its own.
 
@@ -76,7 +78,7 @@ class SessionDiagnosis:
     accepted: Identification | None = None
     left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
-    mended: RightLabels | None = None
+    mended: MendedCopy | None = None
     gain: Gain | None = None
 
     def __repr__(self) -> str:
@@ -118,7 +120,7 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
-    mended: RightLabels | None = None,
+    mended: MendedCopy | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
@@ -126,10 +128,13 @@ def diagnose_session(
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
     (``[MyEffect()]``) join the family; ``mended`` says which labels were put right where ``result`` is of a copy
-    (`with_right_labels`): they are named first.
+    (`with_right_labels`): they are named first. Faults too large for gates and statistics are undone in a copy, too.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
+    tell("looking for faults too large for statistics")
+    mended = with_faults_undone(result, mended, causes(effects), reference=reference, tell=tell)
+    result = result if mended is None else mended.result
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)

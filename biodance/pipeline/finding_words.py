@@ -38,6 +38,7 @@ def in_words(finding: Finding) -> str:
     is said beside its segment.
     """
     name = f"{cause_in_words(finding.effect, finding.target)}{_elsewhere(finding)}"
+    name += f" in {listed(finding.trials)}" if finding.trials else ""
     told = finding.parameters[:1] if finding.effect == LOAD else finding.parameters
     known = [p.known for p in finding.parameters if p.sd == p.sd]
     if not known:

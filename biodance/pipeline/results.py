@@ -17,44 +17,13 @@ from biodance.effects import QualityCheck
 from biodance.effects._base.exchange_spans import Pair, Spans
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
-from biodance.pipeline.trial_result import Check, ShownJoints, Step, TrialResult
-from biodance.records import Array, Session, Sip, Subject, by_name
+from biodance.pipeline.trial_result import Check, ShownJoints, Step, Still, TrialResult, Weighing
+from biodance.records import Session, Sip, Subject, by_name
 from biodance.records.attention import WARNING
 from biodance.settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-@dataclass(frozen=True, eq=False)
-class Still:
-    """One instant to draw in 3-D.
-
-    ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured;
-    ``plates`` (P, 4, 3) m corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN =
-    unloaded); ``forward`` (2,) unit vector the subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations``
-    (N, 3, 3) and ``positions`` (N, 3) m in the lab and their ``box_sides``; ``residual`` (3,) N measured minus
-    predicted force, ``load`` (3,) m place of a load that was found (NaN = none); ``about`` what the picture shows, one
-    sentence.
-    """
-
-    trial: str
-    time: float
-    bones: Array
-    sides: tuple[str, ...]
-    markers: Array
-    plates: Array
-    com: Array
-    force: Array
-    cop: Array
-    forward: Array
-    boxes: Array = field(default_factory=lambda: np.empty((0, 2, 3)))
-    rotations: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
-    positions: Array = field(default_factory=lambda: np.empty((0, 3)))
-    box_sides: tuple[str, ...] = ()
-    residual: Array = field(default_factory=lambda: np.full(3, np.nan))
-    load: Array = field(default_factory=lambda: np.full(3, np.nan))
-    about: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +47,7 @@ class SessionResult:
     checks : tuple
         The session's own rows of the quality table.
     standing : Standing or None
-        The quiet standing whose weight is compared with the declared mass, or None.
+        The quiet standing that shows the centre of mass over the centre of pressure, or None.
     still : Still or None
         One instant to draw, or None.
     identification : SessionIdentification or None
@@ -87,6 +56,8 @@ class SessionResult:
         The frame with the largest residual force, and a load that was found.
     prior : Sip or None
         What an earlier session lets expect of the body; None where that is the table.
+    weighed : Weighing or None
+        The mass on the plates that is compared with the declared one, by standing, strides or Newton; None without.
     shown_joints : ShownJoints
         The joints beyond its 23 axes that the body has because its markers show them, and what each brings.
 
@@ -110,6 +81,7 @@ class SessionResult:
     identification: SessionIdentification | None = None
     more_stills: tuple[Still, ...] = ()
     prior: Sip | None = None
+    weighed: Weighing | None = None
     shown_joints: ShownJoints = field(default_factory=ShownJoints)
 
     def __repr__(self) -> str:
@@ -162,7 +134,7 @@ class SessionResult:
     @property
     def mass_difference(self) -> float:
         """Mass on the plates minus declared mass in % of the declared; NaN where either is unknown."""
-        return 100 * (self.standing.mass / self.declared_mass - 1) if self.standing else float("nan")
+        return 100 * (self.weighed.mass / self.declared_mass - 1) if self.weighed else float("nan")
 
     @property
     def declared_mass(self) -> float:
@@ -205,9 +177,9 @@ class SessionResult:
 
 
 @dataclass(frozen=True, eq=False)
-class RightLabels:
-    """A session ``result`` with its labels put right in a copy: the pairs ``exchanged`` by trial, with their frames,
-    and the ``checks`` that name them.
+class MendedCopy:
+    """A session ``result`` with faults of its recordings undone in a copy: the pairs of labels ``exchanged`` by trial,
+    with their frames, and the ``checks`` that name these and all other faults.
     """
 
     result: SessionResult

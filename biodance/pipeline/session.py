@@ -6,18 +6,18 @@ from functools import partial
 
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
-from biodance.errors import SessionRefused, TrialRefused
+from biodance.errors import SessionRefused
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, shown_joints, starting_from, with_forces
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
-from biodance.pipeline.results import SessionResult, Still
+from biodance.pipeline.results import SessionResult
 from biodance.pipeline.same_person import refuse_another_reference
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
-from biodance.pipeline.trial_result import ShownJoints, Step, TrialResult
+from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
+from biodance.pipeline.weighing import weigh
 from biodance.records import Session
-from biodance.settings import StandingRules
 from biodance.threads import one_thread
 
 
@@ -104,9 +104,10 @@ def examine(
     done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
     if body is not None and plain is not None:
         body, shown = with_forces(shown, plain, body, done)
-    standing = attempt(steps, "standing", lambda: best_standing(done))
+    standing = best_standing(done)
+    weighed = attempt(steps, "weighing", lambda: weigh(session, standing))
     identification, limits = None, session.settings.checks
-    checks = (*mass_check(session.subject, standing, limits), *standing_check(standing, limits))
+    checks = (*mass_check(session.subject, weighed, limits), *standing_check(standing, limits))
     if body is not None and can_identify(done):
         tell("identifying the segments")
         work = partial(
@@ -125,6 +126,7 @@ def examine(
         trials=done,
         checks=checks,
         standing=standing,
+        weighed=weighed,
         still=attempt(steps, "still", lambda: still_of(body, done)) if body else None,
         identification=identification,
         more_stills=_stills(body, done, identification) if body else (),
@@ -141,23 +143,13 @@ def _stills(body: Body, done: tuple[TrialResult, ...], found: SessionIdentificat
     return tuple(still for still in (worst, load) if still is not None)
 
 
-def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding:
-    """Return the quiet standing of a static trial, else of a check, else the longest of all.
-
-    Raises
-    ------
-    TrialRefused
-        Nobody stands still on the plates in any trial.
+def best_standing(results: tuple[TrialResult, ...]) -> QuietStanding | None:
+    """Return the quiet standing of a static trial, else of a check, else the longest of all; None where nobody stands
+    still on the plates in any trial.
     """
     found = [(result.trial.role, result.standing) for result in results if result.standing is not None]
-    if not found:
-        shortest = min((one.trial.settings.standing.shortest for one in results), default=StandingRules.shortest)
-        raise TrialRefused(
-            f"Nobody stands still for {shortest:g} s with both feet on the plates in any trial, so the declared mass "
-            "cannot be checked. Record a few seconds of quiet standing on the plates."
-        )
     order = {"static": 0, "check": 1}
-    return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end))[1]
+    return min(found, key=lambda pair: (order.get(pair[0], 2), pair[1].start - pair[1].end), default=("", None))[1]
 
 
 def identification_of(result: SessionResult) -> SessionIdentification:

@@ -15,8 +15,7 @@ from biodance.identification.load_words import size_and_segments
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
 from biodance.motion.quiet_standing import facing
 from biodance.motion.regressor import predict_wrench
-from biodance.pipeline.results import Still
-from biodance.pipeline.trial_result import TrialResult
+from biodance.pipeline.trial_result import Still, TrialResult
 from biodance.records import Array, Motion, side_in_name
 
 

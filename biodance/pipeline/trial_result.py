@@ -6,6 +6,7 @@ about the lab origin.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -118,6 +119,24 @@ class Check:
     advice: str = ""
 
 
+class WeighedBy(Enum):
+    """How a session was weighed."""
+
+    STANDING = "quiet standing"
+    STRIDES = "whole strides"
+    NEWTON = "the force against the trunk"
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """The ``mass`` kg on the plates with its standard deviation ``sd``, ``by`` what, in which ``trials``."""
+
+    mass: float
+    sd: float
+    by: WeighedBy
+    trials: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class ForceGain:
     """RMS difference of measured and simulated force in a ``trial``, N along x, y, z, the body ``without`` the joints
@@ -207,6 +226,37 @@ class TrialResult:
         """The `reasons` and the checks outside their limits as one text; "" if there are none."""
         outside = [f"{one.what}: {one.value}, should be {one.limit}." for one in self.checks if not one.inside]
         return " ".join([*self.reasons, *(f"{said[:1].upper()}{said[1:]}" for said in outside)])
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """One instant to draw in 3-D.
+
+    ``bones`` (B, 2, 3) m lines with ``sides`` (B) "left", "right" or "middle"; ``markers`` (K, 3) m as measured;
+    ``plates`` (P, 4, 3) m corners; ``com`` (3,) m; ``force`` and ``cop`` (3,) N, m of the total wrench (NaN =
+    unloaded); ``forward`` (2,) unit vector the subject faces. ``boxes`` (N, 2, 3) m of the segments with ``rotations``
+    (N, 3, 3) and ``positions`` (N, 3) m in the lab and their ``box_sides``; ``residual`` (3,) N measured minus
+    predicted force, ``load`` (3,) m place of a load that was found (NaN = none); ``about`` what the picture shows, one
+    sentence.
+    """
+
+    trial: str
+    time: float
+    bones: Array
+    sides: tuple[str, ...]
+    markers: Array
+    plates: Array
+    com: Array
+    force: Array
+    cop: Array
+    forward: Array
+    boxes: Array = field(default_factory=lambda: np.empty((0, 2, 3)))
+    rotations: Array = field(default_factory=lambda: np.empty((0, 3, 3)))
+    positions: Array = field(default_factory=lambda: np.empty((0, 3)))
+    box_sides: tuple[str, ...] = ()
+    residual: Array = field(default_factory=lambda: np.full(3, np.nan))
+    load: Array = field(default_factory=lambda: np.full(3, np.nan))
+    about: str = ""
 
 
 def trial_fit(result: TrialResult) -> Fit | None:

@@ -5,6 +5,7 @@ from typing import Any
 
 from biodance.body.body_file import body_text
 from biodance.effects import QualityCheck
+from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.corrections import PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected, write_mended
 from biodance.pipeline.attention import identified_attention, session_attention
@@ -149,14 +150,16 @@ def _accepted(
     if found.accepted is not None and found.accepted.status == "solved":
         named = ", ".join(f"{one.effect} {one.target}".strip() for one in findings)
         files[BODY] = body_text(found.accepted.identified, f"Session {name}: identified with {named} accepted.")
-    made = accepted_corrections(findings, f"session {name}")
+    labels = found.mended.checks if found.mended else ()
+    undone = {(one.effect, one.target) for one in labels}
+    made = accepted_corrections([f for f in findings if (f.effect, f.target) not in undone], f"session {name}")
     if text := lab_text(earlier, made):
         files[LAB] = text
-    written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if made else ((), ())
+    rewritten = made or any(one.effect != LabelsSwapped.name for one in labels)
+    written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
     mended, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
-    labels = found.mended.checks if found.mended else ()
     exchanged = dict.fromkeys(f"{one.text} Put right in a copy." for one in labels)
-    others = {*((one.effect, one.target) for one in made), *((one.effect, one.target) for one in labels)}
+    others = {*((one.effect, one.target) for one in made), *undone}
     told = {
         "files": [*sorted(files), *mended],
         "corrections": [*exchanged, *(str(one) for one in made)],

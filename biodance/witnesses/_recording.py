@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.still import is_still
 from biodance.motion.contact.over import inside
+from biodance.motion.newton import LagAndMass, Trunk, trunk_of
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
@@ -66,8 +67,9 @@ class FootStep:
 class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
     markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and
-    whether somebody stands ``still`` throughout. ``moments`` keeps what witnesses computed of the pelvis at some times:
-    a recording whose plates are altered has the same.
+    whether somebody stands ``still`` throughout; the ``trunk``, against which the plates weigh and time (None = not
+    seen). ``moments`` keeps what witnesses computed of the pelvis at some times: a recording whose plates are altered
+    has the same.
     """
 
     trial: Trial
@@ -76,6 +78,7 @@ class SeenTrial:
     steps: tuple[FootStep, ...]
     pelvis: Array | None
     still: bool
+    trunk: Trunk | None = None
     moments: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
     _stances: dict[FootStep, slice | None] = field(default_factory=dict, init=False, repr=False)
 
@@ -123,6 +126,20 @@ class SeenTrial:
     def total(self) -> Wrench:
         """Total wrench of all plates."""
         return self.trial.wrench
+
+    @cached_property
+    def newton(self) -> LagAndMass | None:
+        """What Newton tells of the total force beside the trunk; None where the trial does not hold it."""
+        if self.trunk is None or not self.one_clock:
+            return None
+        settings = self.trial.settings
+        return self.trunk.beside(self.total, gravity=settings.gravity, sway=settings.standing.sway)
+
+    @property
+    def one_clock(self) -> bool:
+        """Whether all plates share one time base, so that their forces add."""
+        time = self.trial.plates[0].wrench.time
+        return all(np.array_equal(plate.wrench.time, time) for plate in self.trial.plates)
 
     def swings(self, step: FootStep, time: Array) -> NDArray[np.bool_]:
         """Return (n,) whether the other foot swings at some ``time`` (n,) s while this one stands."""
@@ -178,7 +195,7 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     )
     pelvis = pelvis_path(trial.markers, known)
     steps = tuple(sorted(steps, key=lambda step: step.middle))
-    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial))
+    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial), trunk_of(trial, mass=mass))
 
 
 def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.motion.newton import fading
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
@@ -26,8 +27,6 @@ _ON = (0.0, 0.002, 0.003)
 """The same of all strides of somebody who goes on on a belt, walking or running: nothing is trodden on beside it."""
 _MANY = 6
 """Steps from which somebody goes on."""
-_FADES = 0.3
-"""Share of a step in which the weights of its mean begin, and end."""
 _ONE = (0.2, 0.8)
 """Start and stop, as shares of stance, of the time in which the other foot swings."""
 _SHORTEST = 0.15
@@ -61,7 +60,7 @@ class StrideForce(Witness):
 
     def _lasting(self, seen: SeenTrial) -> list[Observation]:
         moving = [step for step in seen.steps if seen.belt(step) is not None]
-        if len(moving) < _MANY or len(moving) < len(seen.steps) or not _one_clock(seen):
+        if len(moving) < _MANY or len(moving) < len(seen.steps) or not seen.one_clock:
             return []
         total, names = seen.total, {step.plate for step in moving}
         here = (total.time >= moving[0].middle) & (total.time <= moving[-1].middle)
@@ -129,14 +128,9 @@ def _means(seen: SeenTrial, time: Array, force: Array) -> Array:
 
 def _fading(seen: SeenTrial, time: Array) -> tuple[Array, Array]:
     """Return the share (n,) of each of the times (n,) s in a mean, and the pelvis' mean acceleration (3,) m/s²."""
-    lasts = time[-1] - time[0]
-    edge = np.minimum((time - time[0]) / lasts, (time[-1] - time) / lasts) / _FADES
-    weight = np.where(edge < 1, 0.5 * (1 - np.cos(np.pi * edge)), 1.0)
-    bend = np.where(edge < 1, 0.5 * (np.pi / (_FADES * lasts)) ** 2 * np.cos(np.pi * edge), 0.0)
+    share, bend = fading(time)
     path = seen.pelvis_at(time)
-    width = np.diff(time, prepend=time[:1]) + np.diff(time, append=time[-1:])
-    total = width @ weight
-    return width * weight / total, (width * bend) @ (path - path.mean(axis=0)) / total
+    return share, bend @ (path - path.mean(axis=0))
 
 
 def _mass(seen: SeenTrial, means: Array) -> float:
@@ -151,19 +145,13 @@ def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
     """Return steps that follow one another with different feet, the second before the first has ended."""
     swung = [step for step in seen.steps if steps(seen, step)]
     for first, last in zip(swung, swung[1:], strict=False):
-        if first.side != last.side and first.plate != last.plate and _one_clock(seen):
+        if first.side != last.side and first.plate != last.plate and seen.one_clock:
             yield first, last
-
-
-def _one_clock(seen: SeenTrial) -> bool:
-    """Return whether all plates share one time base, so that their forces add."""
-    time = seen.trial.plates[0].wrench.time
-    return all(np.array_equal(plate.wrench.time, time) for plate in seen.trial.plates)
 
 
 def _elsewhere(seen: SeenTrial, *plates: str) -> NDArray[np.bool_]:
     """Return (S,) whether another plate than ``plates`` is loaded: the other foot stands there."""
-    others = [plate for plate in seen.trial.plates if plate.name not in plates] if _one_clock(seen) else []
+    others = [plate for plate in seen.trial.plates if plate.name not in plates] if seen.one_clock else []
     none = np.zeros(seen.plate(plates[0]).wrench.time.size, dtype=bool)
     return np.any([none, *(plate.wrench.force[:, 2] > ONSET for plate in others)], axis=0)
 

@@ -19,6 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.effects._base.case import Case
+from biodance.effects._base.quality_check import Checked
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_origin
@@ -35,7 +36,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Checked):
     """One cause at one ``target``: a segment, a channel (``Fz``), a pair (``Fz->My``), a plate and axis
     (``plate1:x``), or "" for none.
     """

@@ -4,19 +4,23 @@ fitted.
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 from biodance.effects._base.case import Case
-from biodance.records import Session
+from biodance.motion.newton import LagAndMass, newton_of
+from biodance.records import Session, Trial
 
 
 @dataclass(frozen=True)
 class QualityCheck:
     """One check: ``check`` what was looked at, ``ok``, ``text`` one plain sentence of what was seen; where it is not
     well the cause: ``effect`` and ``target`` as in the family, and the ``size`` of its ``quantity`` in ``unit`` (NaN =
-    no number); ``advice`` how the effect is mended (filled in by `check_quality`); ``mended`` where it was taken out
-    before anything was judged, so that the rest can be.
+    no number) with its standard deviation ``sd``; ``trials`` in which it is (() = all); ``alike`` the effects and
+    targets that it cannot be told from; ``advice`` how the effect is mended (filled in by `check_quality`); ``mended``
+    where it was taken out before anything was judged, so that the rest can be.
     """
 
     check: str
@@ -29,6 +33,13 @@ class QualityCheck:
     unit: str = ""
     advice: str = ""
     mended: bool = False
+    sd: float = float("nan")
+    trials: tuple[str, ...] = ()
+    alike: tuple[tuple[str, str], ...] = ()
+
+    def meant(self, trial: Trial) -> bool:
+        """Return whether its cause is in a trial."""
+        return not self.trials or trial.name in self.trials
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +51,37 @@ class Recorded:
     session: Session
     cases: tuple[Case, ...] = ()
 
+    @cached_property
+    def newton(self) -> Mapping[str, LagAndMass]:
+        """What Newton tells of every trial with forces and a trunk, by name."""
+        subject = self.session.subject
+        mass = float("nan") if "mass" in subject.guessed else subject.mass
+        told = {trial.name: newton_of(trial, mass=mass) for trial in self.session.trials if trial.plates}
+        return {name: one for name, one in told.items() if one is not None}
 
-class DiscreteEffect(ABC):
+
+class Checked:
+    """A cause of either kind, as a look at the recordings before any statistics finds it. What is so large that gates
+    would throw away the very frames that show it is found here, and undone in a copy before all else is judged.
+    """
+
+    @classmethod
+    def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
+        """Return the checks that could be made on the recording; by default none."""
+        return ()
+
+    @classmethod
+    def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
+        """Return a trial as read without what its check ``found`` in it; by default as it is: nobody can undo it."""
+        return trial
+
+    @classmethod
+    def undoes(cls) -> bool:
+        """Return whether it is undone before all else is judged."""
+        return cls.undone.__func__ is not Checked.undone.__func__  # type: ignore[attr-defined]
+
+
+class DiscreteEffect(Checked, ABC):
     """One cause that is there or not; the checks that find it are its ``check``, and a file without it is refused
     when it is found.
     """

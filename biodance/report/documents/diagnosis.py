@@ -49,7 +49,7 @@ def _finding(one: Finding) -> dict[str, Any]:
         "set": [keyed(alias, _ALIAS) for alias in one.set],
         "visible_fraction": one.visible_fraction,
         "gain": _gain(one.gain),
-        **keyed(one, "changes advice"),
+        **keyed(one, "changes advice trials"),
     }
 
 

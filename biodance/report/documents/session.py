@@ -111,8 +111,9 @@ def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
 
 
 def _mass_check(result: SessionResult) -> dict[str, Any]:
-    weighed = keyed(result.standing, "trial mass_on_plates_kg=mass mass_on_plates_sd_kg=mass_sd")
-    return weighed | keyed(result, "declared_mass_kg=declared_mass difference_percent=mass_difference")
+    weighed = keyed(result.weighed, "mass_on_plates_kg=mass mass_on_plates_sd_kg=sd weighed_by=by.value trials")
+    first = {"trial": result.weighed.trials[0] if result.weighed else None}
+    return first | weighed | keyed(result, "declared_mass_kg=declared_mass difference_percent=mass_difference")
 
 
 def _optional_joints(shown: ShownJoints) -> dict[str, Any]:

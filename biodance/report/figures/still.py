@@ -4,7 +4,7 @@ import numpy as np
 
 from biodance.body.solids import ROUNDNESS
 from biodance.display import BLACK, GREEN, GREY, YELLOW
-from biodance.pipeline.results import Still
+from biodance.pipeline.trial_result import Still
 from biodance.records import Array
 from biodance.report.figures.style import SIDE_COLOURS
 

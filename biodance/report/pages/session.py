@@ -58,8 +58,8 @@ class Tile:
 
 def key_figures(result: SessionResult) -> list[Tile]:
     """Return the mass and the key figures of a session: markers, forces, and what the movement told of the body."""
-    tiles, standing = [], result.standing
-    if standing:
+    tiles = []
+    if result.weighed:
         declared = result.declared_mass
         beside = (
             f"declared {format_number(declared, 2)} kg ({format_number(result.mass_difference)} %)"
@@ -67,7 +67,7 @@ def key_figures(result: SessionResult) -> list[Tile]:
             else "none declared"
         )
         outside = any(check.what.startswith("mass on") and not check.inside for check in result.checks)
-        tiles.append(Tile("Mass on the plates", f"{format_number(standing.mass, 2)} kg", beside, not outside))
+        tiles.append(Tile("Mass on the plates", f"{format_number(result.weighed.mass, 2)} kg", beside, not outside))
     for start, what in (
         ("marker distance, RMS", "Markers to the body"),
         ("force difference", "Forces to the simulation"),

@@ -1,0 +1,239 @@
+"""Newton's second law for a whole person: the plates carry m (g + a) of the centre of mass, and nothing else.
+
+The mean of the markers of pelvis and trunk goes nearly as the centre of mass does: when the force comes against it, and
+what it weighs over a second or more, needs no body, no joint and no posture. How well the two go together
+(`LagAndMass.correlation`) says how far that holds. Only frames count in which every foot that may touch anything stands
+over plates.
+"""
+
+from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from biodance.errors import BiodanceError
+from biodance.lab.filters import LowPass, low_pass
+from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.prepare import prepare
+from biodance.motion.contact.contact import feet_on_ground
+from biodance.motion.contact.footing import footing
+from biodance.motion.contact.soles import soles_from_markers
+from biodance.motion.contact.support import carried_elsewhere
+from biodance.records import Array, Mask, Trial, Wrench, runs
+
+TELLS = 0.7
+"""Least correlation of force and acceleration that tells anything: with a chair that carries along it is 0.4 to 0.6, in
+23 clean trials of 15 laboratories 0.9 to 0.999."""
+_BAND = LowPass(order=2, cutoff=6.0)
+"""Of force and acceleration: steps and squats are below (Winter 2009, chapter 3), impacts of single limbs above."""
+_FARTHEST, _STEP = 0.5, 0.002
+"""s: how late or early a force is looked for, and in which steps."""
+_EDGE = 0.1
+"""s at each end of the markers, which the low-pass makes up."""
+_LEAST = 0.25
+"""s without a break that are looked at."""
+_MOVES = 0.01
+"""Share of the mean force by which it must swing to show an instant: 0.3 mm of noise in each of eight markers is 0.7 %
+of g at 4 Hz."""
+_AMBIGUOUS = 1.5
+"""Times the least rest: of steps that are all alike the instant nearest to none is believed."""
+_WEIGHS, _FADES = 0.5, 0.3
+"""s without a break that weigh, and the share of them in which their weights begin, and end."""
+_WEIGHED, _UNLIKE = 0.002, 0.25
+"""Of the mass, as a share: sd of what a plate weighs in quiet standing; and of the mean acceleration by which the trunk
+goes unlike the centre of mass (slope of force against acceleration: 0.75 to 0.85 of the mass in squats and in running).
+"""
+_TRUNKS: "WeakKeyDictionary[Trial, tuple[float, Trunk | None]]" = WeakKeyDictionary()
+"""The trunk of a trial with the mass it was asked for, kept as long as the trial lives: checks and witnesses ask."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trunk:
+    """The mean of a trial's pelvis and trunk markers: ``time`` (T,) s, ``height`` (T,) m, ``acceleration`` (T,) m/s²
+    upwards below 6 Hz, and whether plates alone can carry the person, ``covered`` (T,).
+    """
+
+    time: Array
+    height: Array
+    acceleration: Array
+    covered: Mask
+    _known: dict[tuple[float, int, int], "LagAndMass | None"] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def rate(self) -> float:
+        """Hz of the markers."""
+        return 1 / float(np.median(np.diff(self.time)))
+
+    def beside(self, total: Wrench, *, gravity: float, sway: float) -> "LagAndMass | None":
+        """Return what Newton tells of the ``total`` wrench of all plates, see `lag_and_mass`; the last ones are kept: a
+        plate that is moved or turned changes no vertical force.
+        """
+        vertical = total.force[:, 2]
+        key = float(total.time[0]), vertical.size, hash(vertical.tobytes())
+        if key not in self._known:
+            self._known[key] = lag_and_mass(self, total.time, vertical, gravity=gravity, sway=sway)
+        return self._known[key]
+
+
+@dataclass(frozen=True)
+class LagAndMass:
+    """``lag`` s of the force behind the trunk's acceleration, and ``mass`` kg, each with its standard deviation (NaN:
+    not told); their ``correlation``, at the ``unmoved`` instant too, over so many ``seconds``; ``swing``: the standard
+    deviation of the force as a share of its mean.
+    """
+
+    lag: float
+    lag_sd: float
+    mass: float
+    mass_sd: float
+    correlation: float
+    unmoved: float
+    seconds: float
+    swing: float
+
+
+def newton_of(trial: Trial, *, mass: float = float("nan")) -> LagAndMass | None:
+    """Return what Newton tells of a trial as read, or prepared; None where it holds no trunk, no plates, or plates of
+    different clocks. ``mass`` kg of the person, NaN = unknown: without it a chair that carries is not seen.
+    """
+    trunk = trunk_of(trial, mass=mass)
+    if trunk is None or any(not np.array_equal(p.wrench.time, trial.plates[0].wrench.time) for p in trial.plates):
+        return None
+    return trunk.beside(trial.wrench, gravity=trial.settings.gravity, sway=trial.settings.standing.sway)
+
+
+def trunk_of(trial: Trial, *, mass: float = float("nan")) -> Trunk | None:
+    """Return the trunk of a trial as read, or prepared; None without a marker set, pelvis, feet or plates."""
+    known = _TRUNKS.get(trial)
+    if known is None or not np.array_equal(known[0], mass, equal_nan=True):
+        known = _TRUNKS[trial] = mass, _trunk(trial, mass)
+    return known[1]
+
+
+def _trunk(trial: Trial, mass: float) -> Trunk | None:
+    if trial.markers is None or not trial.plates or not trial.marker_set:
+        return None
+    try:
+        one = prepare(trial)
+        assert one.markers is not None
+        path = _height(one)
+        if path is None or one.markers.time.size < 4:
+            return None
+        slow = low_pass(path, one.markers.rate, _BAND)
+        covered = _covered(one, mass)
+    except BiodanceError:
+        return None
+    time = one.markers.time
+    acceleration = np.gradient(np.gradient(slow, time), time)
+    covered &= (time > time[0] + _EDGE) & (time < time[-1] - _EDGE) & np.isfinite(acceleration)
+    return Trunk(time, path, acceleration, covered)
+
+
+def _height(trial: Trial) -> Array | None:
+    """Return the height (T,) m of the middle between pelvis and trunk, each the mean of its markers that are seen
+    throughout; None without pelvis or trunk.
+    """
+    assert trial.markers is not None
+    segment = {marker.label: marker.segment for marker in read_marker_set(trial.marker_set).markers}
+    heights = []
+    for wanted in ("pelvis", "trunk_head"):
+        of = [k for k, name in enumerate(trial.markers.names) if segment.get(name) == wanted]
+        seen = trial.markers.xyz[:, of, 2]
+        seen = seen[:, np.isfinite(seen).all(axis=0)]
+        if seen.shape[1]:
+            heights.append(seen.mean(axis=1))
+    return np.mean(heights, axis=0) if heights else None
+
+
+def _covered(trial: Trial, mass: float) -> Mask:
+    """Return (T,) where every foot of a prepared trial that may touch anything is over plates, by the markers."""
+    assert trial.markers is not None
+    soles = soles_from_markers(trial.markers, read_marker_set(trial.marker_set))
+    feet = feet_on_ground(trial, soles, mass=mass)
+    place = footing(trial.plates, soles, feet.surfaces, feet.touching, feet.load)
+    beside = np.any((feet.touching & ~place.covered) | place.unseen, axis=1)
+    return np.asarray(~beside & ~carried_elsewhere(trial, weight=feet.weight))
+
+
+def lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, sway: float) -> LagAndMass | None:
+    """Return what Newton tells of the vertical force (S,) N of all plates at times (S,) s; None where less than a
+    quarter of a second without a break is covered, or the force is too short to be filtered.
+
+    The lag is that of the largest correlation of force and acceleration. The mass is the force over g plus the
+    acceleration, both with weights that begin and end smoothly, so that no velocity of one instant is needed; somebody
+    whose force swings by less than ``sway`` of it stands, and weighs whatever the correlation.
+    """
+    known = np.isfinite(vertical)
+    rate = 1 / float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    if rate <= 2 * _BAND.cutoff or time.size < 2 * _BAND.shortest(rate) or not known.all():
+        return None
+    spans = [slice(*run) for run in runs(trunk.covered) if run[1] - run[0] >= _LEAST * trunk.rate]
+    if not spans:
+        return None
+    here = np.concatenate([np.arange(span.start, span.stop) for span in spans])
+    slow = low_pass(vertical, rate, _BAND)
+    force = np.interp(trunk.time[here], time, slow)
+    swing = float(force.std() / max(abs(float(force.mean())), 1e-9))
+    lag, lag_sd, correlation, unmoved = _lag(trunk, here, time, slow)
+    if swing < _MOVES:
+        lag = lag_sd = float("nan")
+    force = np.interp(trunk.time + (lag if np.isfinite(lag) else 0.0), time, slow)
+    mass = mass_sd = float("nan")
+    if correlation >= TELLS or swing <= sway:
+        mass, mass_sd = _mass(trunk, [s for s in spans if s.stop - s.start >= _WEIGHS * trunk.rate], force, gravity)
+    seconds = here.size / trunk.rate
+    return LagAndMass(lag, lag_sd, mass, mass_sd, correlation, unmoved, seconds, swing)
+
+
+def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, float, float, float]:
+    """Return lag and its sd s (NaN: not told), the correlation there, and the one at no lag."""
+    farthest = min(_FARTHEST, here.size / trunk.rate / 2)
+    lags = _STEP * np.arange(-round(farthest / _STEP), round(farthest / _STEP) + 1)
+    wanted = trunk.acceleration[here] - trunk.acceleration[here].mean()
+    found = np.stack([np.interp(trunk.time[here] + lag, time, slow) for lag in lags])
+    found -= found.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(found, axis=1) * np.linalg.norm(wanted)
+    alike = found @ wanted / np.where(size > 0, size, np.inf)
+    peaks = np.flatnonzero((alike[1:-1] >= alike[:-2]) & (alike[1:-1] >= alike[2:])) + 1
+    unmoved = float(alike[lags.size // 2])
+    if not peaks.size or alike[peaks].max() < TELLS:
+        return float("nan"), float("nan"), float(alike.max()), unmoved
+    rest = 1 - alike[peaks] ** 2
+    near = peaks[rest <= _AMBIGUOUS * rest.min()]
+    k = near[np.argmin(np.abs(lags[near]))]
+    bend = alike[k - 1] - 2 * alike[k] + alike[k + 1]
+    lag = lags[k] + (0.5 * _STEP * (alike[k - 1] - alike[k + 1]) / bend if bend < 0 else 0.0)
+    slope = found[k] @ wanted / (wanted @ wanted)
+    left, moves = found[k] - slope * wanted, np.gradient(slow, time)
+    steep = float(np.interp(trunk.time[here] + lag, time, moves).std())
+    independent = 2 * _BAND.cutoff * here.size / trunk.rate
+    return float(lag), float(left.std() / steep / independent**0.5), float(alike[k]), unmoved
+
+
+def _mass(trunk: Trunk, spans: list[slice], force: Array, gravity: float) -> tuple[float, float]:
+    """Return the mass kg and its sd by all ``spans`` of frames, each with the weight of its own sd; NaN without one."""
+    masses, sds = [], []
+    for span in spans:
+        time, height = trunk.time[span], trunk.height[span]
+        weight, bend = fading(time)
+        acceleration = float(bend @ (height - height.mean()))
+        mass = float(weight @ force[span]) / (gravity + acceleration)
+        masses.append(mass)
+        sds.append(abs(mass) * float(np.hypot(_WEIGHED, _UNLIKE * acceleration / gravity)))
+    if not masses:
+        return float("nan"), float("nan")
+    share = np.array(sds) ** -2
+    return float(share @ masses / share.sum()), float(max(share.sum() ** -0.5, _WEIGHED * np.mean(masses)))
+
+
+def fading(time: Array) -> tuple[Array, Array]:
+    """Return the share (n,) of each of the times (n,) s in a mean whose weights begin and end as a cosine does, and
+    the factors (n,) 1/s² by which places give the same mean of their acceleration: the weights' second derivative.
+    """
+    lasts = time[-1] - time[0]
+    edge = np.minimum((time - time[0]) / lasts, (time[-1] - time) / lasts) / _FADES
+    weight = np.where(edge < 1, 0.5 * (1 - np.cos(np.pi * edge)), 1.0)
+    bend = np.where(edge < 1, 0.5 * (np.pi / (_FADES * lasts)) ** 2 * np.cos(np.pi * edge), 0.0)
+    width = np.diff(time, prepend=time[:1]) + np.diff(time, append=time[-1:])
+    total = width @ weight
+    return width * weight / total, width * bend / total
