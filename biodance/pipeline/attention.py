@@ -47,14 +47,27 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     doubts = [text for text in result.doubts if not any(target in text for target in found)]
     if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, verdict="named, incomplete")
-    if one.verdict == "nothing wrong" and (why := _not_clean(result, judged, outside)):
-        one = replace(one, verdict="unexplained", why={**why, **one.why})
-    if one.verdict == "unexplained" and not (one.adequacy and any(row.seconds > 0 for row in judged)):
+    if one.verdict == "unexplained" and not one.adequacy:
+        stepped_well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
+        one = replace(
+            one, verdict="nothing wrong" if stepped_well else one.verdict, why={**one.why, Reason.NOT_COMPARED: ()}
+        )
+    if one.verdict == "nothing wrong" and (against := _not_clean(result, judged, outside)):
+        one = replace(one, verdict="unexplained", why={**against, **one.why})
+    if one.verdict == "unexplained" and not any(row.seconds > 0 for row in judged):
         one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
     others = session_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)
     return replace(one, attention=(first, *others))
+
+
+def _compared_by_steps(result: SessionResult, judged: tuple[Judged, ...]) -> bool:
+    """Return whether feet and clocks judged steps in which the forces were compared with the body, too, if for less
+    than the engine needs: nothing is wrong there if they say so and no limit is broken.
+    """
+    compared = {one.name for one in result.trials if one.comparison is not None and one.comparison.used.any()}
+    return any(row.seconds > 0 for row in judged if row.trial in compared - static_trials(result))
 
 
 def _not_clean(

@@ -125,7 +125,7 @@ SPOKEN: dict[str, CauseWords] = {
     "marker_spikes": CauseWords("{it} jumps and comes back", "Fill these frames again.", "spikes"),
     "padding": CauseWords("the forces begin or end with copies of one value", "Cut them off.", "padding"),
     "unequal_limbs": CauseWords(
-        "the legs have unequal masses{times}", "Say in session.toml what is worn.", "unequal legs"
+        "the legs have unequal masses by {size}", "Say in session.toml what is worn.", "unequal legs"
     ),
 }
 """By effect. One from outside the package is told by its name and its own advice."""
@@ -157,7 +157,7 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
     of = ", ".join(finding.trials) or place_in_words(finding.target)
     pairs = ", ".join(one.target.replace("/", " and ") for one in (finding, *others))
     shown = {
-        "it": place_in_words(finding.target.partition("->")[0]),
+        "it": place_in_words(finding.target.partition("->")[0]) or "something",
         "plate": place_in_words(whole) if whole else "the plate",
         "axis": first,
         "other": other,

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
+from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.display import digits
 from biodance.pipeline.cause_words import alternatives, spoken
 from biodance.records.attention import LEVELS, Attention, Judged, Level
@@ -38,14 +39,14 @@ def headline(
     """Return what a session ends with in one sentence and one thing to do; ``static`` are its static trials,
     ``others`` what else a person must see of it: no sentence is weaker than they are.
     """
-    missed = [row.trial for row in judged if row.missed and not row.seconds > 0]
+    missed = [row.trial for row in judged if row.missed and not row.seconds > 0 and row.trial not in static]
     own: Level = "fail"
     if one.status is DiagnosisStatus.NAMED:
         sentences = _named(one)
     elif one.status is DiagnosisStatus.UNKNOWN:
         sentences = _unknown(one)
     elif one.status is DiagnosisStatus.CANNOT_TELL:
-        own, sentences = "warn", _cannot_tell(one)
+        own, sentences = "warn", _cannot_tell(one, amount(judged, static))
     else:
         own = "warn" if missed else "note"
         well = all(other.level == "note" for other in others)
@@ -123,13 +124,15 @@ def _unknown(one: Diagnosis) -> Iterator[str]:
     yield f"{start}. Look at the trials below."
 
 
-def _cannot_tell(one: Diagnosis) -> Iterator[str]:
-    """Yield the first reason for which nobody can tell, and what to do about it."""
+def _cannot_tell(one: Diagnosis, seen: str) -> Iterator[str]:
+    """Yield the first reason for which nobody can tell, and what to do about it; ``seen`` what was judged."""
     reason = next((reason for reason in _WHY if reason in one.why), Reason.NOT_COMPARED)
     why, do = _WHY[reason]
     about = one.why.get(reason, ())
     if reason is Reason.BODY_DOUBTFUL and len(about) == 1:
         yield f"{_UNTOLD}: {about[0]}. Mend it, and run this again."
-    if reason is Reason.UNDESCRIBED_JOINTS:
+    if reason is Reason.UNDESCRIBED_JOINTS and about:
         yield f"{_UNTOLD}: what is usual of {_either(about)} is not known yet. {do}"
+    if reason is Reason.NOT_COMPARED and seen:
+        yield f"{_UNTOLD}: no movement stayed on the plates for {SHORTEST_RUN:g} s. {_SQUATS}"
     yield f"{_UNTOLD}: {why}. {do}"

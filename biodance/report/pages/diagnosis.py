@@ -196,6 +196,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     from markupsafe import Markup
 
     one = found.diagnosis
+    others = [said for said in told_together(one.attention) if said.about != ABOUT]
     witnesses = _witnesses(one.witnesses)
     witnessed = {(row.effect, row.target) for row in witnesses["seen"]} if witnesses else set()
     blind = [row for row in one.unobservable if (row.effect, row.target) not in witnessed]
@@ -224,7 +225,8 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         result=result,
         one=one,
         headline=next((said for said in one.attention if said.about == ABOUT), None),
-        others=[(trial_and_subject(said), said.text) for said in told_together(one.attention) if said.about != ABOUT],
+        others=[(trial_and_subject(said), said.text) for said in others if said.level != "note"],
+        noted=[(trial_and_subject(said), said.text) for said in others if said.level == "note"],
         failures={**result.failures, **found.failures},
         provenance=provenance,
         channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),

@@ -165,6 +165,7 @@ def page(
     from markupsafe import Markup
 
     said = session_attention(result) if attention is None else attention
+    lines = [one for one in told_together(said) if one.about != ABOUT]
     found = result.identification
     validated = {one.name: one for one in (*found.validations, *found.fitted)} if found else {}
     identified = identification_section(found) if found else ""
@@ -179,7 +180,8 @@ def page(
         loaded=bool(replay and replay.load),
         sheet=Markup(print_sheet(f"Session {name}", provenance.visit, made)),
         headline=next((one for one in said if one.about == ABOUT), None),
-        attention=[(trial_and_subject(one), one.text) for one in told_together(said) if one.about != ABOUT],
+        attention=[(trial_and_subject(one), one.text) for one in lines if one.level != "note"],
+        noted=[(trial_and_subject(one), one.text) for one in lines if one.level == "note"],
         tiles=key_figures(result),
         contents=_contents(f"{diagnosis}{identified}{movement}", replayed=replay is not None),
         check_table=check_table(result),
