@@ -182,6 +182,14 @@ def test_nobody_is_on_a_plate_only_where_feet_are_seen_on_another() -> None:
     assert sum(plate.wrench.value[:, 2].mean() for plate in plates) == pytest.approx(MASS * GRAVITY, rel=1e-3)
 
 
+def test_somebody_who_stands_like_a_statue_is_no_dead_plate() -> None:
+    still = [np.tile(wrench.mean(axis=0), (TIME.size, 1)) for wrench in loads()]
+    noise = np.random.default_rng(3).normal(0, 0.2, (TIME.size, 6)) * [1, 1, 1, 0.05, 0.05, 0.05]
+    signals = [channels(one, value) + noise for one, value in zip(FEET, still, strict=True)]
+    plates, _, _, defects = read_plates(raw_file(FEET, signals), metres=0.001, markers=markers())
+    assert (len(plates), defects) == (2, ())
+
+
 def test_a_real_walk_with_an_untared_plate_has_one_sign(data: Path) -> None:
     """Four plates, one of which reads 32 N throughout with nobody on it; its sign was taken from that."""
     record = inspect_file(data / "gaitalytics" / "test_small.c3d")
