@@ -85,8 +85,10 @@ def padded(tmp_path: Path) -> Trial:
 
 
 def test_padding_at_both_ends_is_left_out_and_said_once(padded: Trial) -> None:
-    (warning,) = [line for line in padded.warnings if "padding" in line]
-    assert warning == (
+    (said,) = [line for line in (*padded.history, *padded.warnings) if "padding" in line]
+    record = inspect_file(padded.source.path)
+    assert (record["status"], record["reason"]) == ("warning", said)
+    assert said == (
         "The first 30 ms and the last 20 ms of every analog channel repeat one sample: padding by the recording "
         "program. They were left out."
     )
@@ -98,13 +100,13 @@ def test_padding_at_both_ends_is_left_out_and_said_once(padded: Trial) -> None:
 
 
 def test_padding_is_named_and_no_channel_called_clipped(padded: Trial) -> None:
-    found = check_quality(session_of(padded))
+    found = check_quality(session_of(padded), chosen=("padding", "clipping"))
     assert failed(found) == [("padding", "")]
     (one,) = [quality for quality in found if not quality.ok]
     assert one.size == pytest.approx(0.05)
     assert "(squat_1)" in one.text
     left = Padding.undone(padded, one)
-    assert failed(check_quality(session_of(left))) == []
+    assert failed(check_quality(session_of(left), chosen=("padding", "clipping"))) == []
     assert np.isnan(left.plates[0].wrench.value[:15]).all()
 
 
@@ -144,14 +146,15 @@ def three_plates(dead: float, *, squat: float, reaction: bool = False) -> tuple:
 def test_a_dead_plate_is_named_and_turns_no_other_round(dead: float, squat: float, reaction: bool) -> None:
     """-975 N with nobody on it, as a clinic's third plate reads: neither sign nor zero of any plate comes from it."""
     raw, truth = three_plates(dead, squat=squat, reaction=reaction)
-    plates, warnings, _, defects = read_plates(raw, metres=0.001, markers=markers(moving=squat > 0), body_mass=MASS)
+    seen = markers(moving=squat > 0)
+    plates, warnings, history, defects = read_plates(raw, metres=0.001, markers=seen, body_mass=MASS)
     assert [plate.name for plate in plates] == ["plate1", "plate2"]
     for plate, value in zip(plates, truth, strict=True):
         np.testing.assert_allclose(plate.wrench.value, value, atol=1e-6)
     (one,) = defects
     assert (one.effect, one.target, one.unit) == ("dead_plate", "plate3", "N")
     assert one.size == pytest.approx(dead, abs=0.5)
-    assert warnings == (one.text,)
+    assert (warnings, history) == ((), (one.text,))
     assert one.text.startswith("Plate 3 was left out, and what it carried is missing from the total: it reads")
     trial = Trial("squat", "fit", markers(), plates, Source(Path("squat.c3d"), "", "C3D", 100.0, RATE), defects=defects)
     found = [quality for quality in check_quality(session_of(trial)) if quality.effect == "dead_plate"]
@@ -182,6 +185,14 @@ def test_nobody_is_on_a_plate_only_where_feet_are_seen_on_another() -> None:
     assert sum(plate.wrench.value[:, 2].mean() for plate in plates) == pytest.approx(MASS * GRAVITY, rel=1e-3)
 
 
+def test_somebody_who_stands_like_a_statue_is_no_dead_plate() -> None:
+    still = [np.tile(wrench.mean(axis=0), (TIME.size, 1)) for wrench in loads()]
+    noise = np.random.default_rng(3).normal(0, 0.2, (TIME.size, 6)) * [1, 1, 1, 0.05, 0.05, 0.05]
+    signals = [channels(one, value) + noise for one, value in zip(FEET, still, strict=True)]
+    plates, _, _, defects = read_plates(raw_file(FEET, signals), metres=0.001, markers=markers())
+    assert (len(plates), defects) == (2, ())
+
+
 def test_a_real_walk_with_an_untared_plate_has_one_sign(data: Path) -> None:
     """Four plates, one of which reads 32 N throughout with nobody on it; its sign was taken from that."""
     record = inspect_file(data / "gaitalytics" / "test_small.c3d")
@@ -202,7 +213,7 @@ def test_data_that_are_scaled_already_are_told_by_the_weight(tmp_path: Path, squ
     assert "): the floating-point data are already scaled, and SCALE was not applied." in said
     if not squat:
         assert standing_mass(trial) == pytest.approx(MASS, rel=1e-3)
-    assert failed(check_quality(session_of(trial))) == []
+    assert failed(check_quality(session_of(trial), chosen=("unit_error",))) == []
 
 
 def test_a_scale_that_is_needed_is_applied(tmp_path: Path) -> None:

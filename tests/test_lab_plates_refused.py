@@ -138,9 +138,9 @@ def test_a_plate_that_never_changes_while_somebody_walks_is_refused():
     time = np.arange(0, 2, 0.01)
     walk = np.zeros((time.size, 4, 3)) + np.array([9.0, 9.0, 1.0])
     walk[..., 0] += time[:, None]
-    plates, warnings, *_ = read_plates(raw, metres=0.001, markers=Markers(("A", "B", "C", "D"), time, walk))
+    plates, _, history, _ = read_plates(raw, metres=0.001, markers=Markers(("A", "B", "C", "D"), time, walk))
     assert [plate.name for plate in plates] == ["plate2"]
-    assert "it reads a constant 1448 N" in warnings[0]
+    assert "it reads a constant 1448 N" in history[0]
 
 
 def test_load_beside_the_plate_is_warned_about_and_refused_without_units():

@@ -2,7 +2,8 @@
 
 Signature: for some ten milliseconds at an end of the recording all channels hold one sample to the last digit, while
 the person moves. Look-alikes: an amplifier at its end (one channel, at its extreme), a plate set to zero while unloaded
-(all channels at zero), a recording that hung (markers rest, too). Separated by a longer recording.
+(all channels at zero), a recording that hung (markers rest, too). Separated by a longer recording. Samples that were
+put in front move all forces by as much: that is a time delay, and named as one.
 """
 
 from biodance.effects._base.left_out import checks_of_defects, without_defects

@@ -108,7 +108,7 @@ def inspect_file(
     trial, guessed = _guessed(trial)
     gaps = report_gaps(of_set) if (of_set := _of_the_set(trial)) is not None else ()
     never = [gap.label for gap in gaps if gap.percent >= 100.0]
-    warnings = [*trial.warnings, *guessed]
+    warnings = [*(one.text for one in trial.defects), *trial.warnings, *guessed]
     if never:
         warnings.append(f"Never seen: {', '.join(never[:12])}{' ...' if len(never) > 12 else ''}.")
     plates = [_plate(plate) for plate in trial.plates]

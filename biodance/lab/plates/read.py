@@ -74,7 +74,8 @@ def read_plates(
     plates, said = _oriented(readings, _time(raw, markers), markers)
     defects = (*dead, *padded)
     history += tuple(f"{one.plate.name}: {one.plate.told.sentence}" for one in readings if one.plate.told.sentence)
-    warned = (*warnings, *refused, *(one.text for one in defects), *said, *_weight_said(plates, markers, body_mass))
+    history += tuple(one.text for one in defects)
+    warned = (*warnings, *refused, *said, *_weight_said(plates, markers, body_mass))
     return ReadPlates(plates, warned, history, defects)
 
 
