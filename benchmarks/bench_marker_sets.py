@@ -117,7 +117,8 @@ def labels(data: Path) -> None:
         moved = "-"
         if found:
             result = examine(session)
-            mended, _ = with_right_labels(result, tell=lambda text: None)
+            right = with_right_labels(result, tell=lambda text: None)
+            mended = right.result if right else result
             pairs = [(a, b) for a, b in zip(result.trials, mended.trials, strict=True) if a.fit and b.fit]
             moved = "; ".join(
                 f"{a.trial.name}: {1e3 * a.fit.total_rms:.1f} -> {1e3 * b.fit.total_rms:.1f}" for a, b in pairs
@@ -142,7 +143,12 @@ def _copies(data: Path) -> None:
         for session in children:
             there = exchanges(Recorded(session))
             for wrong in chain.from_iterable(combinations(range(len(session.trials)), n) for n in range(4)):
-                copies = [renamed(one, pairs) if k in wrong else one for k, one in enumerate(session.trials)]
+                copies = [
+                    renamed(one, dict.fromkeys(pairs, ((0, one.markers.time.size),)))
+                    if k in wrong and one.markers
+                    else one
+                    for k, one in enumerate(session.trials)
+                ]
                 whole = all(one.markers and {*chain(*pairs)} <= {*one.markers.names} for one in session.trials)
                 composed = any(not set(a).isdisjoint(b) and a != b for p in there.values() for a in p for b in pairs)
                 if not whole or composed:
@@ -152,7 +158,8 @@ def _copies(data: Path) -> None:
                     for k, one in enumerate(session.trials)
                 }
                 found = exchanges(Recorded(Session(session.subject, tuple(copies), session.folder)))
-                total, right = total + 1, right + (found == {name: p for name, p in truth.items() if p})
+                said = {name: frozenset(p) for name, p in found.items()}
+                total, right = total + 1, right + (said == {name: p for name, p in truth.items() if p})
         print(f"| {kind} | {right} of {total} |", flush=True)
 
 

@@ -8,15 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c3d_files import File, text
+from human_cases import human_case
 from lab_sessions import person
 
 from biodance.effects import Recorded
 from biodance.effects._base.wrists import back_of_hand, middle
-from biodance.effects.labels_swapped import exchanges, renamed
+from biodance.effects.labels_swapped import LabelsSwapped, exchanges, refuted, renamed
 from biodance.errors import FileRefused
 from biodance.lab.c3d.exchanged import write_exchanged
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.session.read import read_session
+from biodance.pipeline.accepted import with_right_labels, write_mended
+from biodance.pipeline.session import examine
 from biodance.records import Markers, Session, Source, Subject, Trial
 
 HEAD = (("LFHD", "RFHD"), ("LBHD", "RBHD"))
@@ -168,3 +171,88 @@ def test_real_copies_with_exchanged_bytes_give_the_right_set(
     session = read_session(tmp_path)
     right = {session.trials[number].name: set(pairs) for number in wrong}
     assert found_in(*session.trials) == right
+
+
+def test_real_toe_labels_exchanged_in_both_runs_are_found(data: Path) -> None:
+    """Toe to heel 209 and 173 mm in the static trial, 171 and 209 mm in the runs."""
+    pair = {("R.MT1", "R.MT5")}
+    assert found_in(*read_session(data / "rbds/S001").trials) == {"runT25": pair, "runT35": pair}
+
+
+def test_a_real_wrist_exchanged_from_the_middle_of_a_trial_on_is_found_to_the_frame(data: Path) -> None:
+    """From 17.63 s on the right wrist's markers lie where the other one lay a frame before (60 mm in 33 ms), and are
+    260 and 274 mm from the elbow, 273 and 259 mm until then.
+    """
+    session = read_session(data / "laas_human/c3d")
+    assert {name: dict(pairs) for name, pairs in exchanges(Recorded(session)).items()} == {
+        "march": {("RWRA", "RWRB"): ((529, 978),)}
+    }
+    assert "march from 17.63 to 32.57 s" in LabelsSwapped.check(Recorded(session))[0].text
+
+
+PARTS = [
+    (("LKNE", "RKNE"),),
+    (("LASI", "RASI"),),
+    (("LWRA", "LWRB"),),
+    (("LFIN", "RFIN"),),
+    (("LFIN", "RFIN"), ("LWRA", "RWRA"), ("LWRB", "RWRB")),
+    (("HEE", "TOE"),),
+    HEAD,
+]
+
+
+@pytest.mark.parametrize("pairs", PARTS)
+def test_an_exchange_for_half_a_second_is_found_to_the_frame_and_put_right(pairs: tuple, data: Path) -> None:
+    pairs = tuple((f"L{a}", f"L{b}") if len(a) == 3 else (a, b) for a, b in pairs)
+    static, walk = (trial for trial in read_session(data / "biomechzoo/HC032A").trials[:2])
+    wrong = swapped(walk, pairs, 70, 120)
+    found = exchanges(Recorded(Session(Subject(60.3, 1.7, "F"), (static, wrong), Path())))
+    assert found == {walk.name: {tuple(sorted(pair)): ((70, 120),) for pair in pairs}}
+    mended = renamed(wrong, found[walk.name])
+    for label in (label for pair in pairs for label in pair):
+        np.testing.assert_array_equal(mended.markers[label], walk.markers[label])
+    assert "from 0.70 to 1.19 s" in mended.history[-1]
+
+
+def test_an_exchange_of_some_frames_is_put_right_in_a_copy_and_nothing_else(data: Path, tmp_path: Path) -> None:
+    source = data / "biomechzoo/HC032A/HC032A03.c3d"
+    wrong = write_exchanged(source, tmp_path / "wrong.c3d", {("LKNE", "RKNE"): [(70, 120)]})
+    before, after = read_raw(source), read_raw(wrong)
+    left, right = (before.labels.index(label) for label in ("LKNE", "RKNE"))
+    np.testing.assert_array_equal(after.points[70:120, left], before.points[70:120, right])
+    np.testing.assert_array_equal(after.points[:70, left], before.points[:70, left])
+    again = write_exchanged(wrong, tmp_path / "right.c3d", {("LKNE", "RKNE"): [(70, 120)]})
+    assert again.read_bytes() == source.read_bytes()
+    with pytest.raises(FileRefused, match="holds no point LXXX"):
+        write_exchanged(source, tmp_path / "none.c3d", {("LXXX", "RKNE"): [(0, 5)]})
+
+
+@pytest.mark.parametrize("child", ["HC002D", "HC036A"])
+def test_swinging_arms_are_no_exchanged_hands_and_accepting_writes_no_label(child: str, data: Path) -> None:
+    result = examine(read_session(data / "biomechzoo" / child))
+    assert with_right_labels(result, tell=lambda text: None) is None
+
+
+def test_accepting_writes_what_it_says_and_nothing_else(data: Path, tmp_path: Path) -> None:
+    session = read_session(data / "biomechzoo/HC055A")
+    right = with_right_labels(examine(session), tell=lambda text: None)
+    assert {name: set(pairs) for name, pairs in right.exchanged.items()} == {"HC055A34": set(map(sorted_pair, HEAD))}
+    written, refused = write_mended(session, right, tmp_path)
+    assert (written, refused) == (("mended/HC055A34.c3d",), ())
+    assert [path.name for path in tmp_path.rglob("*.c3d")] == ["HC055A34.c3d"]
+    before, after = (
+        next(t for t in one.trials if t.name == "HC055A34").fit for one in (examine(session), right.result)
+    )
+    assert after.total_rms < 0.4 * before.total_rms
+
+
+def sorted_pair(pair: tuple[str, str]) -> tuple[str, str]:
+    return (min(pair), max(pair))
+
+
+def test_names_that_a_body_follows_worse_are_refused() -> None:
+    case = human_case(120)
+    trial = case.trial
+    whole = ((0, trial.markers.time.size),)
+    assert refuted(case.body, trial, {("LWRA", "RWRA"): whole})
+    assert not refuted(case.body, swapped(trial, (("LWRA", "RWRA"),)), {("LWRA", "RWRA"): whole})

@@ -87,12 +87,12 @@ def exchanges(recorded: Recorded) -> dict[str, dict[Pair, Spans]]:
     bodies = {case.trial.name: case.body for case in recorded.cases}
     for trial in trials:
         own = {pair: spans for pair, spans in found[trial.name].items() if pair not in known}
-        if own and trial.name in bodies and _refuted(bodies[trial.name], trial, own):
+        if own and trial.name in bodies and refuted(bodies[trial.name], trial, own):
             found[trial.name] = {}
     return {name: pairs for name, pairs in found.items() if pairs}
 
 
-def _refuted(body: Body, trial: Trial, pairs: Mapping[Pair, Spans]) -> bool:
+def refuted(body: Body, trial: Trial, pairs: Mapping[Pair, Spans]) -> bool:
     """Return whether a ``body``, placed by a static trial in which these ``pairs`` are as here, follows a trial clearly
     worse with them exchanged.
     """

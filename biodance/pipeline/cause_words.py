@@ -120,9 +120,9 @@ SPOKEN: dict[str, CauseWords] = {
         "a toe marker elsewhere",
     ),
     "frozen_markers": CauseWords(
-        "{it} stood still to the last bit: not seen", "Leave these frames out.", "frozen markers"
+        "{pairs} stood still to the last bit: not seen", "Leave gaps open instead.", "frozen markers"
     ),
-    "marker_spikes": CauseWords("{it} jumps and comes back", "Fill these frames again.", "spikes"),
+    "marker_spikes": CauseWords("{pairs} jump and come back: not seen", "Fill these frames again.", "spikes"),
     "padding": CauseWords("the forces begin or end with copies of one value", "Cut them off.", "padding"),
     "unequal_limbs": CauseWords(
         "the legs have unequal masses by {size}", "Say in session.toml what is worn.", "unequal legs"

@@ -139,30 +139,32 @@ def _travelled(xyz: Array, repeats: Mask, start: int, stop: int) -> bool:
     return bool(farthest.size) and float(np.median(farthest)) > _TRAVELLED
 
 
-def _off_its_way(xyz: Array, frames: int) -> Array:
+def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
     """Return (T, ...) m how far ``frames`` frames from each one on are off their way, the least of them: from the cubic
-    through the two frames before and the two behind (the line between the next ones where a farther one is not seen);
-    0 where these do not fit together as well.
+    through the two frames before and the two behind, and from the line between the next ones; 0 where neither of these
+    sides leads to the other as well. And by how much (T, ...) m a side may miss the other.
     """
-    off = np.zeros(xyz.shape[:-1])
+    off, missed = np.zeros((2, *xyz.shape[:-1]))
     count = len(xyz) - frames - 3
     if count < 1:
-        return off
+        return off, missed
     places = np.array([-2.0, -1.0, frames, frames + 1.0])
     a, b, c, d = (xyz[at : at + count] for at in (0, 1, frames + 2, frames + 3))
     least = np.full(a.shape[:-1], np.inf)
     for k in range(frames):
         weight = [np.prod((k - places[places != one]) / (one - places[places != one])) for one in places]
         way = weight[0] * a + weight[1] * b + weight[2] * c + weight[3] * d
-        way = np.where(np.isnan(way), b + (k + 1) / (frames + 1) * (c - b), way)
-        least = np.minimum(least, np.linalg.norm(xyz[2 + k : 2 + k + count] - way, axis=-1))
-    apart = [
-        np.linalg.norm(b + (frames + 1) * (b - a) - c, axis=-1),
-        np.linalg.norm(c - (frames + 1) * (d - c) - b, axis=-1),
-    ]
+        line = b + (k + 1) / (frames + 1) * (c - b)
+        for expected in (line, np.where(np.isnan(way), line, way)):
+            least = np.minimum(least, np.linalg.norm(xyz[2 + k : 2 + k + count] - expected, axis=-1))
+    forth, back = (
+        np.linalg.norm(near + (frames + 1) * (near - far) - other, axis=-1)
+        for near, far, other in ((b, a, c), (c, d, b))
+    )
     with np.errstate(invalid="ignore"):
-        off[2 : 2 + count] = np.where(least > np.fmin(*apart), least, 0.0)
-    return off
+        off[2 : 2 + count] = np.where(least > np.fmin(forth, back), least, 0.0)
+    missed[2 : 2 + count] = np.fmax(forth, back)
+    return off, missed
 
 
 def _limit(step: float) -> float:
@@ -172,21 +174,22 @@ def _limit(step: float) -> float:
 
 def _suspects(xyz: Array, step: float) -> Mask:
     """Return (K,) which markers are off their way anywhere."""
-    off = [_off_its_way(xyz, frames).max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
+    off = [_off_its_way(xyz, frames)[0].max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
     return np.asarray(np.max(off, axis=0) > _limit(step))
 
 
 def _spikes(path: Array, step: float) -> tuple[Mask, float]:
-    """Return (T,) where a marker's ``path`` (T, 3) jumps, and how far at most: the farthest jump is taken out first,
+    """Return (T,) where a marker's ``path`` (T, 3) jumps, and how far at most: the clearest jump is taken out first,
     for the frames beside it seem to be off, too.
     """
     path, spiky, farthest = path.copy(), np.zeros(len(path), dtype=bool), 0.0
     while True:
-        off = {frames: _off_its_way(path, frames) for frames in range(1, _LONGEST + 1)}
-        frames = max(off, key=lambda one: float(off[one].max(initial=0.0)))
-        at = int(np.argmax(off[frames])) if len(path) else 0
-        if not len(path) or not off[frames][at] > _limit(step):
+        found = [_off_its_way(path, frames) for frames in range(1, _LONGEST + 1)]
+        off = np.array([one for one, _ in found])
+        clear = np.where(off > _limit(step), off - [missed for _, missed in found], -np.inf)
+        if not np.isfinite(clear).any():
             return spiky, farthest
-        farthest = max(farthest, float(off[frames][at]))
-        spiky[at : at + frames] = True
-        path[at : at + frames] = np.nan
+        shorter, at = np.unravel_index(int(np.argmax(clear)), clear.shape)
+        frames = slice(int(at), int(at) + int(shorter) + 1)
+        farthest = max(farthest, float(off[shorter, at]))
+        spiky[frames], path[frames] = True, np.nan
