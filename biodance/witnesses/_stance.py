@@ -50,7 +50,7 @@ class StepCourse:
 def is_recorded(seen: SeenTrial, step: FootStep) -> bool:
     """Return whether a foot comes and goes within the recording, so that the shares of its stance are known."""
     part = seen.stance(step)
-    return part is not None and 0 < part.start and part.stop < seen.plate(step.plate).wrench.time.size
+    return part is not None and part.start > 0 and part.stop < seen.plate(step.plate).wrench.time.size
 
 
 def walks(seen: SeenTrial, step: FootStep) -> bool:
