@@ -10,8 +10,8 @@ from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, R
 
 
 class ToeLandmark(DiscreteEffect):
-    """Toe markers lie ``inwards`` (m) of the middle of the forefoot, heel markers ``backwards`` (m) of the heel; target:
-    the side, or ``both``. No fault of an instrument.
+    """Toe markers lie ``inwards`` (m) of the middle of the forefoot, heel markers ``backwards`` (m) of the heel;
+    target: the side, or ``both``. No fault of an instrument.
     """
 
     name = "toe_landmark"
