@@ -61,7 +61,8 @@ def combine_findings(
     faults = replace(by_witnesses, findings=tuple(f for f in by_witnesses.findings if f not in habits))
     one = replace(one, witnesses=evidence if evidence.observations else None)
     found = _with_faults(one, faults, evidence, judged, measured)
-    told = {_names(alias) for finding in found.findings for alias in (finding, *finding.set)}
+    told = {_names(finding) for finding in found.findings}
+    told |= {_names(alias) for finding in found.findings for alias in finding.set}
     raw = any(finding.effect in _RAW for finding in found.findings)
     beside = () if raw else tuple(one for one in habits if not told & {_names(alias) for alias in one.set})
     return replace(found, findings=(*found.findings, *beside))

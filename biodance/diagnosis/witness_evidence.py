@@ -83,7 +83,7 @@ class WitnessEvidence:
 
     @cached_property
     def in_reach(self) -> NDArray[np.bool_]:
-        """(n,) observations that tell the size of a cause: no pressure far from the foot or person it should be under."""
+        """(n,) observations that tell the size of a cause: no pressure far from where it should be."""
         away = np.array([abs(one.value - one.expected) if one.unit == "m" else 0.0 for one in self.observations])
         return away <= _REACH
 

@@ -94,8 +94,8 @@ def infer_causes(testimony: WitnessEvidence) -> WitnessFindings:
             break  # the traces of other causes hold only once the sign is mended
     found = _findings(evidence, value, named)
     sized = tuple(one.names for one, _ in named if one.names in evidence.causes)
-    marker = landmark_finding(evidence, value, sized) if len(sized) == len(named) else ()
-    return WitnessFindings((*found, *marker), evidence, first)
+    habit = landmark_finding(evidence, value, sized) if len(sized) == len(named) else ()
+    return WitnessFindings((*found, *habit), evidence, first)
 
 
 def _load_alternatives(near: Iterable[Hypothesis]) -> tuple[Alias, ...]:
@@ -163,7 +163,8 @@ def _findings(
             size, sd = float(last.theta[i]), float(last.covariance[i, i] ** 0.5)
             if not is_beyond_usual(evidence, one.names, size, sd):
                 continue
-            estimates = (Estimate(cause.parameter, size, float(np.hypot(sd, ALIKE.get(cause.effect, 0.0))), cause.unit),)
+            whole = float(np.hypot(sd, ALIKE.get(cause.effect, 0.0)))
+            estimates = (Estimate(cause.parameter, size, whole, cause.unit),)
             visible = _visible_share(evidence, one.names)
         found.append(
             Finding(*one.names, estimates, near, visible, advice=f"{_carried_by(evidence, one.names)} {kind.advice}")

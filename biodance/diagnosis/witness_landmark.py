@@ -59,7 +59,7 @@ def landmark_finding(evidence: WitnessEvidence, value: Array, named: Names) -> t
 
 
 def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> tuple[Estimate, ...]:
-    """Return how far the markers lie beside where they are expected, each kind with the causes ``named`` allowed for."""
+    """Return how far the markers lie beside where they are expected; the causes ``named`` are allowed for."""
     norms = [name for name, one in zip(evidence.norms, where, strict=True) if one]
     Z = np.column_stack([evidence.shared[:, where], *(evidence.traces[name] for name in named)])
     size = np.array([1.0] * len(norms) + [SCALE * typical_size(*name) for name in named])

@@ -1,4 +1,4 @@
-"""The markers of the feet sit elsewhere than on the second ray and the heel: a habit of a laboratory, the same on both feet.
+"""The markers of the feet sit elsewhere than on the second ray and the heel: a habit of a laboratory, on both feet.
 
 Signature: the pressure lies outwards (or inwards) of the line from heel to toe marker in BOTH feet, half as far early
 in stance, or ahead of the heel marker in both. Look-alikes: with the right foot on one plate and the left foot on
@@ -10,7 +10,7 @@ from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, R
 
 
 class ToeLandmark(DiscreteEffect):
-    """The toe markers lie ``inwards`` (m) of the middle of the forefoot, the heel markers ``backwards`` (m) of the heel;
+    """Toe markers lie ``inwards`` (m) of the middle of the forefoot, heel markers ``backwards`` (m) of the heel;
     target: the side, or ``both``. No fault of an instrument.
     """
 

@@ -33,7 +33,7 @@ def landmark_across(foot: FootPath, phase: str) -> dict[str, float]:
 
 
 def landmark_along(foot: FootPath) -> dict[str, float]:
-    """Return m by name: errors of the pressure's place along a ``foot`` due to its heel marker, the same in all phases."""
+    """Return m by name: errors of the pressure's place along a ``foot`` due to its heel marker, in all phases."""
     return {f"laboratory {LANDMARK}, along": _ALONG, f"person {foot.side} heel, along": _OWN["along"]}
 
 

@@ -48,18 +48,16 @@ class FootAcross(Witness):
         part, found = step_course(seen, step, running=running), []
         if part is None:
             return []
-        side = seen.foot(step.side)
+        path, trial = seen.foot(step.side), seen.trial.name
         for phase, (start, stop, expected, sd, foot, laboratory) in phases.items():
             if phase == "early" and (step.beside or not step.heel_first):
                 continue
             norms = {f"person {step.side} foot across, {phase}": foot, f"laboratory across, {phase}": laboratory}
-            norms |= landmark_across(side, phase)
+            norms |= landmark_across(path, phase)
             value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
             what = f"{step.name}, {phase}"
             found.append(
-                Observation(
-                    self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred
-                )
+                Observation(self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred)
             )
         return found
 

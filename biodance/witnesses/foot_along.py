@@ -36,20 +36,18 @@ class FootAlong(Witness):
         part, found = step_course(seen, step), []
         if part is None:
             return []
-        side = seen.foot(step.side)
+        path, trial = seen.foot(step.side), seen.trial.name
         phases = {"middle": _MIDDLE} if step.beside else ALONG_PHASES
         for phase, (start, stop, share, sd, person, laboratory) in phases.items():
             norms = {
                 f"person foot along, {phase}": person * part.length,
                 f"laboratory along, {phase}": laboratory * part.length,
-                **landmark_along(side),
+                **landmark_along(path),
             }
             value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(
-                Observation(
-                    self.name, what, seen.trial.name, value, own, expected, "m", step.plate, norms, side.centred
-                )
+                Observation(self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred)
             )
         return found
 

@@ -8,6 +8,7 @@ other. A foot that reaches over the edge of its plate does not weigh: what it tr
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,7 @@ def _mass(seen: SeenTrial, means: Array) -> float:
 def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
     """Return steps that follow one another with different feet, the second before the first has ended."""
     swung = [step for step in seen.steps if steps(seen, step)]
-    for first, last in zip(swung, swung[1:], strict=False):
+    for first, last in pairwise(swung):
         if first.side != last.side and first.plate != last.plate and seen.one_clock:
             yield first, last
 
