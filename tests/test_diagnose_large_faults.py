@@ -1,0 +1,82 @@
+"""Faults of forces too large for gates and statistics: found before them, undone in a copy, and nothing else named."""
+
+import pytest
+import two_plates
+from two_plates import changed, exchanged, foreign, late, session, weak
+
+from biodance.effects import Recorded
+from biodance.effects.plates_exchanged import PlatesExchanged
+from biodance.effects.time_delay import TimeDelay
+from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
+from biodance.pipeline.session import examine
+
+
+def diagnosed(monkeypatch: pytest.MonkeyPatch, *change) -> SessionDiagnosis:
+    """Return what is found in the session with a change in it."""
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    return diagnose_session(examine(changed(session(), *change) if change else session()))
+
+
+def names(found: SessionDiagnosis) -> list[tuple[str, str, tuple[str, ...]]]:
+    return [(one.effect, one.target, one.trials) for one in found.findings]
+
+
+def test_nothing_is_undone_without_a_fault(monkeypatch):
+    found = diagnosed(monkeypatch)
+    assert found.mended is None
+    assert names(found) == []
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.2, 0.4])
+def test_a_delay_of_one_trial_is_named_there_with_its_size(seconds, monkeypatch):
+    found = diagnosed(monkeypatch, late(seconds), "squat_1")
+    assert names(found) == [("time_delay", "", ("squat_1",))]
+    size = found.findings[0].parameters[0]
+    assert size.value == pytest.approx(seconds, abs=0.02)
+    assert 0 < size.sd < 0.02
+    assert "squat_1" in found.diagnosis.attention[0].text
+
+
+def test_a_delay_of_all_trials_is_one_finding_without_companions(monkeypatch):
+    found = diagnosed(monkeypatch, late(0.1))
+    assert names(found) == [("time_delay", "", ())]
+    assert found.findings[0].parameters[0].value == pytest.approx(0.1, abs=0.02)
+    assert found.mended is not None
+
+
+def test_a_plate_that_reads_seven_tenths_in_all_trials_is_no_body_mass_alone(monkeypatch):
+    found = diagnosed(monkeypatch, weak)
+    assert names(found) == [("plate_gain", "plate2", ())]
+    assert found.findings[0].parameters[0].value == pytest.approx(-0.3, abs=0.05)
+
+
+def test_a_plate_that_reads_seven_tenths_in_one_trial_is_named_there(monkeypatch):
+    found = diagnosed(monkeypatch, weak, "squat_2")
+    assert names(found) == [("plate_gain", "plate2", ("squat_2",))]
+    assert all(alias.effect != "body_mass" for alias in found.findings[0].set)
+
+
+def test_exchanged_plates_are_named(monkeypatch):
+    found = diagnosed(monkeypatch, exchanged)
+    assert names(found) == [("plates_exchanged", "plate1/plate2", ())]
+
+
+def test_plates_exchanged_in_one_trial_are_named_there():
+    checks = PlatesExchanged.check(Recorded(changed(session(), exchanged, "squat_2")))
+    assert [(one.ok, one.trials) for one in checks] == [(False, ("squat_2",))]
+
+
+def test_forces_of_another_trial_are_never_fine(monkeypatch):
+    found = diagnosed(monkeypatch, foreign, "squat_1")
+    assert ("unrelated_forces", "", ("squat_1",)) in names(found)
+    assert next(row for row in found.diagnosis.judged if row.trial == "squat_1").seconds == 0
+
+
+def test_what_is_undone_is_the_recording_again():
+    one = two_plates.session()
+    wrong = changed(one, late(0.2), "squat_1")
+    (failed,) = [check for check in TimeDelay.check(Recorded(wrong)) if not check.ok]
+    (again,) = TimeDelay.check(
+        Recorded(changed(wrong, lambda p: TimeDelay.undone(wrong.trials[1], failed).plates, "squat_1"))
+    )
+    assert again.ok
