@@ -100,8 +100,8 @@ class MarkerLabels:
 
 
 _OBJECT = 6
-"""Markers of a thing at most (a club, a wheel, a probe): three on each of two rigid parts. Fewer than seven markers show
-no pelvis with two legs.
+"""Markers of a thing at most (a club, a wheel, a probe): three on each of two rigid parts. Fewer than seven markers
+show no pelvis with two legs.
 """
 
 

@@ -53,9 +53,9 @@ def stature_of_markers(trial: Trial) -> tuple[float, float, str]:
             names.append(name)
     if not told:
         return math.nan, math.nan, ""
-    sd = np.array(spread)
-    weight = sd**-2 / (sd**-2).sum()
-    covariance = np.outer(sd, sd) * np.where(np.eye(sd.size, dtype=bool), 1.0, _ALIKE)
+    sds = np.array(spread)
+    weight = sds**-2 / (sds**-2).sum()
+    covariance = np.outer(sds, sds) * (_ALIKE + (1 - _ALIKE) * np.eye(len(sds)))
     stature = float(weight @ told)
     return stature, stature * float(np.sqrt(weight @ covariance @ weight)), ", ".join(names)
 
