@@ -18,7 +18,7 @@ from biodance.lab.plates.read import read_plates
 from biodance.lab.plates.told import Told, ToldPlate, as_told
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
-from biodance.lab.session.write import init_session
+from biodance.lab.session.write import init_session, write_registered
 from biodance.motion.contact.contact import ground_contact
 from biodance.records import Plate, Source, Trial, Wrench
 
@@ -222,6 +222,21 @@ def test_plates_of_a_table_get_their_place_and_one_is_left_out(tmp_path: Path) -
     (trial,) = read_session(folder).trials
     assert trial.plates == ()
     assert "plate1 was left out, as session.toml says." in trial.history
+
+
+def test_a_registered_session_says_nothing_of_plates_as_they_were(tmp_path: Path) -> None:
+    folder = tmp_path / "visit"
+    write_trial(folder, "static01")
+    lines = CORNERS.replace("], [", "],\n[")
+    table = f"[plates.plate1]\n{lines}\nchannels = [\n'a', 'b', 'c', 'd', 'e', 'f']\n"
+    (folder / "session.toml").write_text(f"[subject]\nmass_kg = 62\n{table}[trials.static01]\nrole = 'static'\n")
+    session = read_session(folder)
+    moved = [replace(one, corners=one.corners + np.array([1.0, 0, 0])) for one in session.trials[0].plates]
+    write_registered(tmp_path / "out", session, session.trials[0], moved, said={})
+    copied = tomllib.loads((tmp_path / "out" / "session.toml").read_text())
+    assert copied == {"subject": {"mass_kg": 62}, "trials": {"static01": {"role": "static"}}}
+    (after,) = read_session(tmp_path / "out").trials[0].plates
+    np.testing.assert_allclose(after.centre, moved[0].centre, atol=1e-6)
 
 
 def test_a_plate_in_a_frame_of_its_own_is_moved_with_what_it_measures() -> None:

@@ -4,6 +4,7 @@ markers and registered plates are written as an ordinary session, one C3D file w
 
 import json
 import math
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -229,8 +230,17 @@ def write_registered(
     for name in FILES:
         if (own.resolve().parent / name).is_file() and not (folder / name).exists():
             shutil.copyfile(own.resolve().parent / name, folder / name)
+    for name in FILES:
+        if (folder / name).is_file():
+            _take_plates_out(folder / name)
     (folder / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     return path
+
+
+def _take_plates_out(path: Path) -> None:
+    """Take the tables ``[plates.NAME]`` out of a copied file: they are about plates as they were before."""
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(r"(?ms)^\[plates\b.*?(?=^\[[A-Za-z]|\Z)", "", text), encoding="utf-8")
 
 
 def _emptied(folder: Path) -> None:
