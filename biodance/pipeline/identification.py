@@ -271,7 +271,9 @@ def _predicted(
         one,
         fitted=fitted,
         validations=kept,
-        agreements={one.name: _at_origin(identified, one) for one in _fits(results, ROLES)},
+        agreements={
+            f.name: compare(f.wrench, predict_wrench(identified, f.motion), f.use) for f in _fits(results, ROLES)
+        },
         gain=_gain(kept, notes),
         shown=_shown(results),
         notes=tuple(notes),
@@ -282,10 +284,6 @@ def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
     """Return the first trial kept, else the first fitted, whose plates tell what each foot carries."""
     told = [one for one in results if one.motion is not None and one.comparison is not None and one.trial.plates]
     return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
-
-
-def _at_origin(identified: Body, fit: Fit) -> Agreement:
-    return compare(fit.wrench, predict_wrench(identified, fit.motion), fit.use)
 
 
 def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fit, ...]:
