@@ -55,7 +55,11 @@ def test_a_bad_session_is_reported_all_the_same(reported):
     assert "Traceback" not in done.stderr
     assert json.loads(done.stdout) == json.loads((out / "results.json").read_text())
     written = {path.name for path in out.iterdir()}
-    assert {"report.html", "results.json", "methods.md"} <= written <= {*KEPT, "report.html", "results.json", "manifest.json"}
+    assert (
+        {"report.html", "results.json", "methods.md"}
+        <= written
+        <= {*KEPT, "report.html", "results.json", "manifest.json"}
+    )
 
 
 def test_every_bad_file_has_its_sentence_and_the_good_ones_their_numbers(reported):

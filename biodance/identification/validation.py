@@ -51,6 +51,11 @@ class ResidualRatio:
     moment_interval: tuple[float, float]
     blocks: int
 
+    @property
+    def is_proven(self) -> bool:
+        """Whether the second model is better: both 95 % intervals lie above 1."""
+        return min(self.force_interval[0], self.moment_interval[0]) > 1
+
 
 def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialValidation:
     """Return how the table (``body.sip``) and the identified body predict the wrench of one trial, moments about

@@ -15,6 +15,7 @@ from biodance.body.human.scaling import Scaling, measure_static
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.markers.sets import read_marker_set
+from biodance.motion.contact.support import carried_elsewhere
 from biodance.motion.ik.functional_joints import PLACED, functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
 from biodance.motion.regressor import predict_wrench
@@ -22,7 +23,7 @@ from biodance.motion.track import track
 from biodance.pipeline.same_person import refuse_another_body
 from biodance.pipeline.trial import Prepared, attempt, track_trial
 from biodance.pipeline.trial_result import ForceGain, ShownJoints, Step, TrialResult
-from biodance.records import Sip, Subject, Trial
+from biodance.records import Markers, Sip, Subject, Trial
 from biodance.settings import Settings
 from biodance.uncertainty.caution import in_other_frames
 
@@ -102,13 +103,24 @@ def calibrate_joints(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
     """
     wanted = scaling.posture.marker_set.name
     fits = [one.trial for one in read if one.usable and one.trial.role == "fit" and one.trial.marker_set == wanted]
-    same = [trial.markers for trial in fits if trial.markers is not None]
+    same = [markers for trial in fits if (markers := _carried_by_plates(trial, scaling.subject.mass)) is not None]
     if not same:
         raise TrialRefused(
             "No trial with role fit has markers of the static trial's set, so the joints stay where that trial shows "
             "them."
         )
     return functional_joints(scaling, same).scaling
+
+
+def _carried_by_plates(trial: Trial, mass: float) -> Markers | None:
+    """Return the markers of a trial, hidden while a chair or a rail carries a part of the ``mass`` kg: it pushes skin
+    aside and bends the trunk as no joint does.
+    """
+    if trial.markers is None or not trial.plates:
+        return trial.markers
+    xyz = np.array(trial.markers.xyz)
+    xyz[carried_elsewhere(trial, weight=trial.settings.gravity * mass)] = np.nan
+    return replace(trial.markers, xyz=xyz)
 
 
 def starting_from(known: Body, body: Body, mass: float, source: str) -> tuple[Body, Sip, str]:

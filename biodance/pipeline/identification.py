@@ -66,7 +66,7 @@ class SessionIdentification(Sendable):
         What a person should know.
     failures : mapping
         What could not be computed ("segments", "reference", "differences"), each with cause and cure: without segments
-        there is nothing to compare, to validate or to drive joints with, and those fields are empty.
+        the fields that need them are empty.
 
     Examples
     --------
@@ -104,14 +104,8 @@ class SessionIdentification(Sendable):
 
     @property
     def proven(self) -> Sip | None:
-        """The identified inertial parameters where trials that were kept from the fit prove them better than the
-        table's: the 95 % intervals of their gain, of forces and of moments, lie above 1. None otherwise: a body that
-        nobody proved must not change joint moments.
-        """
-        if self.status != "solved" or self.gain is None:
-            return None
-        low = min(self.gain.force_interval[0], self.gain.moment_interval[0])
-        return self.identification.sip if low > 1 else None
+        """What joint moments are computed with: identified parameters that kept trials prove, None for the table's."""
+        return self.identification.sip if self.gain is not None and self.gain.is_proven else None
 
     @cached_property
     def torques(self) -> TorqueBands | None:
@@ -153,7 +147,7 @@ class SessionIdentification(Sendable):
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
     """Whether any trial with role fit can be identified from."""
-    return any(result.trial.role in FITTED_ROLES and trial_fit(result) is not None for result in results)
+    return bool(_fits(results, FITTED_ROLES))
 
 
 @one_thread()
@@ -217,10 +211,8 @@ def _doubts(
 ) -> tuple[str, ...]:
     """Return why no load may be stated: checks of the session and of its fitted trials, and of the reference's."""
     own = (*checks, *(check for one in results if one.trial.role in FITTED_ROLES for check in one.checks))
-    doubts = load_doubts(own, weighed=reference is not None)
-    if reference is None:
-        return doubts
-    return (*doubts, *(f"Session {reference.name}: {doubt}" for doubt in reference.search.doubts))
+    earlier = () if reference is None else (f"Session {reference.name}: {one}" for one in reference.search.doubts)
+    return (*load_doubts(own, weighed=reference is not None), *earlier)
 
 
 def _weighed(one: SessionIdentification, reference: SessionIdentification) -> SessionIdentification:
@@ -279,7 +271,9 @@ def _predicted(
         one,
         fitted=fitted,
         validations=kept,
-        agreements={fit.name: _at_origin(identified, fit) for fit in _fits(results, ROLES)},
+        agreements={
+            f.name: compare(f.wrench, predict_wrench(identified, f.motion), f.use) for f in _fits(results, ROLES)
+        },
         gain=_gain(kept, notes),
         shown=_shown(results),
         notes=tuple(notes),
@@ -292,20 +286,14 @@ def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
     return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
 
 
-def _at_origin(identified: Body, fit: Fit) -> Agreement:
-    return compare(fit.wrench, predict_wrench(identified, fit.motion), fit.use)
-
-
 def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fit, ...]:
     found = [trial_fit(result) for result in results if result.trial.role in roles]
     return tuple(fit for fit in found if fit is not None)
 
 
 def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> ResidualRatio | None:
-    if not kept:
-        return None
     try:
-        return residual_ratio(kept)
+        return residual_ratio(kept) if kept else None
     except BiodanceError as error:
         notes.append(str(error))
         return None

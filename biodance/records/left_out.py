@@ -13,6 +13,8 @@ class LeftOut(StrEnum):
     at the first that takes it out.
     """
 
+    CARRIED_ELSEWHERE = "carried_elsewhere"
+    """A chair, a rail or a hand carries a part of the person."""
     NO_LOAD = "no_load"
     """No plate is loaded, and nobody flies."""
     FORCE_UNKNOWN = "force_unknown"
@@ -25,8 +27,6 @@ class LeftOut(StrEnum):
     """A plate is loaded though no foot is over it."""
     SILENT_PLATE = "silent_plate"
     """A foot rests on a plate that reads nothing."""
-    CARRIED_ELSEWHERE = "carried_elsewhere"
-    """A chair, a rail or a hand carries a part of the person."""
     POSTURE_OPEN = "posture_open"
     """The markers do not fix the posture."""
     FORCES_DIFFER = "forces_differ"

@@ -16,18 +16,16 @@ swing of the limbs leaves 0.95 to 1.1 for the mean of markers all over the body,
 """
 _PARABOLA = 0.005
 """m, RMS, by which the mean of the markers may leave the parabola (limbs move)."""
-_STILL = 0.05
-"""m/s: the mean of the markers of somebody who sits or stands still is slower ..."""
+_LACKS, _ENDS = 0.15, 0.05
+"""Share of the weight that the plates lack while something else carries, and under which it has ended. In clean squats
+and walks they lack less for more than half of `_LASTING`."""
 _LASTING = 0.4
-"""s: ... for this long."""
-_CARRIED = (0.25, 0.75)
-"""Share of the weight on the plates between which somebody who is still is carried by something else, too."""
-_WHOLE = 0.9
-"""Share of the weight from which on nothing else carries."""
-_UNITS = (0.45359237,)
-"""Shares that a wrong unit explains (pounds for kilograms) ..."""
-_NEAR = 0.03
-"""... within this."""
+"""s, at least, that something else carries: delays and impacts are over sooner."""
+_RIGHT = 0.1
+"""Share of the weight, RMS, within which plates and movement agree at all other times. A late clock, a wrong gain or
+mass is wrong then, too: what carries only at times takes away only at times."""
+_SMOOTH = 0.3
+"""s of the parabola whose curvature is the acceleration: 1 mm of noise in the mean of the markers is 0.02 g."""
 
 
 def flight(trial: Trial, touching: Mask, load: Mask) -> Mask:
@@ -56,9 +54,7 @@ def _falls(trial: Trial, start: int, stop: int) -> bool:
     whole = np.isfinite(height).all(axis=0)
     if time[-1] - time[0] < _SHORTEST_FLIGHT or time.size < 4:
         return False
-    own = read_marker_set(trial.marker_set).markers if trial.marker_set else ()
-    pelvis = np.isin(trial.markers.names, [one.label for one in own if one.segment == "pelvis"])
-    parts = [height[:, some].mean(axis=1) for some in (whole, whole & pelvis) if some.any()]
+    parts = [height[:, some].mean(axis=1) for some in (whole, whole & _on(trial, "pelvis")) if some.any()]
     return any(_is_free_fall(time, mean, trial.settings.gravity) for mean in parts)
 
 
@@ -73,31 +69,46 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
     """Return (T,) where something beside the plates carries a good part of the ``weight`` (N; NaN = unknown, then
     nowhere): a chair, a rail.
 
-    The person is still and the plates carry clearly less than the weight, and nobody's unit explains it; the frames
-    around until they carry it all count, too.
+    By Newton the ground carries weight (1 + a / g), with a the vertical acceleration of pelvis and trunk. Where the
+    plates lack a good part of it for a while, and nothing of it at all other times, something else carries.
     """
-    markers, total = trial.markers, trial.wrench.force[:, 2]
-    found = np.zeros(total.size, dtype=bool)
-    if markers is None or markers.time.size < 2 or not weight > 0:
+    from scipy.ndimage import uniform_filter1d
+
+    lacks = share_lacking(trial, weight=weight)
+    found = np.zeros(lacks.size, dtype=bool)
+    if not lacks.any() or trial.markers is None:
         return found
-    speed = _mean_speed(markers.time, markers.xyz)
-    share = np.nan_to_num(total / weight, nan=1.0)
-    least = _LASTING / float(np.median(np.diff(markers.time)))
-    for start, stop in runs((speed < _STILL) & (_CARRIED[0] < share) & (share < _CARRIED[1])):
-        level = float(share[start:stop].mean())
-        if stop - start < least or any(abs(level - unit) < _NEAR for unit in _UNITS):
-            continue
-        for first, last in runs(share < _WHOLE):
-            if first < stop and start < last:
-                found[first:last] = True
-    return found
+    step = float(np.median(np.diff(trial.markers.time)))
+    smooth = uniform_filter1d(lacks, max(1, round(_SMOOTH / step / 2)))
+    long = [(start, stop) for start, stop in runs(smooth > _LACKS) if stop - start >= _LASTING / step]
+    for first, last in runs(lacks > _ENDS):
+        found[first:last] = any(first < stop and start < last for start, stop in long)
+    rest = smooth[~found]
+    return found & (rest.size >= _LASTING / step and float(np.sqrt(np.mean(rest**2))) < _RIGHT)
 
 
-def _mean_speed(time: Array, xyz: Array) -> Array:
-    """Return the speed (T,) m/s of the mean of the markers that are seen throughout; infinite without one."""
-    whole: Mask = np.asarray(np.isfinite(xyz).all(axis=(0, 2)))
-    if not whole.any():
-        return np.full(time.size, np.inf)
-    seen = xyz if whole.all() else xyz[:, whole]
-    middle = np.einsum("tki->ti", seen) / seen.shape[1]  # a tenth of the time of mean(axis=1, where=...)
-    return np.asarray(np.linalg.norm(np.gradient(middle, time, axis=0), axis=1))
+def share_lacking(trial: Trial, *, weight: float) -> Array:
+    """Return (T,) which share of the ``weight`` N the plates lack of what pelvis and trunk (else all markers) need to
+    move as they do; zero where nothing tells it: no markers or weight, forces that are unknown.
+    """
+    from scipy.signal import savgol_filter
+
+    total, markers = trial.wrench.force[:, 2], trial.markers
+    if markers is None or not weight > 0 or markers.time.size != total.size or total.size < 2:
+        return np.zeros(total.size)
+    step = float(np.median(np.diff(markers.time)))
+    frames = 2 * max(2, round(_SMOOTH / step / 2)) + 1
+    whole: Mask = np.asarray(np.isfinite(markers.xyz).all(axis=(0, 2)))
+    trunk = whole & _on(trial, "pelvis", "trunk_head")
+    if not whole.any() or total.size < frames:
+        return np.zeros(total.size)
+    height = markers.xyz[:, trunk if trunk.any() else whole, 2].mean(axis=1)
+    needed = 1 + savgol_filter(height, frames, 2, deriv=2, delta=step) / trial.settings.gravity
+    return np.nan_to_num(needed - total / weight)
+
+
+def _on(trial: Trial, *segments: str) -> Mask:
+    """Return (K,) which markers of a trial sit on ``segments``, as far as its set tells."""
+    own = read_marker_set(trial.marker_set).markers if trial.marker_set else ()
+    names = () if trial.markers is None else trial.markers.names
+    return np.isin(names, [one.label for one in own if one.segment in segments])

@@ -8,7 +8,10 @@ import numpy as np
 
 from biodance.motion.contact.footing import Footing
 from biodance.motion.contact.support import carried_elsewhere, flight
-from biodance.records import SIDES, LeftOut, Mask, Trial
+from biodance.records import SIDES, LeftOut, Mask, Trial, runs
+
+_EXPLAINED = 0.5
+"""Share of its frames from which on feet beside the plates are all that the plates lack."""
 
 
 class Unmeasured(NamedTuple):
@@ -29,14 +32,18 @@ def unmeasured_frames(
     """
     unloaded = ~load.any(axis=1) & ~flight(trial, touching, load)
     unknown: Mask = np.logical_not(np.isfinite(trial.wrench.value).all(axis=1))
+    feet = tuple(one for foot in range(len(SIDES)) for one in _of_foot(place, touching, foot))
     elsewhere = carried_elsewhere(trial, weight=weight)
-    still = "the person is still and the plates carry too little: a chair or a hand carries the rest"
+    beside = np.any([one.frames for one in feet], axis=0)
+    for start, stop in runs(elsewhere):
+        elsewhere[start:stop] &= beside[start:stop].mean() < _EXPLAINED
+    lacks = "the plates carry too little for this movement: a chair or a hand carries the rest"
     return (
-        Unmeasured(LeftOut.NO_LOAD, "no plate is loaded", unloaded),
+        Unmeasured(LeftOut.NO_LOAD, "no plate is loaded", unloaded & ~elsewhere),
         Unmeasured(LeftOut.FORCE_UNKNOWN, "a plate's force is unknown", unknown),
-        *(one for foot in range(len(SIDES)) for one in _of_foot(place, touching, foot)),
+        *feet,
         *(one for index in range(len(trial.plates)) for one in _of_plate(trial, place, rests, load, index)),
-        Unmeasured(LeftOut.CARRIED_ELSEWHERE, still, elsewhere),
+        Unmeasured(LeftOut.CARRIED_ELSEWHERE, lacks, elsewhere),
     )
 
 
