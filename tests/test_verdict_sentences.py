@@ -166,3 +166,15 @@ def test_identify_says_first_what_the_checks_of_the_recordings_found() -> None:
     assert first.text == "A and B carry each other's names. Exchange them, or accept the correction."
     assert ABOUT not in [one.about for one in others]
     assert identified_attention(full, []) == session_attention(full)
+
+
+def test_a_static_trial_beside_the_plates_is_a_note() -> None:
+    trial = full_session().trials[0]
+    why = "Trial cal: it has no usable force plate, so there is no wrench to compare with."
+    steps = (Step("track", "done"), Step("wrench", "refused", why))
+    levels = []
+    for role in ("static", "fit"):
+        one = replace(trial, trial=replace(trial.trial, role=role), steps=steps, checks=(), comparison=None)
+        said = session_attention(replace(full_session(), trials=(one,), checks=()))
+        levels += [line.level for line in said if "no usable force plate" in line.text]
+    assert levels == ["note", "warn"]
