@@ -55,14 +55,14 @@ class Answer:
     @property
     def cannot_tell(self) -> bool:
         """Whether the session says that it cannot tell."""
-        return self.headline.lower().startswith("cannot tell")
+        return self.headline.startswith("Nobody can tell")
 
     @property
     def contradicts(self) -> bool:
         """Whether "nothing wrong" or "complete" stands beside a failed check or an unjudged trial without a word."""
         if not (self.failed or self.missed):
             return False
-        bare = self.verdict == "nothing wrong" and "what could be judged" not in self.headline
+        bare = self.verdict == "nothing wrong" and ", but " not in self.headline
         return self.verdict == "named, complete" or bare
 
 

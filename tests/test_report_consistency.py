@@ -19,7 +19,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import provenance
-from biodance.pipeline.trial_result import Check
+from biodance.pipeline.trial_result import Check, WeighedBy, Weighing
 from biodance.records.attention import Attention, Judged, told_together
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document
 from biodance.report.documents.plain import to_text
@@ -47,7 +47,8 @@ CHECKS = tuple(
     )
 )
 FULL = full_session()
-CALM = replace(FULL, checks=(), trials=tuple(replace(trial, checks=()) for trial in FULL.trials))
+WEIGHED = Weighing(65.2, 0.2, WeighedBy.STANDING, ("static",))
+CALM = replace(FULL, checks=(), weighed=WEIGHED, trials=tuple(replace(trial, checks=()) for trial in FULL.trials))
 MADE = provenance(FULL, created="2026-01-01T00:00:00Z")
 STATIC, MISSED = Judged("static", 3.0), Judged("walk", 0.0, "no 1 s of contact.", missed=True)
 
@@ -156,7 +157,7 @@ def test_another_weight_is_said_once_and_a_slip_in_session_toml_is() -> None:
     weighed = "The plates carry 72.2 kg in quiet standing, 70.2 kg are declared: check the mass."
     trial = replace(trial, trial=replace(trial.trial, warnings=(weighed,)))
     session = replace(FULL.session, notes=("Warning: [trials.wlak] fits no recording of the session.",))
-    result = replace(FULL, session=session, trials=(trial,), checks=(), standing=None, still=None)
+    result = replace(CALM, session=session, trials=(trial,), standing=None, still=None)
     said = session_attention(result)
     assert sum("declared" in one.text + one.about for one in said) == 1
     assert any(one.text.startswith("[trials.wlak] fits no recording") for one in said)

@@ -10,7 +10,6 @@ from example_results import FOUND, VERDICTS, full_session
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.repairs import by_checks
-from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.effects import QualityCheck, effects
 from biodance.pipeline.attention import (
     identified_attention,
@@ -21,8 +20,8 @@ from biodance.pipeline.attention import (
 from biodance.pipeline.finding_words import EXPLAINS, in_words
 from biodance.pipeline.headline import headline
 from biodance.pipeline.trial_result import Check, Step
+from biodance.pipeline.weighing import NOT_WEIGHED
 from biodance.records.attention import Attention, Judged, strongest_first
-from biodance.witnesses import Observation
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)
 
@@ -107,18 +106,15 @@ def test_a_unit_whose_factor_has_no_interval_is_told_in_words() -> None:
 
 
 def test_beside_a_refused_step_nothing_is_well() -> None:
-    """Exit code 1, as of report and identify: the declared mass of such a session was never checked, unless strides
-    weighed it.
-    """
+    """Exit code 1, as of report and identify: no body could be made. Who was not weighed is only told so."""
     full = full_session()
     calm = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=(), steps=())
-    refused = replace(calm, steps=(Step("standing", "refused", "Nobody stands still."),))
+    refused = replace(calm, steps=(Step("body", "refused", "No stature."),))
     told = [reconcile_with_checks(Diagnosis("nothing wrong", ()), some, (STATIC,)) for some in (calm, refused)]
     assert [one.verdict for one in told] == ["nothing wrong", "nothing wrong"]
     assert [is_well(one) for one in told] == [True, False]
-    strides = Observation("stride_force", "mass", 60.0, 0.3, "kg", 60.0, 0.5, "walk")
-    weighed = Diagnosis("nothing wrong", (), witnesses=WitnessEvidence((strides,), {}, {}, {}))
-    assert is_well(reconcile_with_checks(weighed, refused, (STATIC,)))
+    assert calm.weighed is None
+    assert [line.text for line in told[0].attention[1:]] == [NOT_WEIGHED]
 
 
 def test_a_check_points_to_the_cause_that_was_found() -> None:
@@ -166,3 +162,15 @@ def test_identify_says_first_what_the_checks_of_the_recordings_found() -> None:
     assert first.text == "A and B carry each other's names. Exchange them, or accept the correction."
     assert ABOUT not in [one.about for one in others]
     assert identified_attention(full, []) == session_attention(full)
+
+
+def test_a_static_trial_beside_the_plates_is_a_note() -> None:
+    trial = full_session().trials[0]
+    why = "Trial cal: it has no usable force plate, so there is no wrench to compare with."
+    steps = (Step("track", "done"), Step("wrench", "refused", why))
+    levels = []
+    for role in ("static", "fit"):
+        one = replace(trial, trial=replace(trial.trial, role=role), steps=steps, checks=(), comparison=None)
+        said = session_attention(replace(full_session(), trials=(one,), checks=()))
+        levels += [line.level for line in said if "no usable force plate" in line.text]
+    assert levels == ["note", "warn"]

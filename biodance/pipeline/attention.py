@@ -34,6 +34,8 @@ is said of them.
 """
 _NOTED = ("fully measured",)
 """Checks that ask nobody for anything: what was not measured is not judged, which is said of every trial."""
+_ON_PLATES = ("wrench", "contact", "standing", "compare")
+"""Steps on a trial that look at its plates."""
 
 
 def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[Judged, ...]) -> Diagnosis:
@@ -48,10 +50,9 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, verdict="named, incomplete")
     if one.verdict == "unexplained" and not one.adequacy:
-        stepped_well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
-        one = replace(
-            one, verdict="nothing wrong" if stepped_well else one.verdict, why={**one.why, Reason.NOT_COMPARED: ()}
-        )
+        well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
+        why = {**one.why, Reason.NOT_COMPARED: ()}
+        one = replace(one, verdict="nothing wrong" if well else one.verdict, why=why)
     if one.verdict == "nothing wrong" and (against := _not_clean(result, judged, outside)):
         one = replace(one, verdict="unexplained", why={**against, **one.why})
     if one.verdict == "unexplained" and not any(row.seconds > 0 for row in judged):
@@ -139,7 +140,7 @@ def _of_trial(trial: TrialResult, findings: Sequence[Finding]) -> list[Attention
     """
     level: Level = "fail" if trial.status == "refused" else "warn"
     if trial.trial.role == "static" and not trial.trial.warnings:
-        level = "note" if all(step.status == "done" or step.name == "compare" for step in trial.steps) else level
+        level = "note" if all(step.status == "done" or step.name in _ON_PLATES for step in trial.steps) else level
     said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of(_WEIGHT, findings))]
     return [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
 

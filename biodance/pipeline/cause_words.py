@@ -12,6 +12,7 @@ import numpy as np
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.display import digits, shown_unit
 from biodance.identification.knowledge import SIGMAS
+from biodance.pipeline.finding_words import listed
 
 
 class CauseWords(NamedTuple):
@@ -154,8 +155,8 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
         return SpokenFinding(fact, f"{fact}{size.between}", f"{do}." if 0 < len(do.split()) <= _SHORT else _LISTED)
     whole, _, channel = finding.target.rpartition(":")
     first, _, other = channel.partition("->")
-    of = ", ".join(finding.trials) or place_in_words(finding.target)
-    pairs = ", ".join(one.target.replace("/", " and ") for one in (finding, *others))
+    of = listed(finding.trials) or place_in_words(finding.target)
+    pairs = listed([one.target.replace("/", " and ") or "something" for one in (finding, *others)])
     shown = {
         "it": place_in_words(finding.target.partition("->")[0]) or "something",
         "plate": place_in_words(whole) if whole else "the plate",
@@ -167,7 +168,7 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
         "size": size.value or "somewhat",
         "more": words.more[size.negative],
     }
-    where = f" in {', '.join(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
+    where = f" in {listed(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
     plain, fact = (words.fact.format(**shown, between=between) + where for between in ("", size.between))
     return SpokenFinding(plain, fact, words.do)
 

@@ -102,7 +102,8 @@ def print_attention(found: Sequence[dict[str, Any]], console: Console) -> None:
         if one.about == ABOUT:
             console.print(f"[bold]{escape(one.text)}[/]", soft_wrap=True)
         else:
-            console.print(f"look: [bold]{escape(trial_and_subject(one))}[/]: {escape(one.text)}", soft_wrap=True)
+            start = "note" if one.level == "note" else "look"
+            console.print(f"{start}: [bold]{escape(trial_and_subject(one))}[/]: {escape(one.text)}", soft_wrap=True)
 
 
 def print_session(result: SessionResult, found: dict[str, Any], console: Console) -> None:
