@@ -159,13 +159,20 @@ def _accepted(
     written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
     mended, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     exchanged = dict.fromkeys(f"{one.text} Put right in a copy." for one in labels)
-    others = {*((one.effect, one.target) for one in made), *undone}
+    prepared = {(one.effect, one.target) for one in found.diagnosis.checks if one.mended}
+    others = {*((one.effect, one.target) for one in made), *undone, *prepared}
+    rest = [f"{f.effect} {f.target}".strip() for f in findings if (f.effect, f.target) not in others]
+    in_body = BODY in files
     told = {
         "files": [*sorted(files), *mended],
         "corrections": [*exchanged, *(str(one) for one in made)],
         "trials": written,
-        "not_in_recordings": [f"{f.effect} {f.target}".strip() for f in findings if (f.effect, f.target) not in others],
-        "refused": [*refused, *kept],
+        "not_in_recordings": rest if in_body else [],
+        "refused": [
+            *refused,
+            *kept,
+            *(f"For {one} no file was written: correct it yourself." for one in rest * (not in_body)),
+        ],
     }
     return told, files
 
