@@ -32,7 +32,7 @@ def toes_moved(trial: Trial, inwards: float, *, edges: bool = False) -> Trial:
     for side in SIDES:
         letter, inner = side[0].upper(), 1.0 if side == "right" else -1.0
         toe = xyz[:, names.index(f"{letter}TOE")]
-        first, fifth = (toe + [0.0, 0.05 * inner * way, 0.0] for way in (1, -1))
+        first, fifth = (toe + np.array([0.0, 0.05 * inner * way, 0.0]) for way in (1, -1))
         xyz[:, names.index(f"{letter}TOE")] += [0.0, inwards * inner, 0.0]
         if edges:
             names += [f"{letter}MT1", f"{letter}MT5"]
