@@ -32,7 +32,7 @@ def toes_moved(trial: Trial, inwards: float, *, edges: bool = False) -> Trial:
     for side in SIDES:
         letter, inner = side[0].upper(), 1.0 if side == "right" else -1.0
         toe = xyz[:, names.index(f"{letter}TOE")]
-        first, fifth = (toe + [0.0, 0.05 * inner * way, 0.0] for way in (1, -1))
+        first, fifth = (toe + np.array([0.0, 0.05 * inner * way, 0.0]) for way in (1, -1))
         xyz[:, names.index(f"{letter}TOE")] += [0.0, inwards * inner, 0.0]
         if edges:
             names += [f"{letter}MT1", f"{letter}MT5"]
@@ -91,6 +91,27 @@ def test_who_stands_half_beside_the_plates_weighs_nothing_there() -> None:
     aside[:, feet, 1] = PLATES["plate1"][1] + 0.24
     beside = replace(whole, markers=Markers(whole.markers.names, whole.markers.time, aside))
     assert observe(recording(beside, mass=MASS), ["standing_force", "standing_place"]) == ()
+
+
+def test_who_stands_still_needs_no_moment_about_the_vertical() -> None:
+    """The zero of Mz is seen by standing alone, to half a newton metre."""
+    still, wrong = standing(), 9.0
+    value = np.array(still.plates[0].wrench.value)
+    value[:, 5] += wrong
+    turned = replace(still, plates=(replace(still.plates[0], wrench=replace(still.plates[0].wrench, value=value)),))
+    (right, off) = (observe(recording(one, mass=MASS), ["standing_twist"])[0] for one in (still, turned))
+    assert abs(right.value) < 1e-9
+    assert off.value == pytest.approx(wrong)
+    (found,) = heard(session(turned))
+    assert (found.effect, found.target) == ("plate_offset", "Mz")
+    assert found.parameters[0].interval[0] <= wrong <= found.parameters[0].interval[1]
+
+
+def test_a_published_recording_whose_mz_is_off_is_told_so(data: Path) -> None:
+    """The laboratory's own numbers: 10 to 12 N·m in every trial, standing too."""
+    found = next(one for one in heard(read_session(data / "laas_human/c3d")) if one.target == "Mz")
+    assert found.effect == "plate_offset"
+    assert 9.5 < abs(found.parameters[0].value) < 13.0
 
 
 def test_a_stance_whose_beginning_was_not_recorded_has_no_phases() -> None:

@@ -142,8 +142,8 @@ def test_what_is_expected_of_walking_feet_is_not_asked_of_running_ones(recorded:
     said = {name: [observe(recording(one.trial), feet) for one in recorded[name].trials[1:]] for name in recorded}
     assert all(said["treadmill"])
     assert {one.kind for some in said["run"] for one in some} == {"foot_across running"}
-    walking = max(one.expected_sd for some in said["treadmill"] for one in some if one.kind == "foot_across middle")
-    assert all(one.expected_sd == pytest.approx(2 * walking, rel=0.01) for some in said["run"] for one in some)
+    walking = max(one.sd for some in said["treadmill"] for one in some if one.kind == "foot_across middle")
+    assert all(one.sd == pytest.approx(2 * walking, rel=0.01) for some in said["run"] for one in some)
 
 
 def test_the_heel_strikes_when_the_force_comes_and_equal_strides_tell_no_fault(recorded: dict) -> None:

@@ -20,6 +20,8 @@ from biodance.records import Array
 
 SCALE = 3.0
 """Standard deviation of a fault before the data, in typical sizes."""
+TOGETHER = 3.0
+"""Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
 _EMPTY = 50.0
 """N that a plate carries at most that is always empty."""
 AT_ONCE = 32

@@ -35,6 +35,10 @@ _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
 
 
+_ANYWAY = {"standing_twist"}
+"""Witnesses to whom the other channels hardly matter, so that they are heard beside a wrong one."""
+
+
 class SimulatedSize(NamedTuple):
     """What the simulation tells of a cause where nothing was named: ``size`` of the first parameter, its standard
     deviation ``sd`` (NaN: not measured), and the log evidence that is ``lacking`` for a name (negative: to spare).
@@ -78,11 +82,9 @@ def _with_faults(
     """Return the diagnosis with what the witnesses find wrong, see `combine_findings`."""
     raw = any(finding.effect in _RAW for finding in one.findings)
     if raw:
-        known = {(finding.effect, finding.target) for finding in one.findings}
-        signs = tuple(f for f in by_witnesses.findings if f.effect in _RAW and (f.effect, f.target) not in known)
-        return replace(one, findings=(*one.findings, *signs))
-    kept = tuple(one for one in by_witnesses.findings if not is_contradicted(one, evidence))
-    by_witnesses = replace(by_witnesses, findings=kept)
+        known = {_names(finding) for finding in one.findings}
+        told = (f for f in by_witnesses.findings if f.effect in _RAW or _is_shown_by(f, evidence, _ANYWAY))
+        return replace(one, findings=(*one.findings, *(f for f in told if _names(f) not in known)))
     if not by_witnesses.findings:
         return _without_excluded(one, evidence)
     checked = _without_excluded(one, evidence) if judged else one

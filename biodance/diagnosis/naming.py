@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from biodance.diagnosis.adequacy import CONFLICT_LIMIT, prior_data_conflict
-from biodance.diagnosis.candidates import Candidate, candidates
+from biodance.diagnosis.candidates import TOGETHER, Candidate, candidates
 from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Alias
 from biodance.diagnosis.joint_fit import log_bayes_factor_between, settle
@@ -23,8 +23,6 @@ _ROUNDS = 3
 """Causes named at most."""
 REFINED = 6
 """Causes of the screening that are fitted with all their curvature."""
-TOGETHER = 3.0
-"""Natural logarithm: causes that are at most this much less probable than the best one are in its set."""
 SURE = 2.0
 """A name is taken back where its size is less than so many of its standard deviations; of several parameters
 together, where chance brings them as far as often.

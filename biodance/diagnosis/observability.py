@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.parts import JointError
-from biodance.diagnosis.candidates import SCALE, Candidate, bases_of, changes
+from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, bases_of, changes
 from biodance.diagnosis.consequence import least, unit_at
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import smallest_detectable
 from biodance.diagnosis.model import Model
-from biodance.diagnosis.naming import TOGETHER
 from biodance.motion.ik.functional_joints import fixed_point
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.records import Array

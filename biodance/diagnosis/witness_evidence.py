@@ -38,8 +38,8 @@ _REACH = 0.15
 """m from where it is expected that a pressure lies at most because a plate is not quite where the file says (five times
 what plates are off in laboratories); what lies farther is of another foot, of plates exchanged or of a wrong sign.
 """
-_UNTOUCHED = ("empty_plate", "flight")
-"""Witnesses that see plates with nobody on them."""
+_EXACT = ("empty_plate", "flight", "standing_twist")
+"""Witnesses of which Newton alone says what they see: plates with nobody on them, somebody who does not turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +89,15 @@ class WitnessEvidence:
 
     def contacts(self, cause: tuple[str, str] | None = None) -> int:
         """Return how many contacts of the person with the plates there are, or tell a cause: in how many its usual
-        fault is larger than what one observation errs by. Plates that nobody touches need none: 2 then.
+        fault is larger than what one observation errs by. What is exact needs none: 2 then.
         """
         told = np.ones(len(self.observations), dtype=bool)
         if cause is not None:
             own = np.array([one.sd for one in self.observations])
             told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= own)
         seen = [one for one, here in zip(self.observations, told, strict=True) if here]
-        touched = {one.contact for one in seen if one.witness not in _UNTOUCHED}
-        return 2 if cause and any(one.witness in _UNTOUCHED for one in seen) else len(touched)
+        touched = {one.contact for one in seen if one.witness not in _EXACT}
+        return 2 if cause and any(one.witness in _EXACT for one in seen) else len(touched)
 
     def strongest(self, index: int) -> tuple[str, str]:
         """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.diagnosis.candidates import TOGETHER
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.naming import TOGETHER
 from biodance.diagnosis.witness_evidence import WitnessEvidence, undo_causes
 from biodance.diagnosis.witness_fit import (
     ALIKE,

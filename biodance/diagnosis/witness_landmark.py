@@ -8,9 +8,8 @@ evidence beside it is small.
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.diagnosis.candidates import SCALE
+from biodance.diagnosis.candidates import SCALE, TOGETHER
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.naming import TOGETHER
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.diagnosis.witness_fit import THRESHOLD, explain, fit_known, is_told, prior_odds, typical_size
 from biodance.effects.toe_landmark import ToeLandmark

@@ -49,7 +49,7 @@ def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[Alt
             Alteration("plate_position", f"{plate.name}:{a}", "shift", "m", 0.004, _moved(plate.name, a)) for a in "xy"
         ]
         found.append(Alteration("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02, _turned(plate.name)))
-        for k, name in enumerate(CHANNELS[:5]):
+        for k, name in enumerate(CHANNELS):
             unit = "N" if k < 3 else "N·m"
             found.append(
                 Alteration(

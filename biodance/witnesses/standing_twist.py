@@ -1,0 +1,41 @@
+"""The moment about the vertical of who stands still: none, because nobody turns.
+
+Standing still needs no moment about the vertical through the centre of pressure, whatever the body. What is left there
+is the zero of Mz; horizontal forces, which are small, hardly enter.
+"""
+
+import numpy as np
+
+from biodance.settings import COP_FORCE
+from biodance.spatial import zero_moment_point
+from biodance.witnesses import Observation, SeenTrial, Witness
+
+_OWN = 0.4
+"""N·m of sway over a second or longer: 0.00 to 0.16 in eleven static trials of three laboratories."""
+
+
+class StandingTwist(Witness):
+    """Mean moment (N·m) of all plates about the vertical through the mean centre of pressure in quiet standing."""
+
+    name = "standing_twist"
+    sees = ("plate_offset",)
+    needs = "Standing still with both feet wholly on the plates."
+    source = "Newton: who stands still does not turn; 11 static trials of 3 public laboratories"
+
+    def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
+        """Return the moment of a trial in which somebody stands still on plates of one height."""
+        plates, trial = [plate for plate in seen.trial.plates if plate.wrench.time.size], seen.trial
+        if not plates or not seen.still or not seen.whole:
+            return ()
+        value, height = seen.total.value, float(np.mean([plate.height for plate in plates]))
+        place = zero_moment_point(value, height=height, threshold=COP_FORCE)[:, :2]
+        if not np.isfinite(place).all():
+            return ()
+        (x, y), mean = place.mean(axis=0), value.mean(axis=0)
+        twist, lasts = float(mean[5] - x * mean[1] + y * mean[0]), float(np.ptp(seen.total.time))
+        loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * mean[2]]
+        where, sd = loaded[0] if len(loaded) == 1 else "", _OWN * max(1.0, 1.0 / max(lasts, 1e-3))
+        return (Observation(self.name, "moment about the vertical", trial.name, twist, sd, 0.0, "N·m", where),)
+
+
+WITNESS = StandingTwist
