@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from biodance.diagnosis.delay_contradicted import is_contradicted
+from biodance.diagnosis.delay_contradicted import is_contradicted, without_contradicted
 from biodance.diagnosis.diagnosis import HABITS, Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
@@ -81,8 +81,7 @@ def _with_faults(
         known = {(finding.effect, finding.target) for finding in one.findings}
         signs = tuple(f for f in by_witnesses.findings if f.effect in _RAW and (f.effect, f.target) not in known)
         return replace(one, findings=(*one.findings, *signs))
-    kept = tuple(one for one in by_witnesses.findings if not is_contradicted(one, evidence))
-    by_witnesses = replace(by_witnesses, findings=kept)
+    by_witnesses = without_contradicted(by_witnesses, evidence)
     if not by_witnesses.findings:
         return _without_excluded(one, evidence)
     checked = _without_excluded(one, evidence) if judged else one
@@ -270,7 +269,9 @@ def _with_witnesses(one: Alias, by_witnesses: Finding) -> Alias:
 
 def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
     """Return the diagnosis without findings whose size the witnesses exclude."""
-    gone = tuple(finding for finding in one.findings if _excluded(finding, evidence))
+    gone = tuple(
+        finding for finding in one.findings if is_contradicted(finding, evidence) or _excluded(finding, evidence)
+    )
     if not gone:
         return one
     left = tuple(finding for finding in one.findings if finding not in gone)
@@ -290,8 +291,6 @@ def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
 
 def _excluded(finding: Finding, evidence: WitnessEvidence) -> bool:
     """Return whether the witnesses measure the size of this cause precisely enough to exclude that of the finding."""
-    if is_contradicted(finding, evidence):
-        return True
     measured = size_from_witnesses(evidence, (finding.effect, finding.target))
     if measured is None or not finding.parameters:
         return False

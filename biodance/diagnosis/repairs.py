@@ -171,17 +171,3 @@ def named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: 
         findings=(*found, *rest),
         notes=(*notes, *diagnosis.notes),
     )
-
-
-def named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
-    """Return the diagnosis with what was put right before all else was judged named first."""
-    named = {(one.effect, one.target) for one in diagnosis.findings}
-    found = tuple(failed_check(quality) for quality in checks if (quality.effect, quality.target) not in named)
-    if not found:
-        return diagnosis
-    return replace(
-        diagnosis,
-        verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*found, *diagnosis.findings),
-        notes=(*notes, *diagnosis.notes),
-    )
