@@ -269,9 +269,7 @@ def _with_witnesses(one: Alias, by_witnesses: Finding) -> Alias:
 
 def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
     """Return the diagnosis without findings whose size the witnesses exclude."""
-    gone = tuple(
-        finding for finding in one.findings if is_contradicted(finding, evidence) or _excluded(finding, evidence)
-    )
+    gone = tuple(f for f in one.findings if is_contradicted(f, evidence) or _excluded(f, evidence))
     if not gone:
         return one
     left = tuple(finding for finding in one.findings if finding not in gone)
