@@ -24,12 +24,11 @@ CLEAN = {
     "biomechzoo/HC030A": ("HC030A05", "HC030A22"),
     "biomechzoo/HC044A": ("HC044A15", "HC044A29"),
     "c3d_parser_QCMAS": ("QCMAS.dynamic",),
-    "gaitalytics": ("treadmill_no_events",),
     "opensim_models/raj_walk": ("walk",),
     "rbds/S001": ("runT25",),
     "subject4": ("squats1", "walking1"),
 }
-"""Trials of seven laboratories whose clocks are right."""
+"""Trials of six laboratories whose clocks are right."""
 
 
 def told(trial, mass=float("nan")):

@@ -17,6 +17,8 @@ CENTRES = {"plate1": np.array([0.05, 0.335, 0.0]), "plate2": np.array([0.05, -0.
 HALF = np.array([[0.3, 0.25, 0], [-0.3, 0.25, 0], [-0.3, -0.25, 0], [0.3, -0.25, 0]])
 FINE = 1000.0
 """Hz of the plates."""
+NOISE = np.array([0.3, 0.3, 0.5, 0.05, 0.05, 0.05])
+"""N, N·m of one sample."""
 
 
 def session() -> Session:
@@ -44,6 +46,7 @@ def _recorded(name: str, role: str, motion: Motion) -> Trial:
     for (label, centre), y, part in zip(CENTRES.items(), feet, (share, 1 - share), strict=True):
         value = whole * part[:, None]
         value[:, 3] = y * value[:, 2]
+        value += NOISE * np.random.default_rng(len(plates)).normal(size=value.shape)
         plates.append(Plate(label, 2, HALF + centre, Wrench(fine, value)))
     source = Source(Path(f"/lab/S01/{name}.c3d"), "00" * 32, "C3D", 100.0, FINE)
     markers = Markers(BODY.markers.names, TIME, xyz)
@@ -62,17 +65,20 @@ def changed(one: Session, change, *names: str) -> Session:
 
 
 def late(seconds: float):
-    """Return a change: all samples come so much later, the first one fills up."""
+    """Return a change: all samples come so much later; before the first one somebody stands as in it."""
     count = round(seconds * FINE)
-    return lambda plates: tuple(
-        replace(
-            p,
-            wrench=Wrench(
-                p.wrench.time, np.concatenate([np.repeat(p.wrench.value[:1], count, 0), p.wrench.value[:-count]])
-            ),
+
+    def change(plates: tuple[Plate, ...]) -> tuple[Plate, ...]:
+        rng = np.random.default_rng(9)
+        return tuple(
+            replace(p, wrench=Wrench(p.wrench.time, np.concatenate([before(p, rng), p.wrench.value[:-count]])))
+            for p in plates
         )
-        for p in plates
-    )
+
+    def before(plate: Plate, rng: np.random.Generator) -> np.ndarray:
+        return plate.wrench.value[:20].mean(axis=0) + NOISE * rng.normal(size=(count, 6))
+
+    return change
 
 
 def weak(plates: tuple[Plate, ...]) -> tuple[Plate, ...]:

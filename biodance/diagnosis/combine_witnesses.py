@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from biodance.diagnosis.delay_contradicted import is_contradicted
+from biodance.diagnosis.delay_contradicted import is_contradicted, without_contradicted
 from biodance.diagnosis.diagnosis import HABITS, Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
@@ -80,6 +80,7 @@ def _with_faults(
     measured: Mapping[tuple[str, str], SimulatedSize],
 ) -> Diagnosis:
     """Return the diagnosis with what the witnesses find wrong, see `combine_findings`."""
+    by_witnesses = without_contradicted(by_witnesses, evidence)
     raw = any(finding.effect in _RAW for finding in one.findings)
     if raw:
         known = {_names(finding) for finding in one.findings}
@@ -272,7 +273,7 @@ def _with_witnesses(one: Alias, by_witnesses: Finding) -> Alias:
 
 def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
     """Return the diagnosis without findings whose size the witnesses exclude."""
-    gone = tuple(finding for finding in one.findings if _excluded(finding, evidence))
+    gone = tuple(f for f in one.findings if is_contradicted(f, evidence) or _excluded(f, evidence))
     if not gone:
         return one
     left = tuple(finding for finding in one.findings if finding not in gone)
@@ -292,8 +293,6 @@ def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
 
 def _excluded(finding: Finding, evidence: WitnessEvidence) -> bool:
     """Return whether the witnesses measure the size of this cause precisely enough to exclude that of the finding."""
-    if is_contradicted(finding, evidence):
-        return True
     measured = size_from_witnesses(evidence, (finding.effect, finding.target))
     if measured is None or not finding.parameters:
         return False

@@ -1,9 +1,12 @@
 """A delay that simpler evidence contradicts: Newton's lag of the whole force behind the trunk."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects.time_delay import TimeDelay
 from biodance.witnesses.newton import Newton
 
@@ -18,3 +21,9 @@ def is_contradicted(finding: Finding, evidence: WitnessEvidence) -> bool:
     share = np.array([one.sd**-2 for one in lags])
     lag = float(share @ [one.value for one in lags] / share.sum())
     return abs(lag) < abs(lag - finding.parameters[0].value)
+
+
+def without_contradicted(by_witnesses: WitnessFindings, evidence: WitnessEvidence) -> WitnessFindings:
+    """Return the findings of the witnesses without a delay that Newton contradicts."""
+    kept = tuple(one for one in by_witnesses.findings if not is_contradicted(one, evidence))
+    return replace(by_witnesses, findings=kept)

@@ -24,7 +24,7 @@ _LARGE, _DEAD = 0.1, -0.9
 its load or less: what it carried is lost."""
 _RIGHT = 0.03
 """Share by which the weight of a trial may be wrong that is right: clothes and shoes, a step."""
-_SD = 0.03
+_SURE = 0.03
 """Standard deviation of such a gain, and how far those of several trials may differ: that of the weight, twice."""
 _SIDEWAYS, _AGAIN = 0.004, 0.003
 """m: sd of the place of the pressure to the left of the table's centre of mass in standing and squats (13 trials of 11
@@ -98,7 +98,7 @@ class PlateGain(ChannelEffect):
         for name in next(iter(found.values())).plates:
             sizes = [one.plates[name] for one in found.values() if name in one.plates]
             gains = [gain for gain, _ in sizes]
-            if len(sizes) == len(found) and np.ptp(gains) < 2 * _SD and abs(np.mean(gains)) > _LARGE:
+            if len(sizes) == len(found) and np.ptp(gains) < 2 * _SURE and abs(np.mean(gains)) > _LARGE:
                 ranked.append((apart([off for _, off in sizes]), name, float(np.mean(gains))))
         off, plate, gain = min(ranked, default=(np.inf, "", 0.0))
         if not off < min(mass - _NAMED, _TOLD):
@@ -108,7 +108,7 @@ class PlateGain(ChannelEffect):
         text = f"{plate} reads {1 + gain:.2f} times its load in every channel{f', in {trials[0]}' if trials else ''}."
         return QualityCheck(
             "gain of whole plates", False, text, cls.name, plate, gain, "gain", "1",
-            sd=_SD, trials=trials, alike=tuple(alike),
+            sd=_SURE, trials=trials, alike=tuple(alike),
         )  # fmt: skip
 
     @classmethod
