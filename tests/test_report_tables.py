@@ -11,7 +11,8 @@ from example_results import full_session
 from identified_sessions import session_result
 
 from biodance.diagnosis.consequence import Adequacy
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain, Unobservable
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.gain import Gain
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import session_movement
 from biodance.pipeline.tables import session_tables

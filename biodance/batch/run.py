@@ -211,8 +211,8 @@ def run_batch(
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
     with closing(Ledger(folder, archive)) as ledger:
-        for left in (folder / SESSIONS).glob(f"{PART}*"):  # of a run that was killed
-            shutil.rmtree(left, ignore_errors=True)
+        for part in (folder / SESSIONS).glob(f"{PART}*"):  # of a run that was killed
+            shutil.rmtree(part, ignore_errors=True)
         fresh = _work_off(tasks, ledger, workers, work, tell)
         outcomes = tuple(found for task in tasks if (found := outcome_of(task) or ledger.told(task)))
         left_out = tuple(str(path.relative_to(archive)) for path in indices)

@@ -5,7 +5,7 @@ with the remaining time on a terminal, otherwise a plain line every few seconds)
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,7 +18,6 @@ from biodance.version import __version__
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from biodance.lab.session.results_folder import ResultsFolder
     from biodance.records import Session
 
 DONE, NEEDS_A_PERSON, NOT_DONE, STOPPED = 0, 1, 2, 130
@@ -51,18 +50,6 @@ def show(document: Any, printed: "Callable[[Any, Console], None]", *, json: bool
     print_json(document) if json else printed(document, Console())
     if path is not None and not json:
         sys.stdout.write(f"{path}\n")
-
-
-def put_results(place: "ResultsFolder", source: Path, inputs: "Mapping[Path, str]") -> Path:
-    """Put results in place, bound to the recordings ``inputs`` (path -> SHA-256) of ``source``, and return the folder;
-    say where files went that were there and are not of biodance.
-    """
-    from biodance.lab.session.results_folder import inputs_of
-
-    kept = place.finish(source, inputs_of(inputs, source))
-    if kept is not None:
-        say(f"look: files in {place.place} that biodance did not write were kept in {kept}.")
-    return place.place
 
 
 _COUNTED = re.compile(r"(?P<done>\d+) of (?P<all>\d+)")
@@ -296,11 +283,6 @@ class Results:
         from biodance.report.tables import tables_folder
 
         return None if self.tables is None else tables_folder(self.tables, session, force=self.force)
-
-    def finish(self, place: "ResultsFolder", session: "Session") -> Path:
-        """Put the results of a ``session`` in place, whole, and return the folder."""
-        inputs = {trial.source.path: trial.source.sha256 for trial in session.trials}
-        return put_results(place, session.folder, inputs)
 
     def show_page(self, folder: Path) -> None:
         """Show the page of a results folder in the browser, where that is wanted; say where it lies without one."""

@@ -16,11 +16,11 @@ from biodance.cli.app import (
     app,
     print_json,
     progress,
-    put_results,
     say,
     show,
     whole,
 )
+from biodance.cli.place import put_results
 
 
 @app.command(name="batch")

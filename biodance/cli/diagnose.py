@@ -20,6 +20,7 @@ from biodance.cli.app import (
     show,
 )
 from biodance.cli.identify import diagnose_robot
+from biodance.cli.place import put_session_results
 from biodance.cli.session import examine_with_reference, exit_code, tabled
 
 
@@ -107,7 +108,7 @@ def diagnose_command(
         moved = describe_movement(result, lab=reading.lab, tell=tell)
         tabled(result, tables, found.diagnosis, movement=moved)
         document = write_diagnosis(result, found, folder, accepted=accept, earlier=carried.corrections, movement=moved)
-        folder = results.finish(place, recorded)
+        folder = put_session_results(place, recorded)
     results.show_page(folder)
     show(document, print_diagnosis, json=results.json, path=folder / "report.html")
     return NEEDS_A_PERSON if document["failures"] else exit_code(document)

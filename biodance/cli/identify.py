@@ -16,9 +16,9 @@ from biodance.cli.app import (
     RobotFile,
     app,
     progress,
-    put_results,
     show,
 )
+from biodance.cli.place import put_results, put_session_results
 from biodance.cli.session import examine_with_reference, exit_code, tabled
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def identify_command(
         tell("writing the page")
         tabled(result, tables, movement=moved)
         document = write_identification(result, found, place.part, checks=checks, movement=moved)
-        folder = results.finish(place, result.session)
+        folder = put_session_results(place, result.session)
     results.show_page(folder)
     return _told_identified(result, folder, document, results.json)
 

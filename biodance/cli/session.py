@@ -18,6 +18,7 @@ from biodance.cli.app import (
     say,
     show,
 )
+from biodance.cli.place import put_session_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -158,6 +159,6 @@ def report_command(
         result, found = report_session(
             result, place.part, tell, tables=tables, reference=before, lab=reading.lab, for_subject=subject_page
         )
-        folder = results.finish(place, result.session)
+        folder = put_session_results(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)

@@ -16,9 +16,9 @@ from biodance.cli.app import (
     app,
     not_negative,
     progress,
-    put_results,
     whole,
 )
+from biodance.cli.place import put_session_results
 from biodance.cli.session import print_reported, report_session
 
 
@@ -112,8 +112,7 @@ def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -
         session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
         place = results_folder(out / "report", session, force=force)
         result, found = report_session(examine(read_session(session, tell=tell), tell=tell), place.part, tell)
-        inputs = {trial.source.path: trial.source.sha256 for trial in result.session.trials}
-        folder = put_results(place, session, inputs)
+        folder = put_session_results(place, result.session)
     return print_reported(result, folder, found, False)
 
 

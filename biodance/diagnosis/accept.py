@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.diagnosis.diagnosis import Gain
+from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.model import NamedCause
 from biodance.effects import Case
 from biodance.errors import BiodanceError

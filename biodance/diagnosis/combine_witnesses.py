@@ -33,10 +33,8 @@ _NOT_MOVED = "Feet, clocks and weights alone look like a {}; the movement, which
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
 _RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
 """Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
-
-
 _ANYWAY = {"standing_twist"}
-"""Witnesses to whom the other channels hardly matter, so that they are heard beside a wrong one."""
+"""Witnesses to whom other channels hardly matter: heard beside a wrong one."""
 
 
 class SimulatedSize(NamedTuple):

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
-from biodance.diagnosis.diagnosis import Diagnosis, Finding, Gain, Verdict
+from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
+from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.naming import Naming, required_evidence
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, residuals_of
-from biodance.diagnosis.diagnosis import Finding, Gain
+from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.engine import Examined, without_name
+from biodance.diagnosis.gain import Gain
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import standing_point

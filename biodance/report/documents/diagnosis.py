@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Estimate, Finding, Gain
+from biodance.diagnosis.diagnosis import Estimate, Finding
 from biodance.diagnosis.foresight import TOLD, Foresight
+from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.witness_evidence import WitnessEvidence, cause_visibilities
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
