@@ -14,7 +14,16 @@ from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Check, MarkerFit, Step, Still, TrialResult, WrenchComparison
+from biodance.pipeline.trial_result import (
+    Check,
+    MarkerFit,
+    Step,
+    Still,
+    TrialResult,
+    WeighedBy,
+    Weighing,
+    WrenchComparison,
+)
 from biodance.records import Markers, Plate, Session, Source, Subject, Trial, Wrench
 from biodance.report.pages.session import page
 
@@ -127,8 +136,9 @@ def full_session() -> SessionResult:
         Subject(65.0, 1.7, "F", 31.0, "S01"), (result.trial,), Path("/sessions/S01"), notes=("Sex guessed.",)
     )
     return SessionResult(
-        session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still()
-    )
+        session, session.subject, None, "Scaled on static.", (), (result,), (mass,), result.standing, still(),
+        weighed=Weighing(65.2, 0.1, WeighedBy.STANDING, ("walk <1>",)),
+    )  # fmt: skip
 
 
 def refused_session() -> SessionResult:

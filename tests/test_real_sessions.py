@@ -129,7 +129,7 @@ CHILDREN = ("HC031A", "HC032A", "HC038A", "HC044A", "HC050A", "HC055A")
 def test_a_real_recording_without_fault_gets_no_name(name: str, recording: Recording) -> None:
     found = diagnose_session(recording(name)).diagnosis
     said = next(one for one in found.attention if one.about == ABOUT)
-    named = {(one.effect, one.target) for one in found.findings}
+    named = {(one.effect, one.target) for one in found.faults}
     assert named == {("labels_swapped", pair) for pair in EXCHANGED.get(name.removeprefix("biomechzoo/"), ())}
     assert named or found.status in ("clean", "cannot tell")
     assert is_well(found) is (found.status == "clean")

@@ -19,7 +19,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.attention import _checked, reconcile_with_checks, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import provenance
-from biodance.pipeline.trial_result import Check, WeighedBy, Weighing
+from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, told_together
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document
 from biodance.report.documents.plain import to_text
@@ -47,8 +47,7 @@ CHECKS = tuple(
     )
 )
 FULL = full_session()
-WEIGHED = Weighing(65.2, 0.2, WeighedBy.STANDING, ("static",))
-CALM = replace(FULL, checks=(), weighed=WEIGHED, trials=tuple(replace(trial, checks=()) for trial in FULL.trials))
+CALM = replace(FULL, checks=(), trials=tuple(replace(trial, checks=()) for trial in FULL.trials))
 MADE = provenance(FULL, created="2026-01-01T00:00:00Z")
 STATIC, MISSED = Judged("static", 3.0), Judged("walk", 0.0, "no 1 s of contact.", missed=True)
 

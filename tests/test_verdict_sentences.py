@@ -113,8 +113,9 @@ def test_beside_a_refused_step_nothing_is_well() -> None:
     told = [reconcile_with_checks(Diagnosis("nothing wrong", ()), some, (STATIC,)) for some in (calm, refused)]
     assert [one.verdict for one in told] == ["nothing wrong", "nothing wrong"]
     assert [is_well(one) for one in told] == [True, False]
-    assert calm.weighed is None
-    assert [line.text for line in told[0].attention[1:]] == [NOT_WEIGHED]
+    light = reconcile_with_checks(Diagnosis("nothing wrong", ()), replace(calm, weighed=None), (STATIC,))
+    assert is_well(light)
+    assert [line.text for line in light.attention[1:]] == [NOT_WEIGHED]
 
 
 def test_a_check_points_to_the_cause_that_was_found() -> None:
