@@ -19,6 +19,7 @@ from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.diagnosis.witness_fit import is_beyond_usual
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
+from biodance.diagnosis.witness_landmark import with_habits
 from biodance.effects import Effect, causes
 
 _FAR = 3.0
@@ -63,11 +64,7 @@ def combine_findings(
     faults = replace(by_witnesses, findings=tuple(f for f in by_witnesses.findings if f not in habits))
     one = replace(one, witnesses=evidence if evidence.observations else None)
     found = _with_faults(one, faults, evidence, judged, measured)
-    told = {_names(finding) for finding in found.findings}
-    told |= {_names(alias) for finding in found.findings for alias in finding.set}
-    raw = any(finding.effect in _RAW for finding in found.findings)
-    beside = () if raw else tuple(one for one in habits if not told & {_names(alias) for alias in one.set})
-    return replace(found, findings=(*found.findings, *beside))
+    return found if any(one.effect in _RAW for one in found.findings) else with_habits(found, habits)
 
 
 def _with_faults(
@@ -79,8 +76,7 @@ def _with_faults(
 ) -> Diagnosis:
     """Return the diagnosis with what the witnesses find wrong, see `combine_findings`."""
     by_witnesses = without_contradicted(by_witnesses, evidence)
-    raw = any(finding.effect in _RAW for finding in one.findings)
-    if raw:
+    if any(finding.effect in _RAW for finding in one.findings):
         known = {_names(finding) for finding in one.findings}
         told = (f for f in by_witnesses.findings if f.effect in _RAW or _is_shown_by(f, evidence, _ANYWAY))
         return replace(one, findings=(*one.findings, *(f for f in told if _names(f) not in known)))

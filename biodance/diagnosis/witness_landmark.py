@@ -5,11 +5,13 @@ told where it is clearly shown, with the plates that would look the same, and it
 evidence beside it is small.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.diagnosis.candidates import SCALE, TOGETHER
-from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.witness_evidence import WitnessEvidence
 from biodance.diagnosis.witness_fit import THRESHOLD, explain, fit_known, is_told, prior_odds, typical_size
 from biodance.effects.toe_landmark import ToeLandmark
@@ -55,6 +57,16 @@ def landmark_finding(evidence: WitnessEvidence, value: Array, named: Names) -> t
     own = Alias(ToeLandmark.name, _target(evidence), bayes)
     told = shown or (max(sizes, key=lambda one: abs(one.value) / one.sd),)
     return (Finding(own.effect, own.target, told, (own, *alike), _VISIBLE, advice=ToeLandmark.advice),)
+
+
+def with_habits(one: Diagnosis, habits: tuple[Finding, ...]) -> Diagnosis:
+    """Return the diagnosis with what is only a habit of the laboratory told beside it, if nothing of its set is named:
+    what was told apart by more evidence stands alone.
+    """
+    told = {(finding.effect, finding.target) for finding in one.findings}
+    told |= {(alias.effect, alias.target) for finding in one.findings for alias in finding.set}
+    beside = (habit for habit in habits if not any((a.effect, a.target) in told for a in habit.set))
+    return replace(one, findings=(*one.findings, *beside))
 
 
 def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> tuple[Estimate, ...]:
