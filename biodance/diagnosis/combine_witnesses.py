@@ -23,9 +23,9 @@ from biodance.diagnosis.witness_landmark import with_habits
 from biodance.effects import Effect, causes
 
 _FAR = 3.0
-"""Standard deviations between two sizes of one cause from which they contradict each other."""
+"""Standard deviations between two sizes of one cause that contradict each other."""
 _PLAIN = 3.0
-"""Times its limit: a cause so large is seen by the simulation, whatever else it cannot explain."""
+"""Times its limit: the simulation sees a cause so large, whatever else it cannot explain."""
 _WEIGHING = {"standing_force", "stride_force"}
 """Witnesses of mean forces: what only weighs shows in no moment and in no band but the slowest."""
 _STANDING = {*_WEIGHING, "standing_place"}

@@ -11,7 +11,8 @@ from biodance.witnesses.stride_force import DECLARED, StrideForce
 
 _LABORATORY = 0.006
 """s: sd of one laboratory (and movement) of the lag of clean recordings: the means of 13 public laboratories have an sd
-of 6.0 ms, and 5.6 to 6.2 with any one of them left out. In squats the lag is 9 ms more than in walking."""
+of 6.2 ms, and 5.6 to 6.5 with any one of them left out (one more, at 60 Hz, lies at 20 ms). In squats of one person the
+lag is 9 ms more than in walking."""
 _TRIAL = 0.002
 """s: sd of one trial beside what the trial tells of itself: 18 walks of one laboratory scatter by 2.5 ms."""
 _PERSON = 0.005
