@@ -24,6 +24,8 @@ class Reason(StrEnum):
     """No movement could be compared with a body."""
     MOVEMENT_NOT_JUDGED = "movement not judged"
     """None of the movement could be judged, not even by its steps."""
+    BODY_NOT_SCALED = "body not scaled"
+    """No static trial scales the body: its joints lie where stature or one frame of a movement puts them."""
     BODY_DOUBTFUL = "body doubtful"
     """What was measured or declared of the body contradicts itself; forces fit a wrong body as well."""
     UNDESCRIBED_JOINTS = "undescribed joints"
@@ -61,6 +63,7 @@ DOUBTS = frozenset(
         Reason.ONLY_STANDING,
         Reason.NOT_COMPARED,
         Reason.MOVEMENT_NOT_JUDGED,
+        Reason.BODY_NOT_SCALED,
         Reason.BODY_DOUBTFUL,
         Reason.UNDESCRIBED_JOINTS,
         Reason.UNSEEN_JOINTS,

@@ -49,7 +49,8 @@ class AxisError(DiscreteEffect):
 
     @classmethod
     def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[QualityCheck, ...]:
-        pairs = [pair for case in cases if (pair := on_one_plate(case, plate)) is not None]
+        seen = (case for case in cases if np.all(case.body.free))  # an unseen trunk needs other shear than is computed
+        pairs = [pair for case in seen if (pair := on_one_plate(case, plate)) is not None]
         if not pairs:
             return ()
         measured, needed = (np.concatenate([pair[k] for pair in pairs]) for k in range(2))

@@ -27,7 +27,7 @@ _RIGHT = 0.03
 _SURE = 0.03
 """Standard deviation of such a gain, and how far those of several trials may differ: that of the weight, twice."""
 _SIDEWAYS, _AGAIN = 0.004, 0.003
-"""m: sd of the place of the pressure to the left of the table's centre of mass in standing and squats (clean ones of four
+"""m: sd of the place of the pressure to the left of the table's centre of mass in standing and squats (clean ones of 4
 public laboratories lie 0.5 to 4 mm off, two simulated persons 4 to 6 mm), and between trials of a person."""
 _LASTS = 1.0
 """s that a trial tells: within a step or two the place wanders by 16 mm."""

@@ -16,7 +16,7 @@ from biodance.pipeline.finding_words import LOAD, cause_of, explained
 from biodance.pipeline.headline import headline
 from biodance.pipeline.reason_words import reason_notes
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.trial_result import Check, TrialResult
+from biodance.pipeline.trial_result import Check, Step, TrialResult
 from biodance.pipeline.weighing import NOT_WEIGHED
 from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, Level, strongest_first, without_path
 
@@ -110,9 +110,7 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     check that a finding may explain points to it. Nobody has to stand on a plate in the static trial.
     """
     found = [Attention("fail", without_path(why, file), file, "file") for file, why in result.session.refused.items()]
-    found += [
-        Attention(_level(step.status), step.text, "", step.name) for step in result.steps if step.status != "done"
-    ]
+    found += [Attention(_level(step), step.text, "", step.name) for step in result.steps if step.status != "done"]
     found += [Attention("note", NOT_WEIGHED, "", "weighing")] if result.weighed is None else []
     found += [
         Attention("fail", f"Not solved. {why}", "", f"identification, {what}") for what, why in result.failures.items()
@@ -174,8 +172,11 @@ def _load(result: SessionResult, findings: Sequence[Finding]) -> list[Attention]
     return [Attention("warn", text, about=LOAD)]
 
 
-def _level(status: str) -> Level:
-    return "fail" if status == "refused" else "warn"
+def _level(step: Step) -> Level:
+    """Return how loudly a step that was not done is said: a session too short to identify from needs nobody."""
+    if step.status == "refused":
+        return "note" if step.name == "identify" else "fail"
+    return "warn"
 
 
 def _first_sentence(reason: str) -> str:

@@ -50,7 +50,8 @@ def body_of(
     for static in statics:
         scaling = attempt(steps, "scale", partial(measure_static, subject, static))
         if scaling is not None:
-            functional = settings.joints == "functional"
+            moved_in = any(one.trial.role == "fit" and one.trial.markers is not None for one in read)
+            functional = settings.joints == "functional" and moved_in
             placed = attempt(steps, "joints", partial(calibrate_joints, scaling, read)) if functional else None
             moved = placed is not None and any(note.startswith(PLACED) for note in placed.notes)
             how = f"{PLACED[:1].lower()}{PLACED[1:]}" if moved else "joints where it shows them"

@@ -160,7 +160,7 @@ def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, st
     """Return what the simulation tells of every cause, by effect and target, before any is named; nothing where it
     looked for none, or its tolerances do not hold.
     """
-    if not {Reason.ONLY_STANDING, Reason.TOLERANCES_DO_NOT_HOLD}.isdisjoint(reasons):
+    if not {Reason.ONLY_STANDING, Reason.BODY_NOT_SCALED, Reason.TOLERANCES_DO_NOT_HOLD}.isdisjoint(reasons):
         return {}
     return {
         one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
@@ -205,8 +205,9 @@ def _diagnosed(
         return SessionDiagnosis(
             by_checks(checks, examined.diagnosis, suspicious=bool(examined.passes_threshold)), examined
         )
-    if not own.believed:
-        reasons = {**examined.diagnosis.why, Reason.TOLERANCES_DO_NOT_HOLD: ()}
+    unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
+    if any(unsure.values()):
+        reasons = {**examined.diagnosis.why, **{reason: () for reason, holds in unsure.items() if holds}}
         examined = replace(examined, diagnosis=replace(examined.diagnosis, why=reasons))
         return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
     joints = tuple(one.name for one in result.shown_joints.gains if one.taken)

@@ -93,6 +93,11 @@ class SessionResult:
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), [self.body_source])
 
+    @property
+    def scaled(self) -> bool:
+        """Whether a static trial scaled the body."""
+        return any(step.name == "scale" and step.status == "done" for step in self.steps)
+
     def __getitem__(self, name: str) -> TrialResult:
         """Return what was found in the trial of that name; UnknownName lists all names."""
         return by_name(self.trials, name, f"trial of session {self.session.folder.name}")
