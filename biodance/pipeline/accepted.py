@@ -1,13 +1,12 @@
 """What accepting the findings of a session writes: corrected trials, and copies with exchanged labels put right."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import Recorded
 from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError
@@ -15,7 +14,6 @@ from biodance.lab.c3d.exchanged import write_exchanged
 from biodance.lab.c3d.ezc3d_object import write_trial
 from biodance.lab.corrections import (
     APPLIED,
-    PARAMETER_OF,
     PlateCorrection,
     corrected_trial,
     corrections_text,
@@ -30,16 +28,6 @@ CORRECTED = "corrected"
 """Folder with the trials that were corrected."""
 MENDED = "mended"
 """Folder with the copies of recordings whose exchanged labels were put right."""
-
-
-def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[PlateCorrection, ...]:
-    """Return the ``findings`` that can be corrected in recordings, found in ``source``."""
-    out = []
-    for one in findings:
-        size = {p.name: p for p in one.parameters}.get(PARAMETER_OF.get(one.effect, ""))
-        if size is not None and np.isfinite(size.value):
-            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
-    return tuple(out)
 
 
 def write_corrected(

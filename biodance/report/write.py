@@ -7,11 +7,12 @@ from biodance.body.body_file import body_text
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.corrections import PlateCorrection
-from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected, write_mended
+from biodance.pipeline.accepted import CORRECTED, write_corrected, write_mended
 from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
+from biodance.pipeline.gains import accepted_corrections
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text
