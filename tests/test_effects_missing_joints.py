@@ -123,10 +123,10 @@ def test_markers_show_the_joint_and_the_wrench_follows(name: str) -> None:
     assert np.linalg.norm(right.residual[INSIDE]) < 0.1 * before
 
 
-def lower_trunk(far: float) -> Case:
-    """Return a squat of a person whose trunk bends ``far`` m below the model's joint, which no movement has placed."""
+def higher_trunk(far: float) -> Case:
+    """Return a squat of a person whose trunk bends ``far`` m above the model's joint, which no movement has placed."""
     model = human(Subject(70, 1.75, "M", 30))
-    true = recentre_joint(model, model.joint_index("trunk_flexion"), np.array([0.0, -far, 0.0]))
+    true = recentre_joint(model, model.joint_index("trunk_flexion"), np.array([0.0, far, 0.0]))
     time = np.arange(600) / 100
     q = np.tile(true.neutral, (600, 1))
     q[:, 7 + true.joint_index("trunk_flexion")] = -0.25 * (1 - np.cos(np.pi * time))
@@ -137,7 +137,7 @@ def lower_trunk(far: float) -> Case:
 
 
 def test_a_trunk_that_bends_elsewhere_is_no_second_joint() -> None:
-    case = lower_trunk(0.06)
+    case = higher_trunk(0.06)
     found = effect("trunk_joint").at("", case)
     shown = found.shown(case)
     assert shown is not None
@@ -145,7 +145,7 @@ def test_a_trunk_that_bends_elsewhere_is_no_second_joint() -> None:
     placed = replace(case, body=replace(case.body, joint_errors=(JointError("trunk", 0.004, 0.0),)))
     shown = found.shown(placed)
     assert shown is not None
-    assert shown[0] > 0.05
+    assert shown[0] > 0.07
 
 
 def test_the_size_reported_is_the_one_shown_and_the_wrenchs_sum_stays() -> None:
