@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,8 +92,8 @@ def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_
     by_role = {"fit": every[:2] if kept else every, "validate": every[2:] if kept else ()}
     monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
     found = diagnose_trials(body(), by_role["fit"], tolerances=known(), effects=("plate_gain",), search=False)
-    result = SimpleNamespace(body=body(), trials=())
-    right, wrong = gains._with_gains(result, found, (RIGHT, WRONG))  # type: ignore[arg-type]
+    result: Any = SimpleNamespace(body=body(), trials=())
+    right, wrong = gains._with_gains(result, found, (RIGHT, WRONG))
     assert right.gain is not None
     assert right.gain.proven
     assert wrong.gain is not None
@@ -100,7 +101,7 @@ def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_
     assert set(right.gain.trials) == {window.trial.name for window in every[2 * kept :]}
     said = WitnessFindings((RIGHT, WRONG), WitnessEvidence((), {}, {}))
     monkeypatch.setattr(gains, "infer_causes", lambda _: said)
-    told = gains.combined_with_witnesses(result, found.diagnosis, found, WitnessEvidence((), {}, {}), {})  # type: ignore[arg-type]
+    told = gains.combined_with_witnesses(result, found.diagnosis, found, WitnessEvidence((), {}, {}), {})
     assert [one.effect for one in told.findings] == ["plate_gain"]
     assert any(note.startswith("plate position plate1:x was taken back: accepting it") for note in told.notes)
 
@@ -109,9 +110,9 @@ def test_a_touch_that_came_and_went_before_is_not_judged_by_trials_without_it(mo
     every = windows(1, trials=2)
     by_role = {"fit": every[:1], "validate": every[1:]}
     monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
-    result = SimpleNamespace(body=body(), trials=())
+    result: Any = SimpleNamespace(body=body(), trials=())
     case = cases_of(body(), every)[0]
     touch = NamedCause(effect("external_contact").at("pelvis", case), np.zeros(3), np.eye(3))
     for window, judged in zip(every, (False, True), strict=True):
         course = {window.trial.name: np.ones(3)}
-        assert gains._acts(result, replace(touch, course=course)) is judged  # type: ignore[arg-type]
+        assert gains._acts(result, replace(touch, course=course)) is judged
