@@ -8,8 +8,10 @@ import pytest
 from human_cases import CORNERS, human_case, moving
 
 from biodance.body.body import Body
+from biodance.body.changes import recentre_joint
 from biodance.body.human.human import human
 from biodance.body.inertia import shift_matter, smallest_eigenvalues
+from biodance.body.parts import JointError
 from biodance.diagnosis.accept import case_fit
 from biodance.effects import Case, effect
 from biodance.effects.head_joint import HeadJoint
@@ -43,10 +45,10 @@ def longer(body: Body, extended: Body, q: Array) -> Array:
 
 def person(name: str, size: float) -> tuple[Case, Array]:
     """Return a trial of a person who moves the joint by ``size`` rad rms, tracked without it, and the wrench (T, 6)
-    of that motion.
+    of that motion; a movement has placed the trunk.
     """
     rng = np.random.default_rng(4)
-    body = human(Subject(70, 1.75, "M", 30))
+    body = replace(human(Subject(70, 1.75, "M", 30)), joint_errors=(JointError("trunk", 0.004, 0.0),))
     extended = KINDS[name](human_case(120))
     assert extended is not None
     time = np.arange(400) / 100
@@ -119,6 +121,31 @@ def test_markers_show_the_joint_and_the_wrench_follows(name: str) -> None:
     assert np.linalg.norm(residual[INSIDE] - explained) < 0.2 * before
     right = found.corrected(case, shown)
     assert np.linalg.norm(right.residual[INSIDE]) < 0.1 * before
+
+
+def higher_trunk(far: float) -> Case:
+    """Return a squat of a person whose trunk bends ``far`` m above the model's joint, which no movement has placed."""
+    model = human(Subject(70, 1.75, "M", 30))
+    true = recentre_joint(model, model.joint_index("trunk_flexion"), np.array([0.0, far, 0.0]))
+    time = np.arange(600) / 100
+    q = np.tile(true.neutral, (600, 1))
+    q[:, 7 + true.joint_index("trunk_flexion")] = -0.25 * (1 - np.cos(np.pi * time))
+    markers = Markers(true.markers.names, time, poses(true, q).points(true.markers.segment, true.markers.position))
+    wrench = predict_wrench(true, smooth(true, time, q))
+    trial = Trial("t", "fit", markers, (Plate("plate1", 2, CORNERS, wrench),), Source(Path(__file__), "", "test"))
+    return Case(model, trial, track(model, trial), model.sip.phi, np.linspace(0, 1, 600))
+
+
+def test_a_trunk_that_bends_elsewhere_is_no_second_joint() -> None:
+    case = higher_trunk(0.06)
+    found = effect("trunk_joint").at("", case)
+    shown = found.shown(case)
+    assert shown is not None
+    assert shown[0] == 0.0
+    placed = replace(case, body=replace(case.body, joint_errors=(JointError("trunk", 0.004, 0.0),)))
+    shown = found.shown(placed)
+    assert shown is not None
+    assert shown[0] > 0.07
 
 
 def test_the_size_reported_is_the_one_shown_and_the_wrenchs_sum_stays() -> None:

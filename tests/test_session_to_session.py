@@ -14,7 +14,7 @@ import biodance
 from biodance.body.body_file import body_text
 from biodance.cli import run
 from biodance.dance.dance import Dance
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
 from biodance.identification.identification import identify_body
 from biodance.pipeline.body import starting_from
@@ -97,14 +97,33 @@ def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
     shift = np.array([0.03, 0.0, 0.0])
     wrong = trial(point=POINT + shift, corners=CORNERS + shift)
     session = Session(SUBJECT, (wrong,), Path("/lab/S01"))
-    cause = Alias("plate_position", "plate1:x", 50.0)
-    place = Finding("plate_position", "plate1:x", (Estimate("shift", 0.03, 0.001, "m"),), (cause,), 1.0, advice="")
+    cause, proven = Alias("plate_position", "plate1:x", 50.0), Gain(np.ones(6), np.zeros(6), (0.2, 0.4), ("t",))
+    place = Finding("plate_position", "plate1:x", (Estimate("shift", 0.03, 0.001, "m"),), (cause,), 1.0, proven)
     zero = replace(place, effect="plate_offset", target="Fx", parameters=(Estimate("offset", 5.0, 0.3, "N"),))
     load = replace(place, effect="added_mass", target="trunk_head", parameters=(Estimate("mass", 2.0, 0.1, "kg"),))
-    found = SessionDiagnosis(Diagnosis(verdict="named, complete", findings=(place, zero, load)))
+    turned = replace(place, effect="plate_rotation", target="plate1:z", gain=replace(proven, ci95=(-0.1, 0.2)))
+    unmeasured = replace(turned, target="plate1:x", gain=None)
+    found = SessionDiagnosis(Diagnosis(verdict="named, complete", findings=(place, zero, load, turned, unmeasured)))
     told, files = _accepted(replace(session_result(), session=session), found, tmp_path, ())
     assert told["trials"] == ("t",)
-    assert told["not_in_recordings"] == ["added_mass trunk_head"]
+    assert told["not_in_recordings"] == []
+    assert [one["cause"] for one in told["not_applied"]] == [
+        "added_mass trunk_head",
+        "plate_rotation plate1:z",
+        "plate_rotation plate1:x",
+    ]
+    assert "removes -10 to 20 %" in told["not_applied"][1]["why"]
+    assert "is not measured" in told["not_applied"][2]["why"]
+    said = {one["file"]: one["what"] for one in told["written"]}
+    assert set(said) == {
+        "lab.toml",
+        *(f"corrected/{name}" for name in ("t.c3d", "session.toml", "corrected.toml")),
+    }
+    assert (
+        said["corrected/t.c3d"]
+        == "taken off: plate position plate1:x (shift 0.03 m); plate offset Fx (offset 5 N or N·m)"
+    )
+    assert "rotation" not in (tmp_path / "corrected" / "corrected.toml").read_text()
     assert "plate_position" in files["lab.toml"]
     assert "plate_offset" not in files["lab.toml"]  # of today only
     assert sorted(path.name for path in (tmp_path / "corrected").iterdir()) == [

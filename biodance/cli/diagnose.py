@@ -73,8 +73,8 @@ def diagnose_command(
         Parameter(
             name="--accept",
             negative="",
-            help="Also apply the findings and write the result: body.json, lab.toml and corrected trials. The "
-            "recordings themselves are not changed.",
+            help="Also apply the findings that are proven to make data that were not used fit better, and write the "
+            "result: body.json, lab.toml and corrected trials. The recordings themselves are not changed.",
         ),
     ] = False,
     robot: RobotFile = NO_ROBOT,

@@ -89,7 +89,8 @@ def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residua
     unit = np.maximum(_rms(fitted[1]), _TINY) ** 2
     low, high = np.percentile(1 - np.sqrt((second / unit).sum(axis=1) / (first / unit).sum(axis=1)), [2.5, 97.5])
     score, error = _density_gain(before, after, fitted)
-    return Gain(_rms(before), _rms(after), (float(low), float(high)), before.names, score, error, channels)
+    names = tuple(dict.fromkeys(before.names))
+    return Gain(_rms(before), _rms(after), (float(low), float(high)), names, score, error, channels)
 
 
 def _density_gain(before: Residuals, after: Residuals, fitted: tuple[Residuals, Residuals]) -> tuple[float, float]:

@@ -1,13 +1,13 @@
 """What accepting the findings of a session writes: corrected trials, and copies with exchanged labels put right."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import Recorded
 from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError
@@ -15,7 +15,6 @@ from biodance.lab.c3d.exchanged import write_exchanged
 from biodance.lab.c3d.ezc3d_object import write_trial
 from biodance.lab.corrections import (
     APPLIED,
-    PARAMETER_OF,
     PlateCorrection,
     corrected_trial,
     corrections_text,
@@ -32,14 +31,11 @@ MENDED = "mended"
 """Folder with the copies of recordings whose exchanged labels were put right."""
 
 
-def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[PlateCorrection, ...]:
-    """Return the ``findings`` that can be corrected in recordings, found in ``source``."""
-    out = []
-    for one in findings:
-        size = {p.name: p for p in one.parameters}.get(PARAMETER_OF.get(one.effect, ""))
-        if size is not None and np.isfinite(size.value):
-            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
-    return tuple(out)
+class Written(NamedTuple):
+    """One ``file`` that accepting has written, its path in the folder of results, and ``what`` was changed in it."""
+
+    file: str
+    what: str
 
 
 def write_corrected(
@@ -49,12 +45,16 @@ def write_corrected(
     makes them a session; return their names, and why others could not be written.
 
     Markers and plates are as read (m turned to mm, z up, plates TYPE 2), other analog channels are left out. What was
-    corrected ``earlier`` is in ``session`` already.
+    corrected ``earlier`` is in ``session`` already. What says that all of it is off (`APPLIED`) is written first: a run
+    that is killed leaves trials out, and none is ever corrected twice.
     """
     if folder.is_dir() and (folder / APPLIED).is_file():
-        for path in (*folder.glob("*.c3d"), folder / APPLIED, folder / "session.toml"):
+        for path in (*folder.glob("*.c3d"), folder / "session.toml", folder / APPLIED):
             path.unlink(missing_ok=True)
     folder.mkdir(exist_ok=True)
+    text = corrections_text(joined_corrections(earlier, accepted))
+    (folder / APPLIED).write_text(text, encoding="utf-8", newline="\n")
+    (folder / "session.toml").write_text(_session_toml(session), encoding="utf-8", newline="\n")
     written, refused = [], []
     for trial in session.trials:
         try:
@@ -62,9 +62,6 @@ def write_corrected(
             written.append(trial.name)
         except BiodanceError as error:
             refused.append(f"Trial {trial.name} was not written corrected. {error}")
-    (folder / "session.toml").write_text(_session_toml(session), encoding="utf-8", newline="\n")
-    text = corrections_text(joined_corrections(earlier, accepted))
-    (folder / APPLIED).write_text(text, encoding="utf-8", newline="\n")
     return tuple(written), tuple(refused)
 
 
@@ -109,15 +106,18 @@ def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> 
     return None
 
 
-def write_mended(session: Session, right: MendedCopy, folder: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Write a copy of every C3D file with exchanged labels put right into ``folder``/mended; return their names there,
-    and why others could not be written. Every other byte is as in the recording.
+def write_mended(session: Session, right: MendedCopy, folder: Path) -> tuple[tuple[Written, ...], tuple[str, ...]]:
+    """Write a copy of every C3D file with exchanged labels put right into ``folder``/mended; return what was written,
+    and why others could not be. Every other byte is as in the recording.
     """
     written, refused = [], []
     for trial in session.trials:
         pairs, file = right.exchanged.get(trial.name, {}), trial.source.path
         if pairs and trial.source.format == "C3D":
-            written.append(f"{MENDED}/{write_exchanged(file, folder / MENDED / file.name, pairs).name}")
+            path = write_exchanged(file, folder / MENDED / file.name, pairs)
+            written.append(
+                Written(f"{MENDED}/{path.name}", f"names exchanged: {', '.join(f'{a} and {b}' for a, b in pairs)}")
+            )
         elif pairs:
             refused.append(f"Trial {trial.name} was not written with its labels put right: only C3D files are copied.")
     return tuple(written), tuple(refused)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
+from biodance.diagnosis.combine_witnesses import SimulatedSize
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.gain import Gain
@@ -18,7 +18,6 @@ from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import by_checks, named_first, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
-from biodance.diagnosis.witness_inference import infer_causes
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, QualityCheck, causes, check_quality
 from biodance.errors import BiodanceError, TrialRefused
@@ -26,7 +25,7 @@ from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.pipeline.another_body import beside_another_body, without_unplaced_markers
 from biodance.pipeline.attention import reconcile_with_checks
-from biodance.pipeline.gains import accepted, noted
+from biodance.pipeline.gains import accepted, combined_with_witnesses, noted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
@@ -141,7 +140,7 @@ def diagnose_session(
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
     measured = _measured(naming, found.diagnosis.why) if naming else {}
-    whole = combine_findings(found.diagnosis, infer_causes(evidence), evidence, judged=bool(naming), measured=measured)
+    whole = combined_with_witnesses(result, found.diagnosis, found.examined, evidence, measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
     whole = named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))

@@ -201,8 +201,12 @@ def _print_accepted(found: dict[str, Any], console: Console) -> None:
         _line(console, f"accepted: {what}")
     for what in found["not_in_recordings"]:
         _line(console, f"accepted in the body only, no recording is corrected: {what}")
-    written = ", ".join([*found["files"], *(["corrected/"] if found["trials"] else [])])
-    _line(console, f"written: {written or 'nothing, there is nothing to accept'}")
+    for one in found["not_applied"]:
+        _line(console, f"not applied: {one['cause']}, because {one['why']}")
+    for one in found["written"]:
+        _line(console, f"written: {one['file']} ({one['what']})")
+    if not found["written"]:
+        _line(console, "written: nothing")
     for why in found["refused"]:
         _line(console, f"look: {why}")
 

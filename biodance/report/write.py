@@ -4,14 +4,16 @@ from pathlib import Path
 from typing import Any
 
 from biodance.body.body_file import body_text
+from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
-from biodance.lab.corrections import PlateCorrection
-from biodance.pipeline.accepted import CORRECTED, accepted_corrections, write_corrected, write_mended
+from biodance.lab.corrections import APPLIED, LASTING, PlateCorrection
+from biodance.pipeline.accepted import CORRECTED, Written, write_corrected, write_mended
 from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
+from biodance.pipeline.gains import accepted_corrections
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import identified_trials
 from biodance.pipeline.lab_file import LAB, lab_text
@@ -120,8 +122,8 @@ def write_diagnosis(
 ) -> dict[str, Any]:
     """Write ``report.html`` and ``results.json`` of a diagnosis, and return the numbers.
 
-    With ``accepted`` also what follows from the findings: ``body.json``, ``lab.toml`` (with the corrections made
-    ``earlier``) and the trials corrected.
+    With ``accepted`` also what follows from the findings that are proven to gain: ``body.json``, ``lab.toml`` (with the
+    corrections made ``earlier``), the trials corrected, and copies of recordings with their labels put right.
     """
     made = provenance(result, created=now())
     failures = {**result.failures, **found.failures}
@@ -144,37 +146,70 @@ def _accepted(
     result: SessionResult, found: SessionDiagnosis, folder: Path, earlier: tuple[PlateCorrection, ...]
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Write the corrected trials; return what acceptance gave in words, and the texts of the files that are left to
-    write.
+    write. Only what is proven to gain on data that were not used is taken off or believed.
     """
-    name, findings, files = result.session.folder.name, found.diagnosis.faults, {}
-    if found.accepted is not None and found.accepted.status == "solved":
-        named = ", ".join(f"{one.effect} {one.target}".strip() for one in findings)
-        files[BODY] = body_text(found.accepted.identified, f"Session {name}: identified with {named} accepted.")
-    labels = found.mended.checks if found.mended else ()
-    undone = {(one.effect, one.target) for one in labels}
-    made = accepted_corrections([f for f in findings if (f.effect, f.target) not in undone], f"session {name}")
-    if text := lab_text(earlier, made):
+    name, files = f"session {result.session.folder.name}", {}
+    undone = found.mended.checks if found.mended else ()
+    right = {(one.effect, one.target) for one in (*undone, *(c for c in found.diagnosis.checks if c.mended))}
+    findings = tuple(one for one in found.diagnosis.faults if (one.effect, one.target) not in right)
+    written, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
+    body, proven = found.accepted, found.gain is not None and found.gain.proven
+    if body is not None and body.status == "solved" and proven:
+        named = ", ".join(_cause(one) for one in findings if one.changes)
+        files[BODY] = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
+        written = (*written, Written(BODY, f"the body identified with {named} accepted"))
+    made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
+    if made and (text := lab_text(earlier, made)):
         files[LAB] = text
-    rewritten = made or any(one.effect != LabelsSwapped.name for one in labels)
-    written, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
-    mended, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
-    exchanged = dict.fromkeys(f"{one.text} Put right in a copy." for one in labels)
-    prepared = {(one.effect, one.target) for one in found.diagnosis.checks if one.mended}
-    others = {*((one.effect, one.target) for one in made), *undone, *prepared}
-    rest = [f"{f.effect} {f.target}".strip() for f in findings if (f.effect, f.target) not in others]
-    in_body = BODY in files
-    told = {
-        "files": [*sorted(files), *mended],
-        "corrections": [*exchanged, *(str(one) for one in made)],
-        "trials": written,
-        "not_in_recordings": rest if in_body else [],
-        "refused": [
-            *refused,
-            *kept,
-            *(f"For {one} no file was written: correct it yourself." for one in rest * (not in_body)),
-        ],
+        lasting = "; ".join(str(one) for one in made if one.effect in LASTING)
+        written = (*written, Written(LAB, f"to be taken off other sessions: {lasting or 'as before'}"))
+    rewritten = (*(one.text for one in undone if one.effect != LabelsSwapped.name), *map(str, made))
+    trials, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())
+    left = _not_applied(findings, proven=proven)
+    others = {*left, *((one.effect, one.target) for one in made)}
+    document = {
+        "files": [*sorted(files), *(one.file for one in written if one.file not in files)],
+        "corrections": [*dict.fromkeys(f"{one.text} Put right in a copy." for one in undone), *map(str, made)],
+        "trials": trials,
+        "not_in_recordings": [_cause(one) for one in findings if (one.effect, one.target) not in others],
+        "refused": [*refused, *kept],
+        "written": [one._asdict() for one in (*written, *_of_trials(trials, rewritten))],
+        "not_applied": [{"cause": " ".join(names).strip(), "why": why} for names, why in left.items()],
     }
-    return told, files
+    return document, files
+
+
+def _of_trials(trials: tuple[str, ...], changes: tuple[str, ...]) -> list[Written]:
+    """Return what was written of trials with these ``changes``."""
+    if not changes:
+        return []
+    told = "; ".join(changes)
+    beside = Written(f"{CORRECTED}/{APPLIED}", f"says what was taken off: {told}")
+    roles = Written(f"{CORRECTED}/session.toml", "subject and roles")
+    return [beside, roles, *(Written(f"{CORRECTED}/{trial}.c3d", f"taken off: {told}") for trial in trials)]
+
+
+def _cause(one: Finding) -> str:
+    return f"{one.effect} {one.target}".strip()
+
+
+def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[str, str], str]:
+    """Return by effect and target why a finding was not accepted: corrections of recordings go by their own gain, all
+    else by that of all together (``proven``).
+    """
+    out = {}
+    for one in findings:
+        recorded = bool(accepted_corrections((one,), ""))
+        good = one.gain is not None and one.gain.proven if recorded else proven and bool(one.changes)
+        if good:
+            continue
+        low, high = (100 * x for x in one.gain.ci95) if one.gain else (0.0, 0.0)
+        out[one.effect, one.target] = (
+            f"on data that were not used it removes {low:.0f} to {high:.0f} % of the difference: no proven gain"
+            if one.gain
+            else "what it gains on data that were not used is not measured"
+        )
+    return out
 
 
 def _page(

@@ -17,7 +17,7 @@ from biodance.body.human.limits import joint_limits, widen_limits
 from biodance.body.human.measures import Measures, measures
 from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_tree, kind_of
 from biodance.body.human.standing import StaticPosture, standing
-from biodance.body.human.static_centres import Centres, SegmentFrames, segment_frames, static_centres
+from biodance.body.human.static_centres import LIMB_ENDS, Centres, SegmentFrames, segment_frames, static_centres
 from biodance.body.human.unseen import widen_unseen, with_unseen_parts
 from biodance.body.parts import SegmentMarkers
 from biodance.body.tables.anthropometry import proportion
@@ -41,6 +41,10 @@ LENGTH_RATIO = {
 }
 """of stature: the lengths that adults and children have."""
 
+_UNEQUAL = 2.0
+"""Standard deviations of the difference between a limb's sides beyond which its markers are doubted, as of any size
+that is told."""
+
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
@@ -61,7 +65,7 @@ class Scaling:
         """Return the scaled body and its posture q (30,) in the static trial, meeting all markers exactly."""
         frames = segment_frames(self.centres)
         skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
-        doubts = _doubts(skeleton, self.subject)
+        doubts = _doubts(skeleton, self.subject, self.centres)
         markers = calibrated_markers(frames, self.posture)
         notes = (*self.notes, *doubts)
         body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
@@ -257,7 +261,7 @@ def _tilt(rotation: Array) -> float:
     return float(np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0))))
 
 
-def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
+def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[str]:
     """Return warnings about lengths, sides and tilts that no person has."""
     notes = []
     for segment in SEGMENTS:
@@ -268,9 +272,9 @@ def _doubts(skeleton: Skeleton, subject: Subject) -> list[str]:
                 f"usual at {subject.stature:.2f} m: check its markers, and the stature."
             )
         other = segment.replace("right_", "left_")
-        if other != segment and abs(skeleton.lengths[segment] - skeleton.lengths[other]) > 0.02:
-            more = 1e3 * (skeleton.lengths[segment] - skeleton.lengths[other])
-            how = f"is {abs(more):.0f} mm {'longer' if more > 0 else 'shorter'} than"
+        more = skeleton.lengths[segment] - skeleton.lengths[other]
+        if kind_of(segment) in LIMB_ENDS and abs(more) > _UNEQUAL * centres.sides_sd(kind_of(segment)):
+            how = f"is {1e3 * abs(more):.0f} mm {'longer' if more > 0 else 'shorter'} than"
             notes.append(
                 f"Warning: the {segment.replace('_', ' ')} {how} the {other.replace('_', ' ')}: check the markers."
             )

@@ -17,7 +17,7 @@ from biodance.body.human.measures import (
     wrist,
 )
 from biodance.body.parts import JointError
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.records import Array
 from biodance.settings import Hip
 from biodance.spatial import elementary_rotation
@@ -28,6 +28,13 @@ WRIST_BAR = 0.03
 """m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
 AXIS_TOLERANCE = 30.0
 """deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
+LIMB_ENDS = {
+    "thigh": ("hip", "knee"),
+    "shank": ("knee", "ankle"),
+    "upper_arm": ("shoulder", "elbow"),
+    "forearm_hand": ("elbow", "wrist"),
+}
+"""The joints at both ends of the limbs that people have as long on the right as on the left."""
 Places = Mapping[str, Array]
 
 
@@ -58,6 +65,25 @@ class Centres:
     contradicted: tuple[str, ...] = ()
     mid_hip: Array | None = None
     sole: Places = field(default_factory=dict)
+
+    def sd(self, joint: str) -> float:
+        """Return the standard deviation (m per axis) of a joint's centre, after a movement has placed it or before."""
+        return next((one.centre for one in self.errors if one.joint == joint), static_sd(joint))
+
+    def sides_sd(self, limb: str) -> float:
+        """Return the standard deviation (m) of how much longer a ``limb`` (thigh, shank, ...) is on the right: of
+        people, and of the joint centres at its ends.
+        """
+        ends = (self.sd(f"{side}_{joint}") for side in SIGN for joint in LIMB_ENDS[limb])
+        return float(np.linalg.norm([error_size("side_length", "limb"), *ends]))
+
+
+def static_sd(joint: str) -> float:
+    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it; of a hinge
+    about the place that its lateral marker and its axis give it.
+    """
+    hinge = joint.endswith(("knee", "elbow"))
+    return error_size("hinge_centre", "hinge", state="before") if hinge else joint_size("joint_centre", joint)
 
 
 def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True) -> Centres:

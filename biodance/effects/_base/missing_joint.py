@@ -19,7 +19,7 @@ from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass, motion_filter
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.kinematics import SegmentMotion, poses, segment_motion
+from biodance.motion.kinematics import SegmentMotion, chains, poses, segment_motion
 from biodance.motion.regressor import wrench_of_segments
 from biodance.motion.smoothing import smooth
 from biodance.motion.track import track
@@ -67,11 +67,11 @@ class MissingJoint(Effect, ABC):
         return np.stack([nearer, np.zeros_like(nearer)], axis=2)
 
     def shown(self, *cases: Case) -> Array:
-        """Return (2,) rad: the angle in all ``cases`` that is left when the natural one is taken off (squares of
-        independent movements add up), and NaN for what only the wrench can show.
+        """Return (2,) rad: the angle of its own (`Movement.own`) in all ``cases`` that is left when the natural one is
+        taken off (squares of independent movements add up), and NaN for what only the wrench can show.
         """
         found = [(case.motion.time.size, _movement(case, self)) for case in cases]
-        square = sum(frames * one.angle**2 for frames, one in found if one is not None) / sum(
+        square = sum(frames * one.own**2 for frames, one in found if one is not None) / sum(
             frames for frames, _ in found
         )
         return np.array([np.sqrt(max(square - self.natural**2, 0.0)), np.nan])
@@ -113,7 +113,9 @@ class MissingJoint(Effect, ABC):
 class Movement:
     """A trial tracked with the joint, at ``time`` (F,) s: the motion ``loose`` of the segments of the ``body`` with it,
     ``stiff`` of those of the one without; ``markers`` (K, 3) m by which the model's markers come nearer on average,
-    in segment axes; ``angle`` rad rms of the joint's axes.
+    in segment axes; ``angle`` rad rms of the joint's axes, ``own`` of that what does not follow the angles of the
+    joint that carries its segment, where no movement has placed that one: if it lies elsewhere than in the model, a
+    second one that follows it brings the markers nearer, and nothing else moves there.
     """
 
     time: Array
@@ -122,6 +124,7 @@ class Movement:
     stiff: SegmentMotion
     markers: Array
     angle: float
+    own: float
 
     def wrench(self, case: Case) -> Array:
         """Return (F, 6) about the lab origin: what the joint's motion adds with the parameters in use."""
@@ -177,9 +180,34 @@ def _tracked(case: Case, body: Body) -> Movement:
     guess = np.insert(slow.q, new - np.arange(new.size), 0.0, axis=1)
     time = slow.markers.time
     loose = smooth(body, time, solve_ik(body, slow.markers, guess=guess).q, settings=slow.settings)
-    angle = float(np.sqrt(loose.q[:, new].var(axis=0).mean()))
+    angle, own = (
+        _rms(x) for x in (loose.q[:, new], _not_following(loose.q[:, new], loose.q[:, _unplaced(case, body)]))
+    )
     nearer = _markers(case, body, loose.q, slow.q)
-    return Movement(time, body, segment_motion(body, loose), slow.segments, nearer, angle)
+    return Movement(time, body, segment_motion(body, loose), slow.segments, nearer, angle, own)
+
+
+def _rms(angles: Array) -> float:
+    """Return the root mean square of ``angles`` (F, n) about their means."""
+    return float(np.sqrt(angles.var(axis=0).mean()))
+
+
+def _unplaced(case: Case, body: Body) -> list[int]:
+    """Return where in a posture of ``body`` the angles are of the joints that carry those which only it has, and that
+    no movement has placed.
+    """
+    index = {joint.name: body.nq - len(body.joints) + k for k, joint in enumerate(body.joints)}
+    old, placed = {joint.name for joint in case.body.joints}, {error.joint for error in case.body.joint_errors}
+    ends = {body.joints[joint.parent].name for joint in body.joints if joint.name not in old and joint.parent >= 0}
+    chained = [[case.body.joints[k].name for k in chain] for chain in chains(case.body)]
+    open_ones = (names for names in chained if names[-1] in ends and names[0].rsplit("_", 1)[0] not in placed)
+    return [index[name] for names in open_ones for name in names]
+
+
+def _not_following(angles: Array, others: Array) -> Array:
+    """Return what of the course of ``angles`` (F, n) is in no proportion to those of ``others`` (F, m)."""
+    angles, others = angles - angles.mean(axis=0), others - others.mean(axis=0)
+    return angles - others @ np.linalg.lstsq(others, angles, rcond=None)[0]
 
 
 def _markers(case: Case, body: Body, loose: Array, stiff: Array) -> Array:

@@ -3,7 +3,7 @@ prior.
 
 Every choice of the unknowns is a body that meets the static markers exactly. Sought is the most probable one: marker
 distances over postures of the moving trials, each at its own best inverse kinematics, plus the squared distance from
-the static answer (`joint_fit`). What the movement contradicts is found on the way (`elsewhere`).
+the static answer (`joint_fit`). What the movement contradicts is found on the way (`motion.ik.elsewhere`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,10 +17,10 @@ from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
+from biodance.motion.ik.elsewhere import elsewhere
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
     beside_sliding_skin,
-    elsewhere,
     evaluate_joints,
     fit_joints,
     spread_postures,
@@ -109,7 +109,7 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     found, refused = _inside_the_body(scaling, postures, start, shown, noise=noise)
     spared: dict[str, tuple[str, float]] = {}
     for _ in range(_FAULTS):
-        cost, slopes = beside_sliding_skin(scaling, postures, found, noise=noise)
+        cost, slopes = beside_sliding_skin(scaling, postures, found, noise=noise, alike=alike)
         wrong = elsewhere(scaling, found.theta, cost, slopes, shown)
         if wrong is None:
             break

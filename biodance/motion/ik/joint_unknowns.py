@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import JOINTS
-from biodance.body.human.static_centres import Centres
-from biodance.body.tables.error_sizes import error_size, joint_size
+from biodance.body.human.static_centres import Centres, static_sd
+from biodance.body.tables.error_sizes import error_size
 from biodance.motion.kinematics import Poses, below, chains, poses
 from biodance.records import SIDES, Array
 from biodance.spatial import axis_rotation, skew
@@ -47,19 +47,10 @@ place beyond is outside the body. What asks for it is no joint centre, but skin,
 
 
 def centre_sd(joint: str, *, contradicted: bool = False) -> float:
-    """Return the standard deviation (m per axis) of a ``joint``'s centre as the static trial places it, before any
-    movement; of a hinge about the place that its lateral marker and its axis give it; wider where the movement has
-    ``contradicted`` that place.
+    """Return the standard deviation (m per axis) of a ``joint``'s centre before any movement (`static_sd`); wider where
+    the movement has ``contradicted`` that place.
     """
-    usual = hinge_sd() if joint in HINGES else joint_size("joint_centre", joint)
-    return FAULTY * usual if contradicted else usual
-
-
-def hinge_sd() -> float:
-    """Return the standard deviation (m per axis) of the centre of a knee or elbow about where lateral marker and
-    axis place it.
-    """
-    return error_size("hinge_centre", "hinge", state="before")
+    return FAULTY * static_sd(joint) if contradicted else static_sd(joint)
 
 
 @dataclass(frozen=True, eq=False)
