@@ -107,13 +107,14 @@ def test_diagnose_begins_with_its_headline() -> None:
     ],
     ids=("body", "tolerance", "both", "resembled"),
 )
-def test_what_is_strange_alone_is_no_alarm_and_something_left_beside_it_is(reasons: tuple[Reason, ...]) -> None:
+def test_what_is_strange_is_no_alarm_before_a_limit_is_broken(reasons: tuple[Reason, ...]) -> None:
     quiet, why = (replace(LEFT[0], z=1.0),), dict.fromkeys(reasons, ())
     strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, why=why, resembles=(FOUND,))
     for one, level, begins in (
         (strange, "warn", "Nobody can tell whether anything is wrong"),
         (replace(strange, why=why | {Reason.OUTSIDE_EVERY_LABORATORY: ()}), "fail", "Something is wrong"),
-        (replace(strange, adequacy=LEFT, why=why | UNLIKE), "fail", "Something is wrong"),
+        (replace(strange, adequacy=LEFT, why=why | UNLIKE), "warn", "Nobody can tell whether anything is wrong"),
+        (replace(strange, adequacy=LEFT, why=why | UNLIKE | {Reason.LIMIT_BROKEN: ()}), "fail", "Something is wrong"),
     ):
         found = reconcile_with_checks(one, CALM, (STATIC,))
         assert (found.attention[0].level, found.attention[0].text[: len(begins)]) == (level, begins)

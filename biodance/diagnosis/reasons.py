@@ -24,6 +24,8 @@ class Reason(StrEnum):
     """No movement could be compared with a body."""
     MOVEMENT_NOT_JUDGED = "movement not judged"
     """None of the movement could be judged, not even by its steps."""
+    PERSON_UNKNOWN = "person unknown"
+    """Mass or stature is not known, so there is no body."""
     BODY_NOT_SCALED = "body not scaled"
     """No static trial scales the body: its joints lie where stature or one frame of a movement puts them."""
     BODY_DOUBTFUL = "body doubtful"
@@ -63,6 +65,7 @@ DOUBTS = frozenset(
         Reason.ONLY_STANDING,
         Reason.NOT_COMPARED,
         Reason.MOVEMENT_NOT_JUDGED,
+        Reason.PERSON_UNKNOWN,
         Reason.BODY_NOT_SCALED,
         Reason.BODY_DOUBTFUL,
         Reason.UNDESCRIBED_JOINTS,
@@ -91,12 +94,12 @@ OF_RESIDUAL = frozenset(
 
 def status_of(reasons: Collection[Reason], *, named: bool, clean: bool) -> DiagnosisStatus:
     """Return what a diagnosis ends with: whether anything is ``named``, nothing is wrong (``clean``), or why neither
-    is.
+    is. Forces left beside a strange body or stretched tolerances are judged by norms that do not hold there: they prove
+    something wrong only once a limit is broken, or no laboratory is so.
     """
     if named or clean:
         return DiagnosisStatus.NAMED if named else DiagnosisStatus.CLEAN
     if Reason.LIMIT_BROKEN in reasons:
         return DiagnosisStatus.UNKNOWN
-    left = not {Reason.FORCES_LEFT, Reason.OUTSIDE_EVERY_LABORATORY}.isdisjoint(reasons)
-    strange = not left and not STRANGE.isdisjoint(reasons)
+    strange = Reason.OUTSIDE_EVERY_LABORATORY not in reasons and not STRANGE.isdisjoint(reasons)
     return DiagnosisStatus.CANNOT_TELL if strange or not DOUBTS.isdisjoint(reasons) else DiagnosisStatus.UNKNOWN

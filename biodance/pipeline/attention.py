@@ -57,6 +57,8 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
         one = replace(one, verdict="unexplained", why={**against, **one.why})
     if one.verdict == "unexplained" and not any(row.seconds > 0 for row in judged):
         one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
+    if one.verdict == "unexplained" and any(step.name == "subject" and step.status != "done" for step in result.steps):
+        one = replace(one, why={Reason.PERSON_UNKNOWN: (), **one.why})
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
     others = session_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)

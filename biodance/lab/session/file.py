@@ -149,11 +149,11 @@ class SessionFile:
 
     def unused(self, names: list[str]) -> list[str]:
         """Return the keys of ``[trials]`` that fit no trial, each with the closest name: most often a slip of the
-        pen.
+        pen. A pattern (``squat*``) is for what there may be.
         """
         said = []
         for key, _ in self.trials:
-            if not any(fnmatchcase(name.lower(), key.lower()) for name in names):
+            if not set(key) & set("*?[") and not any(fnmatchcase(name.lower(), key.lower()) for name in names):
                 close = get_close_matches(key, names, n=1)
                 hint = f" Did you mean {close[0]!r}?" if close else ""
                 said.append(f"{WARNING}[trials.{key}] fits no recording of the session.{hint}")
