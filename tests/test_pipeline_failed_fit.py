@@ -127,6 +127,7 @@ def test_the_command_says_it_and_writes_and_exports_no_body(failing, monkeypatch
     assert run(["identify", str(tmp_path / "S01"), "--out", str(tmp_path / "out")]) == NEEDS_A_PERSON
     assert "Identification, segments: Not solved." in capsys.readouterr().out
     assert sorted(path.name for path in (tmp_path / "out").glob("[!.]*")) == [
+        "manifest.json",
         "methods.md",
         "report.html",
         "results.json",

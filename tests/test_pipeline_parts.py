@@ -16,7 +16,7 @@ from biodance.motion.quiet_standing import QuietStanding, facing, quiet_run, qui
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.still import bone_lines
 from biodance.pipeline.trial import attempt, marker_fit
-from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult
+from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WeighedBy, Weighing
 from biodance.records import Markers, Motion, Plate, Subject, Trial, Wrench
 from biodance.settings import CheckLimits
 
@@ -174,14 +174,18 @@ def standing(mass: float, ahead: float = 0.0) -> QuietStanding:
     )
 
 
+def weighing(mass: float) -> Weighing:
+    return Weighing(mass, 0.1, WeighedBy.STANDING, ("s",))
+
+
 @pytest.mark.parametrize(("mass", "inside"), [(60.0, True), (61.1, True), (61.3, False), (58.7, False)])
 def test_the_mass_check_allows_two_percent(mass, inside):
-    assert [check.inside for check in mass_check(SUBJECT, standing(mass), CheckLimits())] == [inside]
+    assert [check.inside for check in mass_check(SUBJECT, weighing(mass), CheckLimits())] == [inside]
 
 
 def test_what_is_not_known_is_not_checked():
-    assert mass_check(Subject(float("nan"), 1.7, "F"), standing(60.0), CheckLimits()) == []
-    assert mass_check(Subject(60.0, 1.7, "F", guessed=("mass",)), standing(60.0), CheckLimits()) == []
+    assert mass_check(Subject(float("nan"), 1.7, "F"), weighing(60.0), CheckLimits()) == []
+    assert mass_check(Subject(60.0, 1.7, "F", guessed=("mass",)), weighing(60.0), CheckLimits()) == []
     assert mass_check(SUBJECT, None, CheckLimits()) == []
     assert standing_check(None, CheckLimits()) == []
 
@@ -193,7 +197,7 @@ def test_the_standing_check_is_in_millimetres():
 
 def test_the_checks_of_a_trial_name_what_is_outside():
     rng = np.random.default_rng(3)
-    fit = MarkerFit(("A",), np.array([0.01]), np.array([0.09]), 0.01, 0.09)
+    fit = MarkerFit(("A",), np.array([0.01]), np.array([0.12]), 0.01, 0.12)
     gaps = (MarkerGaps("A", 4.0, 0.1), MarkerGaps("B", 8.0, 0.1))
     result = TrialResult(trial("walk"), (Step("compare", "done"),), gaps, fit, None, comparison(rng))
     rows = {check.what: check for check in trial_checks(result, 60.0)}

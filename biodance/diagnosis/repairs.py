@@ -159,7 +159,9 @@ def failed_check(quality: QualityCheck) -> Finding:
 
 
 def named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
-    """Return the diagnosis with what was put right before all else was judged named first."""
+    """Return the diagnosis with what was put right before all else was judged named first; what was only left out of
+    the recordings (`QualityCheck.mended`) comes behind what is wrong in the rest.
+    """
     found = tuple(failed_check(quality) for quality in checks)
     if not found:
         return diagnosis
@@ -168,6 +170,6 @@ def named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: 
     return replace(
         diagnosis,
         verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
-        findings=(*found, *rest),
+        findings=(*rest, *found) if all(quality.mended for quality in checks) else (*found, *rest),
         notes=(*notes, *diagnosis.notes),
     )

@@ -38,8 +38,10 @@ _REACH = 0.15
 """m from where it is expected that a pressure lies at most because a plate is not quite where the file says (five times
 what plates are off in laboratories); what lies farther is of another foot, of plates exchanged or of a wrong sign.
 """
-_EXACT = ("empty_plate", "flight", "standing_twist")
-"""Witnesses of which Newton alone says what they see: plates with nobody on them, somebody who does not turn."""
+_EXACT = ("empty_plate", "flight", "standing_force", "standing_twist")
+"""Witnesses of which Newton alone says what they see: plates with nobody on them; who stands still has a weight, and no
+other force or turn.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,8 @@ plates. Look-alikes: the offset of an empty plate (small beside a person), someb
 a step on the plate.
 """
 
-from biodance.effects._base.left_out import checks_of_defects, without_defects
+from biodance.effects._base.left_out import checks_of_defects
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.records import Trial
 
 
 class DeadPlate(DiscreteEffect):
@@ -21,11 +20,6 @@ class DeadPlate(DiscreteEffect):
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return the plates that readers left out as dead."""
         return checks_of_defects(recorded.session, cls.name, check="plates that measure", quantity="force")
-
-    @classmethod
-    def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
-        """Return the trial, from which the plate was left out."""
-        return without_defects(trial, cls.name)
 
 
 EFFECT = DeadPlate

@@ -6,9 +6,8 @@ the person moves. Look-alikes: an amplifier at its end (one channel, at its extr
 put in front move all forces by as much: that is a time delay, and named as one.
 """
 
-from biodance.effects._base.left_out import checks_of_defects, without_defects
+from biodance.effects._base.left_out import checks_of_defects
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
-from biodance.records import Trial
 
 
 class Padding(DiscreteEffect):
@@ -22,11 +21,6 @@ class Padding(DiscreteEffect):
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
         """Return what readers left out as padding."""
         return checks_of_defects(recorded.session, cls.name, check="ends of the recordings", quantity="time")
-
-    @classmethod
-    def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
-        """Return the trial, which holds no padding any more."""
-        return without_defects(trial, cls.name)
 
 
 EFFECT = Padding

@@ -166,7 +166,7 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
         "pairs": pairs,
         "factor": f" by a factor of {digits(finding.parameters[0].value, 2)}" if finding.parameters else "",
         "size": size.value or "somewhat",
-        "more": words.more[size.negative],
+        "more": words.more[int(size.negative)],
     }
     where = f" in {listed(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
     plain, fact = (words.fact.format(**shown, between=between) + where for between in ("", size.between))

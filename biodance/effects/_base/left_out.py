@@ -1,9 +1,7 @@
 """What a reader saw and left out of a recording (`records.Defect`), as checks of a cause."""
 
-from dataclasses import replace
-
 from biodance.effects._base.quality_check import QualityCheck
-from biodance.records import Defect, Session, Trial
+from biodance.records import Defect, Session
 
 
 def checks_of_defects(session: Session, effect: str, *, check: str, quantity: str) -> tuple[QualityCheck, ...]:
@@ -20,10 +18,5 @@ def checks_of_defects(session: Session, effect: str, *, check: str, quantity: st
     found = []
     for target, one in first.items():
         text = f"{one.text} ({', '.join(trials[target])})"
-        found.append(QualityCheck(check, False, text, effect, target, one.size, quantity, one.unit))
+        found.append(QualityCheck(check, False, text, effect, target, one.size, quantity, one.unit, mended=True))
     return tuple(found)
-
-
-def without_defects(trial: Trial, effect: str) -> Trial:
-    """Return the trial without the defects of one cause: what was left out stays so, and the rest can be judged."""
-    return replace(trial, defects=tuple(one for one in trial.defects if one.effect != effect))

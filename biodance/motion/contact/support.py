@@ -21,6 +21,8 @@ _LACKS, _ENDS = 0.15, 0.05
 and walks they lack less for more than half of `_LASTING`."""
 _LASTING = 0.4
 """s, at least, that something else carries: delays and impacts are over sooner."""
+_PLAIN = 1.0
+"""s of other times that must agree: a trunk goes otherwise than the whole body for as long as one bend lasts."""
 _RIGHT = 0.1
 """Share of the weight, RMS, within which plates and movement agree at all other times. A late clock, a wrong gain or
 mass is wrong then, too: what carries only at times takes away only at times."""
@@ -84,7 +86,7 @@ def carried_elsewhere(trial: Trial, *, weight: float) -> Mask:
     for first, last in runs(lacks > _ENDS):
         found[first:last] = any(first < stop and start < last for start, stop in long)
     rest = smooth[~found]
-    return found & (rest.size >= _LASTING / step and float(np.sqrt(np.mean(rest**2))) < _RIGHT)
+    return found & (rest.size >= _PLAIN / step and float(np.sqrt(np.mean(rest**2))) < _RIGHT)
 
 
 def share_lacking(trial: Trial, *, weight: float) -> Array:
