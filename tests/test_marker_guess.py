@@ -32,6 +32,15 @@ def test_a_guess_that_the_person_contradicts_is_none() -> None:
     assert guess_set(stand(upside)).name == ""
 
 
+@pytest.mark.parametrize("place", ["asis", "knee_lateral", "heel"])
+def test_two_labels_on_each_others_side_are_what_they_lie_on_and_that_is_said(place: str) -> None:
+    right, left = OWN[f"right_{place}"], OWN[f"left_{place}"]
+    guess = guess_set(stand(OWN | {f"right_{place}": left, f"left_{place}": right}))
+    assert guess.name
+    assert (guess.map[left], guess.map[right]) == (f"right_{place}", f"left_{place}")
+    assert any("lie on each other's sides" in doubt and right in doubt and left in doubt for doubt in guess.doubts)
+
+
 def test_posture_names_what_no_label_says() -> None:
     numbered = {place: f"M{k:02d}" for k, place in enumerate(OWN)}
     guess = guess_set(stand(numbered))

@@ -98,15 +98,20 @@ def _by_names(at: Mapping[str, Array]) -> GuessedSet:
 def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
     """Return the guess for a standing person: what the labels say and the person confirms, then what posture tells."""
     named = _assigned(said, stand.misfit)
+    said, crossed = _as_they_lie(said, named, stand)
+    named = _assigned(said, stand.misfit) if crossed else named
     stand = replace(stand, named=named)
     confirmed = {
         label: tuple(one for one in found if stand.believed(one.place, label)) for label, found in said.items()
     }
     places = _assigned(confirmed, stand.misfit)
     doubts = [
-        f"{label} was not taken for the {one.replace('_', ' ')}: no standing person has it there."
-        for one, label in named.items()
-        if one in LANDMARKS and not confirmed[label]
+        *crossed,
+        *(
+            f"{label} was not taken for the {one.replace('_', ' ')}: no standing person has it there."
+            for one, label in named.items()
+            if one in LANDMARKS and not confirmed[label]
+        ),
     ]
     _take_ends(places, stand, confirmed)
     _take_outer(places, stand, doubts)
@@ -125,6 +130,25 @@ def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
     if reasons:
         return GuessedSet(map_, (" ".join(reasons), *doubts))
     return GuessedSet(map_, tuple(doubts), GUESSED + json.dumps(map_, separators=(",", ":")))
+
+
+def _as_they_lie(
+    said: Mapping[str, tuple[Meaning, ...]], named: Mapping[str, str], stand: Standing
+) -> tuple[Mapping[str, tuple[Meaning, ...]], list[str]]:
+    """Return what the labels say, with two labels of one landmark exchanged where each stands where a person has the
+    other side's, and a sentence for each such pair: what lies on the right is right, whatever it is called.
+    """
+    meant, doubts = dict(said), []
+    for right, a in named.items():
+        left = right.replace("right_", "left_", 1)
+        b = named.get(left) if right.startswith("right_") else None
+        if b is None or stand.believed(right, a) or stand.believed(left, b):
+            continue
+        if stand.believed(right, b) and stand.believed(left, a):
+            meant[a], meant[b] = said[b], said[a]
+            words = right.removeprefix("right_").replace("_", " ")
+            doubts.append(f"{a} and {b} lie on each other's sides: taken for the {words} of the side where they are.")
+    return meant, doubts
 
 
 def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, str], float]) -> dict[str, str]:
