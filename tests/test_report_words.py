@@ -140,7 +140,8 @@ def test_joints_that_stay_are_not_said_to_be_placed(monkeypatch):
     from biodance.pipeline import body as module
 
     static = SimpleNamespace(name="static", role="static")
-    read = (SimpleNamespace(trial=static, usable=True),)
+    walk = SimpleNamespace(name="walk", role="fit", markers=())
+    read = (SimpleNamespace(trial=static, usable=True), SimpleNamespace(trial=walk, usable=True))
     subject = SimpleNamespace(require=lambda *_: None)
     settings = SimpleNamespace(joints="functional", table="de_leva_1996")
     said = []
