@@ -121,9 +121,9 @@ SPOKEN: dict[str, CauseWords] = {
         "a toe marker elsewhere",
     ),
     "frozen_markers": CauseWords(
-        "{pairs} stood still to the last bit: not seen", "Leave gaps open instead.", "frozen markers"
+        "{pairs} stood still to the last bit for a while", "Leave gaps open instead.", "frozen markers"
     ),
-    "marker_spikes": CauseWords("{pairs} jump and come back: not seen", "Fill these frames again.", "spikes"),
+    "marker_spikes": CauseWords("some frames of {pairs} lie far off their way", "Fill these frames again.", "spikes"),
     "padding": CauseWords("the forces begin or end with copies of one value", "Cut them off.", "padding"),
     "unequal_limbs": CauseWords(
         "the legs have unequal masses by {size}", "Say in session.toml what is worn.", "unequal legs"
@@ -171,6 +171,11 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
     where = f" in {listed(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
     plain, fact = (words.fact.format(**shown, between=between) + where for between in ("", size.between))
     return SpokenFinding(plain, fact, words.do)
+
+
+def names_markers(effect: str) -> bool:
+    """Return whether findings of an effect are told by their markers, several together."""
+    return effect in SPOKEN and "{pairs}" in SPOKEN[effect].fact
 
 
 def alternatives(finding: Finding) -> list[str]:

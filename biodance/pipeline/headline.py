@@ -7,7 +7,7 @@ from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.display import digits
-from biodance.pipeline.cause_words import alternatives, spoken
+from biodance.pipeline.cause_words import alternatives, names_markers, spoken
 from biodance.records.attention import LEVELS, Attention, Judged, Level
 
 WORDS = 30
@@ -101,8 +101,8 @@ def _named(one: Diagnosis) -> Iterator[str]:
 
 
 def _together(first: Finding, rest: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return the findings that are told in one breath with the first: labels that are exchanged as well."""
-    return tuple(one for one in rest if one.effect == first.effect == "labels_swapped")
+    """Return the findings that are told in one breath with the first: markers with the same fault."""
+    return tuple(one for one in rest if one.effect == first.effect and names_markers(first.effect))
 
 
 def _either(names: Sequence[str]) -> str:
@@ -118,7 +118,7 @@ def _unknown(one: Diagnosis) -> Iterator[str]:
     row = next((row for row in one.adequacy if row.matters and row.z > LIMIT), None)
     start = "Something is wrong that no known cause explains"
     for about in one.why.get(Reason.LIMIT_BROKEN, ()):
-        yield f"{start}: {about}. Look there."
+        yield f"Something is wrong: {about}. Look there."
     if row is not None:
         off = f"{row.channel} is {row.size:.2g} {row.unit} off"
         yield f"{start}: {off}, most in {row.trial} at {row.second:.1f} s. Look there."
