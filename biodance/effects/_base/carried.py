@@ -17,6 +17,11 @@ from biodance.spatial import wrench_about_point
 _LOADED = 0.02
 """Share of the need under which the place of a plate's pressure says nothing: its centre stands for it."""
 
+_STAYS = 0.25
+"""m that the pelvis goes over the floor where nobody steps: less than a step. Whoever walks treads on each plate once,
+and where the pressure lies over one step says nothing of what the plate reads.
+"""
+
 
 @dataclass(frozen=True)
 class Carried:
@@ -32,11 +37,13 @@ class Carried:
 
 def carried_by_plates(case: Case) -> Carried | None:
     """Return what the plates of a trial carry, over the frames in which the markers show that they alone carry; None
-    without such frames or with fewer than two plates.
+    without such frames, with fewer than two plates, or of somebody who goes over them.
     """
     plates = case.trial.plates
     trunk = trunk_of(case.trial, mass=float(case.phi[::10].sum())) if len(plates) > 1 else None
     if trunk is None or trunk.covered.size != len(case.predicted) or not trunk.covered.any():
+        return None
+    if np.linalg.norm(np.ptp(case.motion.q[trunk.covered, :2], axis=0)) > _STAYS:
         return None
     middle = np.mean([plate.centre for plate in plates], axis=0)
     means = [
