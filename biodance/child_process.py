@@ -5,6 +5,7 @@ of strangers may lie (CWE-427).
 import os
 import subprocess
 import sys
+from multiprocessing import forkserver
 from pathlib import Path
 
 _OWN = str(Path(__file__).resolve().parent.parent)
@@ -35,6 +36,16 @@ def run_python(*arguments: str, timeout: float, input: bytes | None = None) -> "
     )
 
 
-def keep_children_safe() -> None:
-    """Let processes that the standard library starts from now on (forkserver) leave out the working folder, too."""
+def start_forkserver() -> None:
+    """Start the process from which workers are forked: it leaves out the working folder, too. What this process starts
+    otherwise is as before.
+    """
+    before = os.environ.get(_SAFE)
     os.environ[_SAFE] = "1"
+    try:
+        forkserver.ensure_running()
+    finally:
+        if before is None:
+            del os.environ[_SAFE]
+        else:
+            os.environ[_SAFE] = before

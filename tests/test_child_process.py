@@ -35,6 +35,15 @@ def test_no_command_runs_what_lies_in_the_working_folder(planted: Path, words: t
     assert b"Traceback" not in done.stderr
 
 
+def test_what_else_is_started_keeps_its_own_folder(monkeypatch) -> None:
+    from biodance.batch.engines import _process
+
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+    with _process() as pool:
+        assert pool.submit(os.getenv, "PYTHONSAFEPATH").result() == "1"
+    assert "PYTHONSAFEPATH" not in os.environ
+
+
 def test_a_child_imports_biodance_and_nothing_of_the_working_folder(planted: Path, monkeypatch) -> None:
     from biodance.child_process import run_python
 

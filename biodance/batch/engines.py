@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING
 
 from biodance.batch.outcome import Outcome, SessionStatus, SessionTask, Why, untold
-from biodance.child_process import keep_children_safe
+from biodance.child_process import start_forkserver
 from biodance.errors import BiodanceError
 
 if TYPE_CHECKING:
@@ -86,9 +86,9 @@ def _killed(task: SessionTask) -> Outcome:
 
 def _process() -> ProcessPoolExecutor:
     """Return one process that ends with us, even when we are killed."""
-    keep_children_safe()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["biodance.pipeline.front", "biodance.report.write"])
+    start_forkserver()
     return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
 
 
