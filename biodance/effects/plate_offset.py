@@ -35,6 +35,7 @@ class PlateOffset(ChannelEffect):
     """A constant ``offset`` (N or N·m) about the plate's centre in channel ``target``."""
 
     name = "plate_offset"
+    prior = 0.04
     parameters = (Parameter("offset", "N or N·m", 5.0, "re-zeroing rule of +-5 N in laboratory guides (Codamotion)"),)
     separated_by = "Postures of different weight on the plate: squats, one leg, sitting down beside it."
     advice = "Record the empty plate before and after, and re-zero it."
