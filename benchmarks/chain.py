@@ -58,10 +58,10 @@ def dance_of(folder: Path, name: str, way: str) -> Dance:
     """Return the dance of a body, from the folder if it is there."""
     path = path_of(folder, name, way)
     if not path.exists():
-        subject = BODIES[name][0]
-        plan = read_plan("full" if way == "full" else "short")
-        plan = replace(plan, instructions=np.inf, simplicity=0.0)
-        dance, _ = design(dancer(subject, plan), plan, seed=0)
+        if way not in ("free", "full"):
+            raise SystemExit(f"There is no {path}. Design it first: python -m benchmarks dance {folder}")
+        plan = replace(read_plan("full" if way == "full" else "short"), instructions=np.inf, simplicity=0.0)
+        dance, _ = design(dancer(BODIES[name][0], plan), plan, seed=0)
         path.parent.mkdir(exist_ok=True)
         dance.save(path)
     return Dance.load(path)
