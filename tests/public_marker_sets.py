@@ -17,6 +17,7 @@ from biodance.records import Array, Markers, Trial
 
 SETS = read_toml(Path(__file__).with_name("public_marker_sets.toml"))
 SIDES = {"R": "right", "L": "left"}
+CHILDREN = ("030", "031", "032", "038", "044", "050", "055")
 PREFIXES = ("Subject01:", "", "P07_", "")
 SPREAD = 0.01
 """m: a second marker at one landmark is glued so far from the first (normal)."""
@@ -163,7 +164,7 @@ def carried(still: Person, moving: Person, place: str, path: Array) -> Array:
 def people_of(data: Path) -> dict[str, Person]:
     """Return the nine persons of BIODANCE_DATA who stand, by the name of the trial."""
     files = [
-        *sorted(data.glob("biomechzoo/*/*01.c3d")),
+        *(data / f"biomechzoo/HC{n}A/HC{n}A01.c3d" for n in CHILDREN),
         data / "pycgm/Static_trial.c3d",
         data / "adl_gait/2014001_ST.c3d",
     ]

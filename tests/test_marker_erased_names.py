@@ -69,7 +69,7 @@ def people() -> list[Person]:
 
 
 @pytest.mark.parametrize(
-    ("parts", "guessed"), [((), 95), (("numbers",), 40), (("sides",), 65), (("knee",), 90), (("toe",), 90)]
+    ("parts", "guessed"), [((), 84), (("numbers",), 39), (("sides",), 60), (("knee",), 83), (("toe",), 83)]
 )
 def test_of_labels_that_say_less_next_to_nothing_false_is_guessed(
     people: list[Person], parts: tuple[str, ...], guessed: int
