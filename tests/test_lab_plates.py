@@ -8,7 +8,7 @@ from plate_emulator import RATE, Emulated, channels, random_pose, raw_file, step
 
 from biodance.errors import TrialRefused
 from biodance.lab.plates.read import read_plates, total_wrench
-from biodance.lab.plates.wrench import centre_of_pressure
+from biodance.lab.plates.sense import centre_of_pressure
 from biodance.records import Markers
 
 POLYNOMIAL = np.array([[1e-17, -5e-12, 3e-7, -2e-12, 4e-7, -1e-2], [2e-17, -2e-12, -7e-7, -1e-12, 5e-7, 2e-2]])

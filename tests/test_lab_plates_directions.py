@@ -7,7 +7,7 @@ import pytest
 from plate_emulator import RATE, Emulated, channels, raw_file, step, yaw
 
 from biodance.lab.plates.read import read_plates
-from biodance.lab.plates.wrench import sway_sign
+from biodance.lab.plates.sense import sway_sign
 from biodance.records import Markers
 
 HEIGHT, MASS = 0.95, 70.0
