@@ -15,9 +15,9 @@ from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, read_raw
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import PlateRecording
-from biodance.lab.plates.decode import decode_plate
+from biodance.lab.plates.decode import decode_plates
 from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters
-from biodance.lab.plates.sense import gravity_sign, sensor_below, with_load_on_plate
+from biodance.lab.plates.sense import gravity_sign, sensor_below, with_loads_on_plates
 from biodance.records import Array, Markers
 from biodance.virtual_lab.recording.laboratory import Fault, Recording
 
@@ -99,7 +99,8 @@ def _plates(raw: RawC3d, axes: _Axes) -> tuple[_Stored, ...]:
         signals = raw.analog[:, columns] * (factors if plate.type == 2 else 1.0)
         matrix = None if plate.calibration is None else plate.calibration * factors[:, None]
         corners = axes.lab(plate.corners)
-        reading = with_load_on_plate(decode_plate(raw, plate, metres=axes.metres, turn=axes.turn))
+        decoded = decode_plates(raw, [plate], metres=axes.metres, turn=axes.turn, mass=None)
+        (reading,), _ = with_loads_on_plates(decoded.readings)
         origin = sensor_below(reading.vector, reading.axes)[0]
         recording = PlateRecording(plate.type, corners, origin, signals, calibration=matrix)
         sign = -1.0 if gravity_sign(reading.sensor[reading.loaded], reading.axes) < 0 else 1.0

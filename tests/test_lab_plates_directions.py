@@ -44,19 +44,20 @@ def file_of(plate, truth, order):
 
 def test_sway_tells_reaction_from_load():
     plate = Emulated(centre=np.zeros(3), rotation=np.eye(3))
-    truth, _, _ = standing(plate)
-    assert sway_sign(truth, RATE) == 1
-    assert sway_sign(-truth, RATE) == -1
-    assert sway_sign(np.hstack([truth[:, :1], -truth[:, 1:]]), RATE) == 0
-    assert sway_sign(truth[: int(2.2 * RATE)], RATE) == 0
-    assert sway_sign(np.zeros((4000, 6)), RATE) == 0
+    truth, point, _ = standing(plate)
+    force = truth[:, :3]
+    assert sway_sign(force, point, RATE) == 1
+    assert sway_sign(-force, point, RATE) == -1
+    assert sway_sign(force * [1, -1, -1], point, RATE) == 0  # x and y disagree
+    assert sway_sign(force[: int(2.2 * RATE)], point[: int(2.2 * RATE)], RATE) == 0
+    assert sway_sign(np.zeros((4000, 3)), np.zeros((4000, 3)), RATE) == 0
 
 
 def test_sway_is_not_seen_where_nobody_sways():
     rng = np.random.default_rng(0)
     for _ in range(20):
-        noise = np.column_stack([rng.normal(0, 2, (4000, 2)), np.full(4000, 700.0), rng.normal(0, 2, (4000, 3))])
-        assert sway_sign(noise, RATE) == 0
+        force = np.column_stack([rng.normal(0, 2, (4000, 2)), np.full(4000, 700.0)])
+        assert sway_sign(force, rng.normal(0, 2 / 700, (4000, 3)), RATE) == 0
 
 
 @pytest.mark.parametrize("reaction", [True, False])

@@ -1,6 +1,4 @@
-"""What of force plates is no measurement: numbers that were scaled already, dead plates, padding at the ends of the
-recording.
-"""
+"""What of force plates is no measurement: dead plates, and padding at the ends of the recording."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,18 +8,12 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.still import movement
-from biodance.lab.plates.decode import LARGEST_SHARE, PlateReading, block_means
+from biodance.lab.plates.decode import LARGEST_SHARE, PlateReading
 from biodance.records import Array, Defect, Markers, Mask
-from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE, StandingRules
+from biodance.settings import TOUCH_FORCE, StandingRules
 
 FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle included
 _AROUND = 0.05  # m by which a sole reaches beyond its markers
-
-_OFF = 0.5
-"""Share of the weight (or its inverse) from which on the scale is doubted; a foot beside the plates costs less."""
-_WHOLE = 0.15
-"""Share by which what the plates carry without the scale may differ from the weight: shoes, clothes, movement."""
-_SOMEBODY_ON = 0.3  # share of the largest total force from which on somebody stands on the plates
 
 _STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
 _SAME_PLACE = 0.001
@@ -42,46 +34,6 @@ coarse converter does at rest, all of them repeat it four times in six of a hund
 def left_out_said(number: int, why: TrialRefused | str) -> str:
     """Return the sentence that a plate is not used."""
     return f"Plate {number} was left out, and what it carried is missing from the total: {why}"
-
-
-def scale_in_doubt(raw: RawC3d, readings: Sequence[PlateReading], mass: float | None) -> bool:
-    """Return whether the scale was perhaps applied twice: floating-point numbers with a scale, and not the weight of
-    ``mass`` kg on the plates.
-    """
-    used = [column for reading in readings for column in reading.plate.channels]
-    if raw.layout is None or not raw.layout.floating or not used or not mass or not mass > 0:
-        return False
-    gain = raw.layout.gain[used]
-    return bool(np.isfinite(gain).all() and (gain != 1).any() and not _OFF < _weight_share(readings, mass) < 1 / _OFF)
-
-
-def unscaled(raw: RawC3d) -> RawC3d:
-    """Return the file with its analog numbers as stored, without OFFSET, SCALE and GEN_SCALE."""
-    assert raw.layout is not None
-    gain = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
-    return replace(raw, analog=raw.analog / gain + raw.layout.offset)
-
-
-def already_scaled(scaled: Sequence[PlateReading], plain: Sequence[PlateReading], mass: float) -> str:
-    """Return why the numbers are believed as stored (``plain``) and not times the scale; "" where they are not.
-
-    The evidence is the weight: as stored, the plates carry all of it.
-    """
-    share, whole = _weight_share(scaled, mass), _weight_share(plain, mass)
-    if len(plain) < len(scaled) or abs(whole - 1) > _WHOLE:
-        return ""
-    return (
-        f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
-        f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
-        f"ANALOG:SCALE, or export the file again."
-    )
-
-
-def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
-    """Return the median of the total vertical force while somebody is on the plates over the weight of ``mass`` kg."""
-    total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
-    loaded = total >= _SOMEBODY_ON * total.max()
-    return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
 
 
 def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[Defect]]:
@@ -159,9 +111,12 @@ def _course(reading: PlateReading, length: float) -> tuple[float, float, float]:
     """Return the mean vertical force N along the plate's z, and the standard deviations of its means over ``length`` s
     (0 = of the samples) and of those of the worse of both tilting moments, N·m.
     """
-    sensor = reading.sensor[reading.known]
-    vertical, *moments = (block_means(sensor[:, k], reading.rate, length=length)[0] for k in (2, 3, 4))
-    return float(vertical.mean()), float(vertical.std()), max(float(one.std()) for one in moments)
+    sensor = reading.sensor[reading.known, 2:5]
+    size = min(max(1, round(length * reading.rate)), len(sensor))
+    count = len(sensor) // size
+    means = sensor[: count * size].reshape(count, size, 3).mean(axis=1)
+    level, (spread, *wanders) = float(means[:, 0].mean()), means.std(axis=0)
+    return level, float(spread), float(max(wanders))
 
 
 def without_padding(

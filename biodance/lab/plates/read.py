@@ -13,17 +13,10 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.still import movement, steady_mass
-from biodance.lab.plates.decode import PlateReading, decode_plate
-from biodance.lab.plates.left_out import (
-    already_scaled,
-    left_out_said,
-    scale_in_doubt,
-    unscaled,
-    without_dead,
-    without_padding,
-)
-from biodance.lab.plates.parameters import POUND, DeclaredPlates, declared_plates
-from biodance.lab.plates.sense import sense_plates, with_load_on_plate
+from biodance.lab.plates.decode import decode_plates
+from biodance.lab.plates.left_out import left_out_said, without_dead, without_padding
+from biodance.lab.plates.parameters import POUND, declared_plates
+from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
 from biodance.lab.plates.told import ToldPlate
 from biodance.records import Array, Defect, Markers, Plate, Wrench
 from biodance.settings import CheckLimits, StandingRules
@@ -62,13 +55,12 @@ def read_plates(
     """
     turn = np.eye(3) if turn is None else turn
     declared = declared_plates(raw, told or {}, metres=metres, turn=turn)
-    readings, refused = _readings(raw, declared, metres, turn)
-    if body_mass and scale_in_doubt(raw, readings, body_mass):
-        plain, refused_plain = _readings(unscaled(raw), declared, metres, turn)
-        if scaled := already_scaled(readings, plain, body_mass):
-            readings, refused = plain, (scaled, *refused_plain)
+    decoded = decode_plates(raw, declared.plates, metres=metres, turn=turn, mass=body_mass)
+    readings, beside = with_loads_on_plates(decoded.readings)
+    refused = {**declared.refused, **decoded.refused, **beside}
+    warnings = (*declared.warnings, *decoded.warnings, *(left_out_said(n, refused[n]) for n in sorted(refused)))
     if not readings:
-        return ReadPlates((), (*declared.warnings, *refused), declared.history)
+        return ReadPlates((), warnings, declared.history)
     readings, dead = without_dead(readings, markers)
     readings, padded = without_padding(raw, readings, markers)
     start = float(markers.time[0]) if markers is not None and markers.time.size else 0.0
@@ -76,21 +68,7 @@ def read_plates(
     defects = (*dead, *padded)
     followed = (f"{one.plate.name}: {one.plate.told.sentence}" for one in readings if one.plate.told.sentence)
     history = (*declared.history, *followed, *(one.text for one in defects))
-    warned = (*declared.warnings, *refused, *said, *_weight_said(plates, markers, body_mass))
-    return ReadPlates(plates, warned, history, defects)
-
-
-def _readings(
-    raw: RawC3d, declared: DeclaredPlates, metres: float, turn: Array
-) -> tuple[list[PlateReading], tuple[str, ...]]:
-    """Return the readings of the plates that make sense and a sentence for each of the others."""
-    readings, refused = [], dict(declared.refused)
-    for plate in declared.plates:
-        try:
-            readings.append(with_load_on_plate(decode_plate(raw, plate, metres=metres, turn=turn)))
-        except TrialRefused as error:
-            refused[plate.number] = str(error)
-    return readings, tuple(left_out_said(number, why) for number, why in sorted(refused.items()))
+    return ReadPlates(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
 
 
 def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
@@ -108,7 +86,10 @@ def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
 def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: float | None) -> tuple[str, ...]:
     """Return a warning if the weight in quiet standing contradicts the declared mass."""
     walks = markers is not None and movement(markers) > StandingRules.still
-    mass = steady_mass(total_wrench(plates)) if plates and not walks else None
+    if not plates or walks:
+        return ()
+    total = total_wrench(plates)
+    mass = steady_mass(total)
     if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= CheckLimits.mass / 100:
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"

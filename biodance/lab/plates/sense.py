@@ -12,7 +12,7 @@ from biodance.errors import TrialRefused
 from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, PlateReading
 from biodance.lab.plates.left_out import FOOT_HEIGHT, left_out_said
 from biodance.lab.plates.parameters import CONTENT, FOUR_SENSORS
-from biodance.records import CHANNELS, Array, Markers, Plate, Wrench, longest_run
+from biodance.records import CHANNELS, Array, Markers, Mask, Plate, Wrench, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
 
@@ -58,7 +58,7 @@ def surface_wrench(reading: PlateReading) -> tuple[Array, Said]:
     wrench = wrench_about_point(reading.sensor, below)
     if reading.plate.polynomial is None:
         return wrench, (said,)
-    point = 1000 * centre_of_pressure(wrench)
+    point = 1000 * zero_moment_point(wrench, threshold=COP_FORCE)[:, :2]
     point[np.abs(point) > 1000 * FARTHEST_PRESSURE] = np.nan
     error = np.zeros((len(point), 3))
     for i, p in enumerate(reading.plate.polynomial):
@@ -69,9 +69,10 @@ def surface_wrench(reading: PlateReading) -> tuple[Array, Said]:
     return corrected, (said, "The maker's correction of the centre of pressure (FPCOPPOLY) was applied.")
 
 
-def centre_of_pressure(wrench: Array) -> Array:
-    """Return the centre of pressure (S, 2) m on the surface from a wrench (S, 6) about its centre; NaN below 20 N."""
-    return zero_moment_point(wrench, threshold=COP_FORCE)[:, :2]
+def pressure_point(reading: PlateReading) -> Array:
+    """Return the centre of pressure (S, 3) m from the centre of the surface, plate axes; NaN below 20 N."""
+    wrench, _ = surface_wrench(reading)
+    return zero_moment_point(wrench, threshold=COP_FORCE)
 
 
 def sensor_below(vector: Array, axes: Array) -> tuple[Array, str]:
@@ -95,34 +96,36 @@ def sensor_below(vector: Array, axes: Array) -> tuple[Array, str]:
     return np.array([x, y, -z]), f"{said}."
 
 
-def with_load_on_plate(reading: PlateReading) -> PlateReading:
-    """Return the reading with ORIGIN's x, y turned by 180 degrees, and the moments in another unit (times 1000 or
-    0.001), each only where that alone puts the load on the plate.
+def with_loads_on_plates(readings: Sequence[PlateReading]) -> tuple[list[PlateReading], dict[int, str]]:
+    """Return the readings with ORIGIN's x, y turned by 180 degrees, and the moments in another unit (times 1000 or
+    0.001), each only where that alone puts the load on the plate; and by number why others are refused: the load lies
+    beside the plate and the file does not say the units, or a channel reads more than any plate measures.
 
     Treadmills write ORIGIN from the surface centre to the sensor (x, y up to 1 m); z has a test of its own
     (`sensor_below`).
-
-    Raises
-    ------
-    TrialRefused
-        The load lies beside the plate and the file does not say the units, or a channel reads more than any plate
-        measures.
     """
-    if (loaded := reading.loaded).any():
-        reading = _with_origin_turned(reading, loaded)
-        reading = _with_moments_in_unit(reading, loaded)
-    largest = np.abs(reading.sensor).max(axis=0, initial=0.0)
-    worst = int(np.argmax(largest))
-    if largest[worst] > _STRONGEST:
-        raise TrialRefused(
+    fit, refused = [], {}
+    for reading in readings:
+        try:
+            if (loaded := reading.loaded).any():
+                reading = _with_moments_in_unit(_with_origin_turned(reading, loaded), loaded)
+        except TrialRefused as error:
+            refused[reading.plate.number] = str(error)
+            continue
+        largest = np.abs(reading.sensor).max(axis=0, initial=0.0)
+        worst = int(np.argmax(largest))
+        if largest[worst] <= _STRONGEST:
+            fit.append(reading)
+            continue
+        refused[reading.plate.number] = (
             f"{CHANNELS[worst]} reads up to {largest[worst]:.3g} {'N' if worst < 3 else 'N·m'}; no plate measures more "
             f"than {_STRONGEST:g}. Check the channels {', '.join(str(c + 1) for c in reading.plate.channels)}, their "
             f"ANALOG:SCALE and units."
         )
-    return reading
+    return fit, refused
 
 
-def _with_origin_turned(reading: PlateReading, loaded: Array) -> PlateReading:
+def _with_origin_turned(reading: PlateReading, loaded: Mask) -> PlateReading:
     """Return the reading, ORIGIN x, y turned where only that puts the load on the plate."""
     x, y, _ = reading.vector
     if reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < _LEAST_BESIDE:
@@ -139,14 +142,14 @@ def _with_origin_turned(reading: PlateReading, loaded: Array) -> PlateReading:
     return replace(reading, vector=vector, decisions=decisions)
 
 
-def _with_moments_in_unit(reading: PlateReading, loaded: Array) -> PlateReading:
+def _with_moments_in_unit(reading: PlateReading, loaded: Mask) -> PlateReading:
     """Return the reading with moments in the unit, declared or else only one, that puts the load on the plate."""
     plate, pressed, inside, good = reading.plate, reading.sensor[loaded], 0.0, []
     for factor in _MOMENT_UNITS if "M" in CONTENT[plate.type] else _MOMENT_UNITS[:1]:
         tried = pressed * np.array([1, 1, 1, factor, factor, factor])
         share = _share_on_plate(replace(reading, sensor=tried))
         # moments that are 1000 times too small lie on every plate: at its centre, where nobody's pressure stays
-        lives = float(np.percentile(np.abs(centre_of_pressure(tried)).max(axis=1), 90)) > _STILLEST
+        lives = float(np.percentile(np.abs(zero_moment_point(tried, threshold=COP_FORCE)).max(axis=1), 90)) > _STILLEST
         if share >= _INSIDE and lives:
             good.append(factor)
         if factor == 1.0:
@@ -176,7 +179,7 @@ def _with_moments_in_unit(reading: PlateReading, loaded: Array) -> PlateReading:
 
 def _share_on_plate(reading: PlateReading) -> float:
     """Return the share of the samples whose centre of pressure lies on the plate."""
-    point = centre_of_pressure(surface_wrench(reading)[0])
+    point = pressure_point(reading)[:, :2]
     return float((np.abs(point) <= reading.half + EDGE).all(axis=1).mean())
 
 
@@ -190,27 +193,28 @@ def gravity_sign(pressed: Array, axes: Array) -> int:
     return int(np.sign((pressed[:, :3] @ axes[2]).sum()))
 
 
-def sway_sign(wrench: Array, rate: float) -> int:
+def sway_sign(force: Array, point: Array, rate: float) -> int:
     """Return +1 if a standing person's shear shows that the reaction was recorded, -1 for the load, 0 if it cannot be
     told.
 
     A person who stands is an inverted pendulum: the ground's shear on the person is opposite to the quick part of the
-    centre of pressure, F = -(m g / h) (CoP - CoM), whatever the sign of the vertical channel. Needs 2.5 s of standing
-    on this one plate (vertical within 5 %), and both axes must agree in sign, correlate by at least 0.4 and have a
-    slope between 0.25 and 3 per metre.
+    centre of pressure, ``F = -(m g / h) (CoP - CoM)``, whatever the sign of the vertical channel. Needs 2.5 s of
+    standing on this one plate (vertical within 5 %), and both axes must agree in sign, correlate by at least 0.4 and
+    have a slope between 0.25 and 3 per metre.
+
+    ``force`` (S, 3) N and ``point`` (S, 3) m, the centre of pressure, in the same axes; ``rate`` Hz.
     """
-    part = _standing(wrench[:, 2], rate)
+    part = _standing(force[:, 2], rate)
     if part is None:
         return 0
-    point = centre_of_pressure(wrench[part])
     signs = []
     for axis in (0, 1):
-        shear, cop = _band(wrench[part, axis], rate), _band(point[:, axis], rate)
+        shear, cop = _band(force[part, axis], rate), _band(point[part, axis], rate)
         power = float(cop @ cop)
         if power <= 0 or not shear.any():
             return 0
         correlation = float(shear @ cop / np.sqrt(power * float(shear @ shear)))
-        slope = abs(float(shear @ cop)) / power / abs(float(wrench[part, 2].mean()))
+        slope = abs(float(shear @ cop)) / power / abs(float(force[part, 2].mean()))
         if abs(correlation) < _SWAY_CORRELATION or not _SWAY_SLOPE[0] <= slope <= _SWAY_SLOPE[1]:
             return 0
         signs.append(-np.sign(correlation))
@@ -323,7 +327,7 @@ def _in_lab(
     """
     reading, moved = _with_origin_under_feet(reading, time, markers)
     wrench, said = surface_wrench(reading)
-    sway = sway_sign(wrench, reading.rate) if alone and sign else 0
+    sway = sway_sign(wrench[:, :3], pressure_point(reading), reading.rate) if alone and sign else 0
     seen, doubt, fz_alone = "", "", False
     if sway and sway != sign and reading.axes[2, 2] > 0:
         reading, seen = _unmirrored(reading, time, markers)
@@ -344,10 +348,10 @@ def _in_lab(
             wrench = wrench * np.array([1, 1, 1, 1, 1, -1])
             checked, doubt = _FZ_ALONE, f"{_FZ_ALONE} Check its cabling."
         doubts += [doubt] * bool(doubt)
+    told = (text for text in (*moved, *said, seen, checked, _sign_said(sign, otherwise)) if text)
     value = wrench_in_lab(wrench, reading.axes, sign or otherwise, reading.corners.mean(axis=0))
     value[~reading.known] = np.nan
     value.setflags(write=False)  # the record keeps it without a copy
-    told = (text for text in (*moved, *said, seen, checked, _sign_said(sign, otherwise)) if text)
     zero = (sign or otherwise) * reading.axes @ reading.empty
     plate, steps = reading.plate, reading.decisions
     where = (plate.name, plate.type, reading.corners, Wrench(time, value))
@@ -450,7 +454,7 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
         return None
     frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))
     at = np.clip(np.searchsorted(time, markers.time[frames]), 0, time.size - 1)
-    point = centre_of_pressure(surface_wrench(replace(reading, sensor=reading.sensor[at]))[0])
+    point = pressure_point(replace(reading, sensor=reading.sensor[at]))[:, :2]
     centre, reach = reading.corners.mean(axis=0), float(np.linalg.norm(reading.half)) + _BESIDE
     cop, xyz = centre[:2] + point @ reading.axes[:2, :2].T, markers.xyz[frames]
     low = np.abs(xyz[:, :, 2] - centre[2]) <= FOOT_HEIGHT
