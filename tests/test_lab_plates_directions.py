@@ -137,6 +137,18 @@ def test_load_far_from_the_feet_is_warned_about():
     assert "from the feet that the markers show" in warnings[0]
 
 
+@pytest.mark.parametrize("reaction", [True, False])
+def test_a_knock_against_a_plate_does_not_turn_the_weight_of_a_person(reaction):
+    """Somebody of 700 N stands for 2 s; before, a hoist pulls the plate up with 2.5 kN for 0.3 s."""
+    plate = Emulated(reaction=reaction)
+    truth, _ = step(np.random.default_rng(0), plate)
+    time = np.arange(len(truth)) / RATE
+    force = np.where((time > 0.4)[:, None] & (time < 0.7)[:, None], [0.0, 0.0, -2500.0], truth[:, :3])
+    pulled = np.hstack([force, np.where(force[:, 2:] < 0, np.cross(plate.centre, force), truth[:, 3:])])
+    plates, *_ = read_plates(raw_file([plate], [channels(plate, pulled)]), metres=0.001)
+    np.testing.assert_allclose(plates[0].wrench.value, pulled, atol=1e-6)
+
+
 def test_shear_of_the_wrong_sign_is_warned_about():
     plate = Emulated(2, centre=np.zeros(3))
     plate.origin = np.zeros(3)
