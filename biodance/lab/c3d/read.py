@@ -6,7 +6,6 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,10 +19,6 @@ from biodance.lab.markers.upright import axis_to_head, clear_axis
 from biodance.lab.plates.corners import is_rectangle
 from biodance.lab.plates.told import Told
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
-
-if TYPE_CHECKING:
-    from biodance.lab.plates.read import ReadPlates
-
 
 _CLOUD = 6
 """Markers that show how a body lies."""
@@ -66,6 +61,8 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     >>> biodance.read_c3d("visit/static.c3d", role="static").markers
     Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
     """
+    from biodance.lab.plates.read import read_plates
+
     raw = read_raw(path)
     poses = poses_only(raw)
     if poses and not raw.analog.size:
@@ -76,7 +73,7 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     measures, measure_history, measure_warnings = measurements_of(raw)
     told = told or Told()
     mass = measures.get("Bodymass") if told.mass is None else told.mass
-    read = _plates(raw, metres, turn, markers, mass, told)
+    read = read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=mass, told=told.plates)
     rate = raw.rate if markers is not None else math.nan
     worn = known.name if known is not None and markers is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
@@ -149,14 +146,6 @@ def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None
             f"again."
         )
     return Markers(labels.names, np.arange(len(points)) / (raw.rate if math.isfinite(raw.rate) else 1.0), points)
-
-
-def _plates(
-    raw: RawC3d, metres: float, turn: Array, markers: Markers | None, mass: float | None, told: Told
-) -> "ReadPlates":
-    from biodance.lab.plates.read import read_plates
-
-    return read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=mass, told=told.plates)
 
 
 def _gaps(markers: Markers | None) -> tuple[str, ...]:
