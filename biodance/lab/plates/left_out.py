@@ -61,9 +61,7 @@ def _borne_elsewhere(reading: PlateReading, others: Sequence[PlateReading], mark
 
 
 def _feet_on(reading: PlateReading, markers: Markers) -> bool:
-    """Return whether a marker as low as a standing foot's is ever over the plate, or no more
-    than 0.05 m beside it.
-    """
+    """Return whether a marker as low as a standing foot's is ever over the plate, or no more than 0.05 m beside it."""
     centre = reading.corners.mean(axis=0)
     x, y, _ = (reading.axes[:, k] @ np.moveaxis(markers.xyz - centre, -1, 0).reshape(3, -1) for k in range(3))
     low = np.abs(markers.xyz[..., 2] - centre[2]).ravel() <= FOOT_HEIGHT

@@ -463,6 +463,7 @@ def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | N
     if seen.sum() < max(1, min(5, len(cop))):
         return None
     point, near, feet = cop[seen], near[seen], np.where(near[:, :, None], xyz[:, :, :2], np.inf)[seen]
+    # the markers near the plate first, so that no more columns are left than feet were ever seen there
     first = np.argsort(~near, axis=1, kind="stable")[:, : near.sum(axis=1).max(), None]
     return float(np.median(_distances_between(point, np.take_along_axis(feet, first, axis=1))))
 
@@ -474,6 +475,7 @@ def _distances_between(points: Array, feet: Array) -> Array:
     with np.errstate(invalid="ignore"):  # feet that are not there give NaN
         x, y = away[:, i, 0], away[:, i, 1]
         ax, ay = away[:, j, 0] - x, away[:, j, 1] - y
+        # where on the segment the foot of the perpendicular from the point lies: 0 at one marker, 1 at the other
         share = np.clip(-(x * ax + y * ay) / np.maximum(ax * ax + ay * ay, 1e-12), 0, 1)
         square = (x + share * ax) ** 2 + (y + share * ay) ** 2
     return np.sqrt(np.where(np.isnan(square), np.inf, square).min(axis=1))
