@@ -15,10 +15,9 @@ from biodance.lab.c3d.parameters import DEC, MIPS, floats, integers, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, read_raw
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import PlateRecording
-from biodance.lab.plates.corners import plate_axes
-from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters, unit_factors
-from biodance.lab.plates.signals import vector_under_load
-from biodance.lab.plates.wrench import gravity_sign, sensor_below
+from biodance.lab.plates.decode import decode_plates
+from biodance.lab.plates.parameters import PlateParameters, count_plates, plate_parameters
+from biodance.lab.plates.sense import gravity_sign, sensor_below, with_loads_on_plates
 from biodance.records import Array, Markers
 from biodance.virtual_lab.recording.laboratory import Fault, Recording
 
@@ -90,22 +89,21 @@ def inject(path_in: Path, path_out: Path, fault: Fault) -> Path:
 def _plates(raw: RawC3d, axes: _Axes) -> tuple[_Stored, ...]:
     out = []
     for number in range(1, count_plates(raw)[0] + 1):
-        plate = plate_parameters(raw, number)
+        plate = plate_parameters(raw, number, metres=axes.metres, turn=axes.turn)
         if plate.type not in (2, 4):
             raise BiodanceError(
                 f"{raw.path}: plate {number} is of TYPE {plate.type}; faults are written into TYPE 2 and 4."
             )
         columns = list(plate.channels)
-        units = tuple(raw.analog_units[c] for c in columns)
-        factors = np.array(unit_factors(plate, units, metres=axes.metres)[0])
+        factors = np.array(plate.factors)
         signals = raw.analog[:, columns] * (factors if plate.type == 2 else 1.0)
         matrix = None if plate.calibration is None else plate.calibration * factors[:, None]
         corners = axes.lab(plate.corners)
-        wrench = signals if matrix is None else signals @ matrix.T
-        vector = vector_under_load(plate, wrench, plate.origin * axes.metres, corners, raw.analog_rate)[0]
-        origin = sensor_below(vector, plate_axes(corners))[0]
+        decoded = decode_plates(raw, [plate], metres=axes.metres, turn=axes.turn, mass=None)
+        (reading,), _ = with_loads_on_plates(decoded.readings)
+        origin = sensor_below(reading.vector, reading.axes)[0]
         recording = PlateRecording(plate.type, corners, origin, signals, calibration=matrix)
-        sign = -1.0 if gravity_sign(wrench, plate_axes(corners), raw.analog_rate) < 0 else 1.0
+        sign = -1.0 if gravity_sign(reading.sensor[reading.loaded], reading.axes) < 0 else 1.0
         out.append(_Stored(plate, factors, sign, replace(recording, channels=sign * signals)))
     return tuple(out)
 

@@ -84,9 +84,9 @@ def test_words_nobody_knows_are_told_by_where_the_markers_are() -> None:
 def test_the_only_way_to_stand_is_up() -> None:
     numbered = {place: f"M{k:02d}" for k, place in enumerate((*OWN, "c7", "jugular_notch"))}
     upright = stand(numbered)
-    assert axis_to_head(upright) == pytest.approx([0.0, 0.0, 1.0])
+    assert axis_to_head(upright, None) == pytest.approx([0.0, 0.0, 1.0])
     lying = Markers(upright.names, upright.time, upright.xyz[..., [1, 2, 0]])
-    assert axis_to_head(lying) == pytest.approx([0.0, 1.0, 0.0])
+    assert axis_to_head(lying, None) == pytest.approx([0.0, 1.0, 0.0])
 
 
 SPEAKERS = {

@@ -22,7 +22,7 @@ USUAL_ZERO, VERTICAL_ZERO = 7.0, 18.0
 """N of horizontal and of vertical zero up to which laboratories have one without calling it a fault: public recordings
 have up to 6 and 16, and readers take the vertical off."""
 _EMPTY = 30.0
-"""N of vertical force within which a plate may be empty: larger zeros are found by the readers (`lab.plates.zero`)."""
+"""N of vertical force within which a plate may be empty: larger zeros are found by the readers (`find_baseline`)."""
 _RINGS, _SHORTEST = 0.02, 0.03
 """s at each end of an empty stretch in which a plate rings or is touched, and s of what is left: a flight of a slow run
 lasts 0.08 s."""

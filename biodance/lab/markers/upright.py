@@ -9,7 +9,7 @@ import numpy as np
 from biodance.lab.markers.names import meanings, meanings_of
 from biodance.lab.markers.person import person_of
 from biodance.lab.markers.set_file import LANDMARKS, segment_of
-from biodance.lab.markers.sets import landmark, recognise
+from biodance.lab.markers.sets import MarkerSet, landmark
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.still import median_places, quietest
 from biodance.records import Array, Markers, spread_frames
@@ -26,11 +26,10 @@ _CLEAR = 2.0
 """A direction counts if its largest component is so many times the others."""
 
 
-def axis_to_head(markers: Markers) -> Array | None:
+def axis_to_head(markers: Markers, known: MarkerSet | None) -> Array | None:
     """Return the signed coordinate axis (3,) from the feet to the head or pelvis in most frames; None if the labels or
-    the posture do not tell it, in frames spread over the recording.
+    the posture do not tell it, in frames spread over the recording. ``known`` is the set of the labels (`recognise`).
     """
-    known = recognise(markers.names)
     few = replace(markers, time=spread_frames(markers.time), xyz=spread_frames(markers.xyz))
     ends = [
         [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (_UPPER, _LOWER)
