@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -46,6 +47,7 @@ _GAINS = (*_NEEDS, "psis", "mid_psis")
 """Landmarks by whose marker a body gains: those, and one behind the pelvis."""
 _FREE = (*(f"{side}_{part}" for side in SIDES for part in (*_NEEDS, *_TOES[1:], "psis", *_USEFUL)), "mid_psis")
 """Landmarks that a label may be taken for that does not name them."""
+_EITHER = ("knee_lateral", "knee_medial", "ankle_lateral", "ankle_medial")
 _ENDS = {"lateral": "medial", "medial": "lateral"}
 _NAMED, _NEED = 30.0, 30.0
 """nats: gain of a landmark by a label that names it, or that a body needs; above all that a place can cost."""
@@ -57,8 +59,8 @@ _OTHER_SIDE, _OTHER_END, _SEGMENT = 8.0, 3.0, 3.0
 """nats: a label means the other side's, the other end of its joint, or names no more than the segment."""
 _FARTHEST = 8.0
 """nats: most that its place can cost a landmark that is named: people stand as they like."""
-_OUTER = 100.0
-"""nats a stature: of two markers of an elbow the outer one is the lateral one, where the labels do not tell."""
+_OUTER = 2.5
+"""nats: most that lying outside or inside the others of a joint without usual places tells which end a marker is."""
 _MARGIN = 3.0
 """nats: by so much (odds of 20) the next best assignment must be worse where no label names a landmark."""
 _SAME = 0.012
@@ -230,12 +232,18 @@ class _Person:
         for i, label in enumerate(self.labels):
             for place, cost in self._named(label):
                 self.words[i, LANDMARKS.index(place)] = cost
-                outer = _OUTER * OUTWARDS.get(place.partition("_")[0], 0.0) * self.shares[i, 0]
-                sign = -1.0 if place.endswith("elbow_lateral") else 1.0 if place.endswith("elbow_medial") else 0.0
-                self.high[i, LANDMARKS.index(place)] = _high(stand, place, label) + sign * outer
+                known = part_of(place) in usual_standing()["places"]
+                self.high[i, LANDMARKS.index(place)] = 0.0 if known else _high(stand, place, label)
             for place in _FREE:
                 self.free[i, LANDMARKS.index(place)] = self._may_be(label, place)
         self.free &= ~np.isfinite(self.words)
+        for side, joint in product(SIDES, ("elbow", "toe")):  # whose ends have no usual place: lateral is outside
+            lateral, medial = (LANDMARKS.index(f"{side}_{joint}_{end}") for end in _ENDS)
+            either = np.isfinite(self.words[:, [lateral, medial]]).any(axis=1)
+            out = OUTWARDS[side] * self.shares[:, 0]
+            outside = _OUTER * np.clip((out - out[either].mean()) / _SAME, -1.0, 1.0) if either.any() else 0.0
+            self.high[:, lateral] -= outside
+            self.high[:, medial] += outside
 
     def _named(self, label: str) -> Iterator[tuple[str, float]]:
         """Yield the landmarks that the words of a label mean, or which it is if they mean the other side or the other
@@ -267,7 +275,7 @@ class _Person:
         """Return whether a label that does not name a landmark may mark it: it says nothing, or the segment alone."""
         side, part, ways = place.partition("_")[0], part_of(place), self.confirmed[label]
         have, middle = {part_of(one) for one in self.sure}, abs(self.shares[self.labels.index(label), 0]) < _SAME
-        if place.startswith(SIDES) and self.sides.get(label, side) != side:
+        if self.sides.get(label, side) != side:
             return False
         if part.endswith("psis") and (not have.isdisjoint({"mid_psis", part}) or middle != (part == "mid_psis")):
             return False
@@ -281,7 +289,12 @@ class _Person:
     def assignment(self) -> dict[str, str]:
         """Return landmark -> label: the cheapest assignment given what is certain, again until nothing more is."""
         claims = Counter(ways[0].place for ways in self.confirmed.values() if ways)
-        known = {place: label for place, label in self.sure.items() if claims[place] < 2}
+        # Which end of its joint the only marker that names one is, is not known yet.
+        known = {
+            place: label
+            for place, label in self.sure.items()
+            if claims[place] < 2 and (part_of(place) not in _EITHER or self.sure.keys() >= {*_both_ends(place)})
+        }
         fixed: dict[str, str] = {}
         while True:
             cost, loose = self._costs(known, fixed)
@@ -294,7 +307,7 @@ class _Person:
             away = self._distances(new)
             for place, label in tuple(new.items()):
                 i, j = self.labels.index(label), LANDMARKS.index(place)
-                if self.free[i, j] and away[i, j] > NEAR / 2:  # what was taken with it says that it is elsewhere
+                if self.free[i, j] and part_of(place) not in _TOES and away[i, j] > NEAR / 2:  # what was taken with it says that it is elsewhere
                     self.free[i, j] = False
                     del new[place]
             if len(new) == len(fixed):
@@ -307,6 +320,9 @@ class _Person:
         shares = self.shares - [0.0, self._ankles(known), 0.0]
         rows = {place: self.labels.index(label) for place, label in known.items()}
         away[:, [LANDMARKS.index(place) for place in _template()[0]]] = _distances(shares, rows) / 2
+        for side in SIDES:  # which marker of the front of a foot it is tells its place across, not how far it is
+            for toe in _TOES[1:]:
+                away[:, LANDMARKS.index(f"{side}_{toe}")] = away[:, LANDMARKS.index(f"{side}_toe")]
         return away
 
     def is_inferred(self, place: str, label: str) -> bool:
@@ -326,13 +342,13 @@ class _Person:
         """
         usual, away = self._distances({}), self._distances(known)
         gain = np.array([_NEED * (part_of(place) in _GAINS) for place in LANDMARKS])
-        cost = self.words + np.where(np.isfinite(away), np.minimum(away, _FARTHEST), self.high) - _NAMED - gain
-        for side in SIDES:  # the front of a foot has no place of its own before it is known what is there
-            for toe in _TOES:
-                away[:, LANDMARKS.index(f"{side}_{toe}")] = usual[:, LANDMARKS.index(f"{side}_toe")]
-        free = self.free & self._at_ends_of_feet(usual, set(known.values()))
+        cost = self.words + np.where(np.isfinite(away), np.minimum(away, _FARTHEST), 0.0) + self.high - _NAMED - gain
+        free = self.free & self._at_ends_of_feet(np.minimum(usual, away), set(known.values()))
         silent = np.array([_SEGMENT * bool(self.confirmed[label]) for label in self.labels])
-        loose = np.where(free & (away < NEAR / 2 + _MARGIN), silent[:, None] + away - _MUTE - gain, np.inf)
+        front = [LANDMARKS.index(f"{side}_{toe}") for side in SIDES for toe in _TOES]
+        away[:, front] = usual[:, front]  # which of them is there is not known: the foot may turn about them
+        away += silent[:, None]
+        loose = np.where(free & (away < NEAR / 2 + _MARGIN), away - _MUTE - gain, np.inf)
         for i, j in np.argwhere(free & (away < NEAR / 2)):
             if self.stand.believed(LANDMARKS[j], self.labels[i]):
                 cost[i, j] = loose[i, j]
@@ -379,6 +395,11 @@ class _Person:
             for place, row in balls.items():
                 may[row, LANDMARKS.index(place)] = True
         return may
+
+
+def _both_ends(place: str) -> tuple[str, ...]:
+    """Return the lateral and the medial landmark of a joint."""
+    return tuple(f"{place.rpartition('_')[0]}_{end}" for end in _ENDS)
 
 
 def _other_side(place: str) -> str:
