@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from bench_public_sets import SETS, Person, judged, labelled, people_of
 
-from biodance.lab.markers.assign import guess_set
+from biodance.lab.markers.guess import guess_set
 from biodance.records import Markers
 
 PARTS = {

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.diagnosis.diagnosis import ABOUT
-from biodance.lab.markers.assign import guess_set
+from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import MarkerSet, landmark, read_marker_set
 from biodance.lab.read import read_trial
 from biodance.library import read_toml

@@ -19,7 +19,7 @@ import numpy as np
 from bench_marker_sets import landmark, landmark_path
 
 from biodance.errors import BiodanceError
-from biodance.lab.markers.assign import guess_set
+from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.set_file import LANDMARKS, segment_of
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.opensim.trc import write_trc

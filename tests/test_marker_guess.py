@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from standing_markers import OWN, stand
 
-from biodance.lab.markers.assign import dress
-from biodance.lab.markers.assign import guess_set
+from biodance.lab.markers.guess import dress, guess_set
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.upright import axis_to_head
 from biodance.lab.read import read_trial

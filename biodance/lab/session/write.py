@@ -17,7 +17,7 @@ from biodance.errors import SessionRefused
 from biodance.lab.c3d.ezc3d_object import plate_recording
 from biodance.lab.c3d.subject import as_written
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.lab.markers.assign import guess_set
+from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.plates.corners import plate_axes
