@@ -15,14 +15,13 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from biodance.lab.markers.names import Meaning, sides_of
-from biodance.lab.markers.set_file import LANDMARKS
+from biodance.lab.markers.set_file import LANDMARKS, other_end, other_side, part_of
 from biodance.lab.markers.spelling import plain_labels
-from biodance.lab.markers.upright import NEAR, OUTWARDS, Standing, part_of, usual_standing
-from biodance.records import SIDES, Array
+from biodance.lab.markers.upright import OUTWARDS, Standing, rule, usual_standing
+from biodance.records import SIDES, Array, Mask
 
 _TOES = ("toe", "toe_lateral", "toe_medial")
 NEEDS = {one: (one,) for one in ("asis", "knee_lateral", "ankle_lateral", "heel")} | {"toe": _TOES}
@@ -34,33 +33,17 @@ _GAINS = (*NEEDS, "psis", "mid_psis")
 _FREE = (*(f"{side}_{part}" for side in SIDES for part in (*NEEDS, *_TOES[1:], "psis", *_USEFUL)), "mid_psis")
 """Landmarks that a label may be taken for that does not name them."""
 _AT = {place: j for j, place in enumerate(LANDMARKS)}
-_ENDS = {"lateral": "medial", "medial": "lateral"}
-_NAMED, _NEED = 30.0, 30.0
-"""nats: gain of a landmark by a label that names it, or that a body needs; above all that a place can cost."""
-_MUTE = 8.0
-"""nats: gain of a landmark by a label that does not name it: a marker at the limit of `NEAR` still pays."""
-_RANK = 10.0
-"""A spelling so far down its list is half as usual (Zipf: 1 / (1 + rank / 10))."""
-_OTHER_SIDE, _OTHER_END, _SEGMENT = 8.0, 3.0, 3.0
-"""nats: a label means the other side's, the other end of its joint, or names no more than the segment."""
-_FARTHEST = 8.0
-"""nats: most that its place can cost a landmark that is named: people stand as they like."""
-_OUTER = 2.5
-"""nats: most that lying outside or inside the others of a joint without usual places tells which end a marker is."""
-_MARGIN = 3.0
-"""nats: by so much (odds of 20) the next best assignment must be worse where no label names a landmark."""
-_SAME = 0.012
-"""Share of the stature within which two markers mark one landmark, or one of the middle lies from it."""
-_GLUED = 0.006
-"""Share of the stature: standard deviation with which a marker is glued on its landmark."""
-BELIEVED = 0.85
-"""Share of the named landmarks that the person must confirm, and of the sides, or words mean something else here."""
+_ENDS = ("lateral", "medial")
 _Said = Mapping[str, tuple[Meaning, ...]]
-_BALL = 0.036
-"""Share of the stature by which markers at the big and the little toe are at least apart."""
+
+
+def _nats(name: str) -> float:
+    return float(usual_standing()["nats"][name])
+
+
 def spelled(rank: int) -> float:
     """Return the cost of a spelling, nats."""
-    return float(np.log1p(rank / _RANK))
+    return float(np.log1p(rank / _nats("rank")))
 
 
 def by_names(said: _Said, stand: Standing | None = None) -> dict[str, str]:
@@ -70,7 +53,7 @@ def by_names(said: _Said, stand: Standing | None = None) -> dict[str, str]:
         for one in ways:
             if one.place in LANDMARKS:
                 high = _high(stand, one.place, label) if stand else 0.0
-                cost[i, _AT[one.place]] = spelled(one.rank) + high - _NAMED
+                cost[i, _AT[one.place]] = spelled(one.rank) + high - _nats("named")
     return {LANDMARKS[j]: list(said)[i] for i, j in _cheapest(cost)[0]}
 
 
@@ -129,14 +112,14 @@ def _squares(shares: Array, known: Mapping[str, int]) -> Array:
         x = shares[:, axis, None] * (sides if axis == 0 else np.ones(len(places)))
         mean, variance = at[:, axis].copy(), np.diag(cov).copy()
         if have:
-            inverse = np.linalg.inv(cov[np.ix_(have, have)] + _GLUED**2 * np.eye(len(have)))
+            inverse = np.linalg.inv(cov[np.ix_(have, have)] + rule("glued") ** 2 * np.eye(len(have)))
             off = x[[known[places[k]] for k in have], have] - mean[have]
             off = np.clip(off, *(sign * 3 * np.sqrt(variance[have]) for sign in (-1, 1)))  # one odd marker moves little
             left_out = off - inverse @ off / np.diag(inverse)
             mean += cov[:, have] @ inverse @ off
             variance -= np.einsum("ij,jk,ik->i", cov[:, have], inverse, cov[:, have])
             mean[have], variance[have] = at[have, axis] + left_out, 1 / np.diag(inverse)
-        total += (x - mean) ** 2 / np.maximum(variance, _GLUED**2)
+        total += (x - mean) ** 2 / np.maximum(variance, rule("glued") ** 2)
     return total
 
 
@@ -160,7 +143,7 @@ class PersonLabels:
         self._shares = stand.shares(self.rows)
         told = sides_of(stand.at)
         agree = [told[label] == SIDES[int(self._shares[i, 0] < 0)] for label, i in self.rows.items() if label in told]
-        self._sides = told if agree and np.mean(agree) > BELIEVED else {}
+        self._sides = told if agree and np.mean(agree) > rule("believed") else {}
         self.words = np.full((len(self.rows), len(LANDMARKS)), np.inf)
         self.free = np.zeros(self.words.shape, dtype=bool)
         for label, i in self.rows.items():
@@ -176,14 +159,13 @@ class PersonLabels:
         """
         ways = self.said[label]
         said = ways[0].place if ways else ""
-        joint, _, end = said.rpartition("_")
+        misread, end = [], other_end(said)
         # A forearm turns: names of the two ends of an elbow are believed, unless both have the same.
         twice = sum(other[0].place == said for other in self.said.values() if other) > 1
-        misread = []
-        if end in _ENDS and joint.endswith(("knee", "ankle", "toe", *["elbow"] * twice)):
-            misread.append((f"{joint}_{_ENDS[end]}", _OTHER_END))
+        if end and part_of(end).startswith(("knee", "ankle", "toe", *["elbow"] * twice)):
+            misread.append((end, _nats("other_end")))
         if said in LANDMARKS and said.startswith(SIDES) and not self._stand.believed(said, label):
-            misread.append((other_side(said), _OTHER_SIDE))
+            misread.append((other_side(said), _nats("other_side")))
         for place, more in misread:
             if self._stand.believed(place, label):
                 yield place, spelled(ways[0].rank) + more
@@ -194,94 +176,88 @@ class PersonLabels:
     def _open_to(self, label: str) -> Iterator[str]:
         """Yield what a label may mark that does not name it: it says nothing, or no more than the segment."""
         ways, own = self.confirmed[label], self._sides.get(label)
-        have, middle = {part_of(one) for one in self._sure}, abs(self._shares[self.rows[label], 0]) < _SAME
+        have, middle = {part_of(one) for one in self._sure}, abs(self._shares[self.rows[label], 0]) < rule("same")
         for place in _FREE:
             side, part = place.partition("_")[0], part_of(place)
-            segment = all(
-                one.place not in LANDMARKS and (one.place.startswith(side) or part.endswith("sis")) for one in ways
-            )
-            behind = part.endswith("psis") and (
-                middle != (part == "mid_psis") or "mid_psis" in have or (part == "mid_psis" and "psis" in have)
-            )
+            named = {"mid_psis"} if part == "psis" else {"mid_psis", "psis"} if part == "mid_psis" else set()
+            there = part.endswith("psis") and middle != (part == "mid_psis")
             toes = part in _TOES and any(f"{side}_{toe}" in self._sure for toe in _TOES)
-            if own in (None, side) and segment and not (behind or toes or (ways and part in _USEFUL)):
+            if own not in (None, side) or named & have or there or toes or (ways and part in _USEFUL):
+                continue
+            if all(one.place not in LANDMARKS and (one.place.startswith(side) or part.endswith("sis")) for one in ways):
                 yield place
 
     def _by_height_and_width(self) -> Array:
         """Return the cost (N, P), nats, of where labels are for what has no usual place: by its height; of the ends of
         an elbow or of toes the lateral one is outside.
         """
-        cost = np.zeros(self.words.shape)
-        for label, i in self.rows.items():
-            for j in np.flatnonzero(np.isfinite(self.words[i])):
-                if part_of(LANDMARKS[j]) not in usual_standing()["places"]:
-                    cost[i, j] = _high(self._stand, LANDMARKS[j], label)
+        cost, labels, usual = np.zeros(self.words.shape), list(self.rows), usual_standing()["places"]
+        for i, j in np.argwhere(np.isfinite(self.words)):
+            if part_of(LANDMARKS[j]) not in usual:
+                cost[i, j] = _high(self._stand, LANDMARKS[j], labels[i])
         for side, joint in product(SIDES, ("elbow", "toe")):
             lateral, medial = (_AT[f"{side}_{joint}_{end}"] for end in _ENDS)
             either = np.isfinite(self.words[:, [lateral, medial]]).any(axis=1)
-            if either.any():
-                out = OUTWARDS[side] * self._shares[:, 0]
-                outside = _OUTER * np.clip((out - out[either].mean()) / _SAME, -1.0, 1.0)
-                cost[:, lateral] -= outside
-                cost[:, medial] += outside
+            out = OUTWARDS[side] * self._shares[:, 0]
+            middle = out[either].mean() if either.any() else 0.0
+            outside = _nats("outer") * np.clip((out - middle) / rule("same"), -1.0, 1.0)
+            cost[:, [lateral, medial]] += np.stack([-outside, outside], axis=1)
         return cost
 
     def assignment(self) -> dict[str, str]:
         """Return landmark -> label: the cheapest assignment given what is certain, again until nothing more is."""
         labels, free = list(self.rows), self.free.copy()
         claims = Counter(ways[0].place for ways in self.confirmed.values() if ways)
-        known = {
-            place: label
-            for place, label in self._sure.items()
-            # Which end of its joint the only marker that names one is, is not known yet.
-            if claims[place] < 2 and (place.rpartition("_")[2] not in _ENDS or self._sure.keys() >= {*_both_ends(place)})
-        }
+        # Which end of its joint the only marker that names one is, is not known yet.
+        alone = [place for place in self._sure if other_end(place) not in (None, *self._sure)]
+        known = {place: one for place, one in self._sure.items() if claims[place] < 2 and place not in alone}
         fixed: dict[str, str] = {}
         while True:
             cost, rivals = self._costs(known, fixed, free)
             pairs, least = _cheapest(cost)
             new = dict(fixed)
             for i, j in pairs:
-                if not free[i, j] or self._next_best(i, j, cost, rivals) - least >= _MARGIN:
+                if not free[i, j] or self._next_best(i, j, cost, rivals) - least >= _nats("margin"):
                     new[LANDMARKS[j]] = labels[i]
             away = self._distances(new)
             for place, label in tuple(new.items()):
                 i, j = self.rows[label], _AT[place]
-                if free[i, j] and part_of(place) not in _TOES and away[i, j] > NEAR / 2:
+                if free[i, j] and part_of(place) not in _TOES and away[i, j] > rule("near") / 2:
                     free[i, j] = False  # what was taken with it says that it is elsewhere
                     del new[place]
             if new == fixed:
                 return new
             known = fixed = new
 
-    def _costs(
-        self, known: Mapping[str, str], fixed: Mapping[str, str], free: NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
+    def _costs(self, known: Mapping[str, str], fixed: Mapping[str, str], free: Mask) -> tuple[Array, Array]:
         """Return the costs (N, P) given the landmarks that are ``known``, and those of labels without the name as far
         away as they are rivals; what is ``fixed`` stays.
         """
-        usual, away = self._distances({}), self._distances(known)
-        gain = np.array([_NEED * (part_of(place) in _GAINS) for place in LANDMARKS])
-        placed = np.where(np.isfinite(away), np.minimum(away, _FARTHEST), 0.0) + self._unplaced
-        cost = self.words + placed - _NAMED - gain
+        usual, away, labels = self._distances({}), self._distances(known), list(self.rows)
+        gain = np.array([_nats("needed") * (part_of(place) in _GAINS) for place in LANDMARKS])
+        placed = np.where(np.isfinite(away), np.minimum(away, _nats("farthest")), 0.0) + self._unplaced
+        cost = self.words + placed - _nats("named") - gain
         open_ = free & self._at_ends_of_feet(np.minimum(usual, away), free, set(known.values()))
         front = [_AT[f"{side}_{toe}"] for side in SIDES for toe in _TOES]
         away[:, front] = usual[:, front]  # it is not known which toe is there: the foot may turn
-        away += np.array([[_SEGMENT * bool(ways)] for ways in self.confirmed.values()])
-        rivals = np.where(open_ & (away < NEAR / 2 + _MARGIN), away - _MUTE - gain, np.inf)
-        labels = list(self.rows)
-        for i, j in np.argwhere(open_ & (away < NEAR / 2)):
+        away += np.array([[_nats("segment") * bool(ways)] for ways in self.confirmed.values()])
+        rivals = np.where(open_ & (away < rule("near") / 2 + _nats("margin")), away - _nats("mute") - gain, np.inf)
+        for i, j in np.argwhere(open_ & (away < rule("near") / 2)):
             if self._stand.believed(LANDMARKS[j], labels[i]):
                 cost[i, j] = rivals[i, j]
         for place, label in fixed.items():
-            for one in (cost, rivals):
-                one[self.rows[label]], one[:, _AT[place]] = np.inf, np.inf
-            cost[self.rows[label], _AT[place]] = -_NAMED - _NEED
+            cost[self.rows[label]] = rivals[self.rows[label]] = np.inf
+            cost[:, _AT[place]] = rivals[:, _AT[place]] = np.inf
+            cost[self.rows[label], _AT[place]] = -_nats("named") - _nats("needed")
         return cost, rivals
+
+    def is_named(self, place: str, label: str) -> bool:
+        """Return whether the words of a label name a landmark, or name it by mistake."""
+        return bool(np.isfinite(self.words[self.rows[label], _AT[place]]))
 
     def _next_best(self, row: int, column: int, cost: Array, rivals: Array) -> float:
         """Return the sum of the next best assignment, in which no marker at this place is the landmark."""
-        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= _SAME
+        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= rule("same")
         other = cost.copy()
         other[:, column] = np.where(beside, np.inf, np.minimum(cost[:, column], rivals[:, column]))
         return _cheapest(other)[1]
@@ -290,56 +266,36 @@ class PersonLabels:
         """Return (N, P) half the squared distances given landmarks that are known; inf for those without usual place.
         Any toe is expected at the front of the foot.
         """
-        ahead = {place: self._shares[self.rows[label], 1] for place, label in known.items()}
-        ankles, spines = ([ahead.get(f"{side}_{part}") for side in SIDES] for part in ("ankle_lateral", "asis"))
-        origin = float(self._stand.middle @ self._stand.ahead / self._stand.stature)
-        if None not in ankles:
-            origin = float(np.mean(ankles))
-        elif self.named and None not in spines:
-            origin = float(np.mean(spines) - usual_standing()["places"]["asis"]["at"][1])
         away = np.full(self.words.shape, np.inf)
         rows = {place: self.rows[label] for place, label in known.items()}
-        away[:, [_AT[place] for place in _template()[0]]] = _squares(self._shares - [0.0, origin, 0.0], rows) / 2
+        away[:, [_AT[place] for place in _template()[0]]] = _squares(self._shares, rows) / 2
         for side, toe in product(SIDES, _TOES[1:]):
             away[:, _AT[f"{side}_{toe}"]] = away[:, _AT[f"{side}_toe"]]
         return away
 
-    def _at_ends_of_feet(
-        self, away: Array, free: NDArray[np.bool_], taken: Collection[str]
-    ) -> NDArray[np.bool_]:
+    def _at_ends_of_feet(self, away: Array, free: Mask, taken: Collection[str]) -> Mask:
         """Return (N, P) whether a label may be a heel or toe by its place: the hindmost and foremost of a foot, or both
         markers at its ball where both feet have two.
         """
-        may = np.ones(away.shape, dtype=bool)
-        may[:, [j for j, place in enumerate(LANDMARKS) if part_of(place) in ("heel", *_TOES)]] = False
+        ends: dict[str, int] = {}
         balls: dict[str, int] = {}
-        here = free & (away < NEAR / 2) & np.array([[label not in taken] for label in self.rows])
+        mute = np.array([not ways for ways in self.confirmed.values()])
+        here = free & (away < rule("near") / 2) & np.array([[label not in taken] for label in self.rows])
         for side in SIDES:
             out, ahead = OUTWARDS[side] * self._shares[:, 0], self._shares[:, 1]
             hind, front = (np.flatnonzero(here[:, _AT[f"{side}_{end}"]]) for end in ("heel", "toe"))
+            front = front[mute[front]] if mute[front].any() else front
             if hind.size:
-                may[hind[ahead[hind].argmin()], _AT[f"{side}_heel"]] = True
+                ends[f"{side}_heel"] = hind[ahead[hind].argmin()]
             if front.size:
-                may[front[ahead[front].argmax()], _AT[f"{side}_toe"]] = True
+                ends[f"{side}_toe"] = front[ahead[front].argmax()]
                 outer, inner = front[out[front].argmax()], front[out[front].argmin()]
                 across, along = np.abs(self._shares[outer] - self._shares[inner])[:2]
-                if along < across and np.hypot(across, along) > _BALL:
+                if along < across and np.hypot(across, along) > rule("ball"):
                     balls |= {f"{side}_toe_lateral": outer, f"{side}_toe_medial": inner}
         if len(balls) == 2 * len(SIDES):
-            may[:, [_AT[f"{side}_toe"] for side in SIDES]] = False
-            for place, row in balls.items():
-                may[row, _AT[place]] = True
+            ends = balls | {place: row for place, row in ends.items() if part_of(place) == "heel"}
+        may = np.tile([part_of(place) not in ("heel", *_TOES) for place in LANDMARKS], (len(self.rows), 1))
+        for place, row in ends.items():
+            may[row, _AT[place]] = True
         return may
-
-
-def _both_ends(place: str) -> tuple[str, ...]:
-    """Return the lateral and the medial landmark of a joint."""
-    return tuple(f"{place.rpartition('_')[0]}_{end}" for end in _ENDS)
-
-
-def other_side(place: str) -> str:
-    """Return the same landmark of the other side."""
-    side, _, part = place.partition("_")
-    return f"{'left' if side == 'right' else 'right'}_{part}"
-
-

@@ -9,19 +9,21 @@ import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from biodance.lab.markers.assign import BELIEVED, NEEDS, PersonLabels, by_names, other_side
+from biodance.lab.markers.assign import NEEDS, PersonLabels, by_names
 from biodance.lab.markers.names import joints_from_video, meanings_of, sides_exchanged
-from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
+from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, other_side, part_of, segment_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, read_marker_set
 from biodance.lab.markers.spelling import plain_labels, side_words
 from biodance.lab.markers.still import median_places, posture_frames
-from biodance.lab.markers.upright import Standing, mirror_images, part_of, standing_by_names, standing_by_points
+from biodance.lab.markers.upright import (
+    Standing,
+    mirror_images,
+    rule,
+    standing_by_names,
+    standing_by_points,
+)
 from biodance.records import SIDES, Array, Markers, Trial
 
-_USUAL = 30
-"""Rank of a spelling below which it is a common one, whose word counts."""
 _SHARED = 6
 """Labels of the session's set that a trial must have to be read with it: three markers on each of two segments."""
 _FROM_VIDEO = (
@@ -62,7 +64,9 @@ def _guessed(at: Mapping[str, Array]) -> GuessedSet:
     if isinstance(stand, Standing):
         named = _guess_of(PersonLabels(stand, said))
     else:
-        named = GuessedSet({}, (stand or "Too few labels say which landmark they mark, so no marker set can be guessed.",))
+        named = GuessedSet(
+            {}, (stand or "Too few labels say which landmark they mark, so no marker set can be guessed.",)
+        )
     plain = plain_labels(at)
     person = None if named.name else standing_by_points({label: at[label] for label in plain})
     if person is None:
@@ -91,10 +95,10 @@ def _guess_of(person: PersonLabels) -> GuessedSet:
     if "mid_psis" not in places and not {"left_psis", "right_psis"} <= places.keys():
         absent.append("the posterior iliac spines or the sacrum")
     reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
-    usual = [label for label in person.named.values() if person.said[label][0].rank < _USUAL]
+    usual = [label for label in person.named.values() if person.said[label][0].rank < rule("usual")]
     other = {places.get(other_side(place)) for place, label in person.named.items() if not person.confirmed[label]}
     refuted = [label for label in usual if not person.confirmed[label] and label not in other]
-    if len(usual) - len(refuted) < BELIEVED * len(usual):
+    if len(usual) - len(refuted) < rule("believed") * len(usual):
         reasons.append(
             f"Only {len(usual) - len(refuted)} of {len(usual)} landmarks that the labels name stand where a person has "
             f"them; elsewhere: {', '.join(refuted)}."
@@ -112,13 +116,16 @@ def _contradictions(person: PersonLabels, places: Mapping[str, str]) -> Iterator
         if label not in landmarks and not person.confirmed[label]:
             yield f"{label} was not taken for the {_words(place)}: no standing person has it there."
     for place, label in places.items():
-        if place in (one.place for one in person.confirmed[label]) or not np.isfinite(person.words[person.rows[label], LANDMARKS.index(place)]):
+        if place in (one.place for one in person.confirmed[label]) or not person.is_named(place, label):
             continue
         said, side, joint = person.said[label][0].place, place.partition("_")[0], place.rpartition("_")[0]
         other = places.get(said, "")
         if said == other_side(place) and other:
             if side == "right":
-                yield f"{label} and {other} lie on each other's sides: taken for the {_words(part_of(place))} of the side where they are."
+                yield (
+                    f"{label} and {other} lie on each other's sides: taken for the {_words(part_of(place))} of the "
+                    f"side where they are."
+                )
         elif not other:
             yield f"{label} is the only marker there: taken for the {_words(place)}, against its name."
         elif place.endswith("lateral"):
@@ -130,14 +137,14 @@ def _contradictions(person: PersonLabels, places: Mapping[str, str]) -> Iterator
 
 def _inferences(person: PersonLabels, places: Mapping[str, str]) -> Iterator[str]:
     """Yield, in sentences, which labels were taken for landmarks that they do not name."""
-    mute = {place: label for place, label in places.items() if not np.isfinite(person.words[person.rows[label], LANDMARKS.index(place)])}
+    mute = {place: label for place, label in places.items() if not person.is_named(place, label)}
     for place, label in mute.items():
         inner = places.get(place.replace("lateral", "medial"), label)
         mirror = places.get(other_side(place))
         if place.endswith("lateral") and inner not in (label, *mute.values()):
             yield (
-                f"{label} lies across the {_words(place.rpartition('_')[0])} from {inner}, outside: it was taken for the lateral "
-                f"marker, {inner} for the medial one."
+                f"{label} lies across the {_words(place.rpartition('_')[0])} from {inner}, outside: it was taken for "
+                f"the lateral marker, {inner} for the medial one."
             )
         elif mirror and mirror not in mute.values():
             yield f"{label} lies where the mirror image of {mirror} is: taken for the {_words(place)}."

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from biodance.lab.markers.names import meanings, meanings_of
-from biodance.lab.markers.set_file import LANDMARKS, segment_of
+from biodance.lab.markers.set_file import LANDMARKS, part_of, segment_of
 from biodance.lab.markers.sets import landmark, recognise
 from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.markers.still import median_places, quietest
@@ -19,46 +19,21 @@ from biodance.records import SIDES, Array, Markers, spread_frames
 
 OUTWARDS = {"right": 1.0, "left": -1.0}
 """Sign of a person's right on each side."""
-NEAR = 9.0
-"""Squared distance, in standard deviations of the three axes, within which a marker may be a landmark (97 %)."""
 _ON_THE_SIDE = ("asis", "knee", "ankle", "heel", "toe", "acromion")
-_ACROSS, _OFF_MIDDLE = 0.02, 0.06
-"""Shares of the stature by which a landmark may lie beyond the middle of the body, or one of the middle beside it."""
-_LIFTED = 0.085
-"""Share of the stature above which an ankle belongs to a foot that is not flat on the ground."""
 _STRAIGHT = ("asis", "psis", "acromion")
 """Pairs that point right even where one leg is before the other."""
 _PAIRS = (*_STRAIGHT, "knee_lateral", "ankle_lateral", "heel", "toe", "toe_lateral")
 _FRONT_AND_BACK = (("toe", "{}_heel"), ("toe_lateral", "{}_heel"), ("asis", "{}_psis"), ("asis", "mid_psis"))
 """Landmarks before others, of the same side where both have one."""
+_ABOVE = ("ankle_lateral", "asis")
 _FEET = ("_heel", "_toe", "_toe_lateral", "_toe_medial")
 _NEEDED = ("asis", "knee_lateral", "ankle_lateral", "heel", "toe")
-_SOLE = 0.014
-"""Share of the stature at which the lowest marker of a foot is."""
-_REACH = 0.6
-"""m, horizontal, from the middle within which the markers of a person are."""
-_PAIRED = 0.03
-"""m: so near to the mirror image of another marker a marker is its pair."""
 _STATURES = np.geomspace(0.85, 2.15, 40)
 """m: statures that are tried."""
-_LEVEL, _WIDE = 0.025, 0.1
-"""m: difference in height, and distance, of two markers that may be mirror images."""
-_TRIED = 250
-"""Pairs of markers, those of the most equal height, of which the plane between is tried."""
-_HALF = 0.3
-"""Share of the markers that must have a mirror image, or lie in the middle, in a person who stands straight."""
-_WAYS = 5.0
-"""By so much (in squared standard deviations) the other way round must fit worse."""
 _UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
 _LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
 _HIGH, _DEEP = ("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank")
 """Segments of the upper and of the lowest part of the body, for sets that nobody described."""
-_CLOUD = 16
-"""Markers of a body of which pelvis, knees, ankles and feet can be told without names."""
-_TALL = 0.7
-"""Share of the longest extent of a body that its height may be; arms may be spread."""
-_CLEAR = 2.0
-"""A direction counts if its largest component is so many times the others."""
 
 
 @cache
@@ -67,9 +42,9 @@ def usual_standing() -> dict[str, Any]:
     return read_toml(locate("anthropometry", "standing"))
 
 
-def part_of(place: str) -> str:
-    """Return a landmark without its side."""
-    return place.partition("_")[2] if place.startswith(SIDES) else place
+def rule(name: str) -> float:
+    """Return one of the numbers by which a standing person is told: ``[rules]`` of ``anthropometry/standing.toml``."""
+    return float(usual_standing()["rules"][name])
 
 
 def _height_of(place: str) -> tuple[float, float] | None:
@@ -81,7 +56,7 @@ def _height_of(place: str) -> tuple[float, float] | None:
 @dataclass(frozen=True, eq=False)
 class Standing:
     """One standing posture: ``at`` label -> (3,) m; ``named`` landmark -> label as far as known; ``right``, ``ahead``
-    horizontal unit vectors; ``middle`` (3,) m of the body; ``floor`` m; ``stature`` m.
+    horizontal unit vectors; ``middle`` (3,) m of the body, above the ankles; ``floor`` m; ``stature`` m.
     """
 
     at: Mapping[str, Array]
@@ -93,10 +68,9 @@ class Standing:
     stature: float
 
     def shares(self, labels: Iterable[str]) -> Array:
-        """Return (N, 3) of markers, in shares of the stature: right of the middle, ahead, above the floor."""
-        xyz = np.array([self.at[label] for label in labels]).reshape(-1, 3)
-        out, ahead, up = (xyz - self.middle) @ self.right, xyz @ self.ahead, xyz[:, 2] - self.floor
-        return np.asarray(np.stack([out, ahead, up], axis=1) / self.stature)
+        """Return (N, 3) of markers, in shares of the stature: right of the middle, ahead of it, above the floor."""
+        xyz = np.array([self.at[label] for label in labels]).reshape(-1, 3) - [*self.middle[:2], self.floor]
+        return np.asarray(xyz @ np.stack([self.right, self.ahead, [0.0, 0.0, 1.0]]).T / self.stature)
 
     def misfit(self, place: str, label: str) -> float:
         """Return how far a marker is from the usual height of a landmark: 1 at the limit where it is believed; 0 where
@@ -115,14 +89,14 @@ class Standing:
         if not lowest <= high <= highest or self.misfit(place, label) > 1:
             return False
         if side not in SIDES:
-            return bool(abs(out) < _OFF_MIDDLE) or place.startswith("head") or _height_of(place) is None
+            return bool(abs(out) < rule("off_middle")) or place.startswith("head") or _height_of(place) is None
         own = OUTWARDS[side] * out
-        if own >= usual["widest"].get(part, np.inf) or (own <= -_ACROSS and part.startswith(_ON_THE_SIDE)):
+        if own >= usual["widest"].get(part, np.inf) or (own <= -rule("across") and part.startswith(_ON_THE_SIDE)):
             return False
         ankle, shoulder = (self.named.get(f"{side}_{end}", label) for end in ("ankle_lateral", "acromion"))
         _, before, lifted = self.shares([ankle])[0]
-        if part.startswith(("heel", "toe")) and ankle != label and lifted < _LIFTED:
-            return bool(ahead < before if part == "heel" else ahead - before > _ACROSS)
+        if part.startswith(("heel", "toe")) and ankle != label and lifted < rule("lifted"):
+            return bool(ahead < before if part == "heel" else ahead - before > rule("across"))
         reach = next((span for key, span in usual["reach"].items() if part.startswith(key)), None)
         away = float(np.linalg.norm(self.at[label] - self.at[shoulder])) / self.stature
         return reach is None or shoulder == label or bool(reach[0] <= away <= reach[1])
@@ -161,7 +135,10 @@ def standing_by_names(at: Mapping[str, Array], named: Mapping[str, str]) -> Stan
     stature = float(np.median(statures)) if statures else 0.0
     if not 0.6 < stature < 2.6:
         return f"Nobody stands upright here: the labels would make a person of {stature:.2f} m."
-    return Standing(at, named, right, forward, middle, floor, stature)
+    ankles, spines = ([known[place] for s in SIDES if (place := f"{s}_{part}") in known] for part in _ABOVE)
+    usual_place = usual_standing()["places"]["asis"]["at"][1] * stature
+    back = np.mean(ankles, axis=0) if len(ankles) == 2 else np.mean(spines or [middle], axis=0) - usual_place * forward
+    return Standing(at, named, right, forward, middle + (back - middle) @ forward * forward, floor, stature)
 
 
 def standing_by_points(at: Mapping[str, Array]) -> Standing | None:
@@ -174,7 +151,7 @@ def standing_by_points(at: Mapping[str, Array]) -> Standing | None:
     plane = _plane_between(np.array(list(at.values())).reshape(-1, 3))
     ways = [_fitted(at, sign * plane[0], sign * plane[1]) for sign in (1.0, -1.0)] if plane else []
     fits = sorted((fit for fit in ways if fit is not None), key=lambda fit: fit[0])
-    if not fits or (len(fits) > 1 and fits[1][0] - fits[0][0] < _WAYS):
+    if not fits or (len(fits) > 1 and fits[1][0] - fits[0][0] < rule("ways")):
         return None
     return fits[0][1]
 
@@ -183,13 +160,12 @@ def mirror_images(stand: Standing) -> list[tuple[str, str]]:
     """Return the pairs of labels (right, left) of which each lies nearest to the mirror image of the other."""
     labels, xyz = list(stand.at), np.array(list(stand.at.values()))
     out = (xyz - stand.middle) @ stand.right
-    image = xyz - 2 * out[:, None] * stand.right
-    away = np.linalg.norm(image[:, None] - xyz[None], axis=2)
+    away = _mirrored(xyz, stand.right, float(stand.middle @ stand.right))
     nearest = away.argmin(axis=1)
     return [
         (labels[i], labels[j])
         for i, j in enumerate(nearest)
-        if nearest[j] == i and i != j and away[i, j] < _PAIRED and out[i] > out[j]
+        if nearest[j] == i and i != j and away[i, j] < rule("paired_m") and out[i] > out[j]
     ]
 
 
@@ -199,20 +175,20 @@ def _plane_between(xyz: Array) -> tuple[Array, float] | None:
     """
     step = xyz[:, None] - xyz[None]
     flat = np.hypot(step[..., 0], step[..., 1])
-    first, second = np.nonzero(np.triu((np.abs(step[..., 2]) < _LEVEL) & (flat > _WIDE)))
+    first, second = np.nonzero(np.triu((np.abs(step[..., 2]) < rule("level_m")) & (flat > rule("wide_m"))))
     best, plane = 0.0, None
-    level = np.argsort(np.abs(step[first, second, 2]))[:_TRIED]
+    level = np.argsort(np.abs(step[first, second, 2]))[: int(rule("tried"))]
     for i, j in zip(first[level], second[level], strict=True):
         axis = step[i, j] * [1.0, 1.0, 0.0] / flat[i, j]
         offset = float((xyz[i] + xyz[j]) @ axis / 2)
-        here = float(np.clip(1.5 - _mirrored(xyz, axis, offset).min(axis=1) / _PAIRED, 0.0, 1.0).sum())
+        here = float(np.clip(1.5 - _mirrored(xyz, axis, offset).min(axis=1) / rule("paired_m"), 0.0, 1.0).sum())
         if here > best:
             best, plane = here, (axis, offset)
-    if plane is None or best < _HALF * len(xyz):
+    if plane is None or best < rule("half") * len(xyz):
         return None
     axis, offset = plane
     away = _mirrored(xyz, axis, offset)
-    one = np.flatnonzero((away.min(axis=1) < _PAIRED) & (xyz @ axis > offset + _WIDE / 4))
+    one = np.flatnonzero((away.min(axis=1) < rule("paired_m")) & (xyz @ axis > offset + rule("wide_m") / 4))
     if not one.size:
         return plane
     # The plane in the middle of all pairs, not of the one that it was found by.
@@ -234,20 +210,20 @@ def _fitted(at: Mapping[str, Array], right: Array, offset: float) -> tuple[float
     xyz = np.array(list(at.values()))
     ahead = np.cross([0.0, 0.0, 1.0], right)
     out, along, up = xyz @ right - offset, xyz @ ahead, xyz[:, 2]
-    person = np.hypot(out, along - np.median(along)) < _REACH
+    person = np.hypot(out, along - np.median(along)) < rule("reach_m")
     low = float(up[person].min()) if person.any() else 0.0
     best = (float("inf"), 0.0, 0.0)
     for stature in _STATURES:
-        shares = np.stack([out, along, up - low], axis=1) / stature + [0.0, 0.0, _SOLE]
+        shares = np.stack([out, along, up - low], axis=1) / stature + [0.0, 0.0, rule("sole")]
         lateral = person & (np.abs(shares[:, 2] - 0.044) < 0.02) & (np.abs(shares[:, 0]) > 0.05)
         origins = np.unique(along[lateral].round(2))
         if origins.size:
             misfits = _misfit(shares, origins[:, None] / stature)
             best = min(best, (float(misfits.min()), float(stature), float(origins[int(misfits.argmin())])))
     ill, stature, origin = best
-    if ill > NEAR * len(_NEEDED):
+    if ill > rule("near") * len(_NEEDED):
         return None
-    return ill, Standing(at, {}, right, ahead, right * offset + ahead * origin, low - _SOLE * stature, stature)
+    return ill, Standing(at, {}, right, ahead, right * offset + ahead * origin, low - rule("sole") * stature, stature)
 
 
 def _misfit(shares: Array, origin: Array) -> Array:
@@ -267,7 +243,7 @@ def _misfit(shares: Array, origin: Array) -> Array:
     behind = np.minimum(nearest("psis", 1.0), nearest("mid_psis", 1.0))
     trunk = shares[np.abs(shares[:, 0]) < 0.12]
     over = max(float(trunk[:, 2].max(initial=0.0)) - 1.03, 0.0) / 0.02
-    return np.asarray(np.minimum([*near, behind], 2 * NEAR).sum(axis=0) + over**2)
+    return np.asarray(np.minimum([*near, behind], 2 * rule("near")).sum(axis=0) + over**2)
 
 
 def axis_to_head(markers: Markers) -> Array | None:
@@ -298,11 +274,13 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
     """Return the signed axis (3,) along which alone the points are a standing person; None if none or several are."""
     points = median_places(markers, quietest(markers))
     at = {label: points[label] for label in plain_labels(points)}
-    if len(at) < _CLOUD:
+    if len(at) < rule("cloud"):
         return None
     extent = np.ptp(np.percentile(list(at.values()), (5, 95), axis=0), axis=0)
     found = []
-    for up in (sign * np.eye(3)[k] for k in np.flatnonzero(extent > _TALL * extent.max()) for sign in (1.0, -1.0)):
+    for up in (
+        sign * np.eye(3)[k] for k in np.flatnonzero(extent > rule("tall") * extent.max()) for sign in (1.0, -1.0)
+    ):
         first = np.roll(np.abs(up), 1)
         turned = np.stack([first, np.cross(up, first), up])
         if standing_by_points({label: turned @ point for label, point in at.items()}) is not None:
@@ -315,7 +293,7 @@ def clear_axis(direction: Array) -> Array | None:
     finite.
     """
     size = np.sort(np.abs(direction))
-    if not np.isfinite(size).all() or size[2] <= _CLEAR * size[1]:
+    if not np.isfinite(size).all() or size[2] <= rule("clear") * size[1]:
         return None
     i = int(np.argmax(np.abs(direction)))
     axis: Array = np.eye(3)[i] * np.sign(direction[i])
