@@ -20,7 +20,7 @@ from scipy.optimize import linear_sum_assignment
 from biodance.lab.markers.names import Meaning, sides_of
 from biodance.lab.markers.set_file import LANDMARKS, other_end, other_side, part_of
 from biodance.lab.markers.spelling import plain_labels
-from biodance.lab.markers.upright import OUTWARDS, Standing, rule, usual_standing
+from biodance.lab.markers.upright import OUTWARDS, Standing, bound, usual_standing
 from biodance.records import SIDES, Array, Mask
 
 _TOES = ("toe", "toe_lateral", "toe_medial")
@@ -41,7 +41,7 @@ def _nats(name: str) -> float:
     return float(usual_standing()["nats"][name])
 
 
-def spelled(rank: int) -> float:
+def _spelled(rank: int) -> float:
     """Return the cost of a spelling, nats."""
     return float(np.log1p(rank / _nats("rank")))
 
@@ -52,8 +52,8 @@ def by_names(said: _Said, stand: Standing | None = None) -> dict[str, str]:
     for i, (label, ways) in enumerate(said.items()):
         for one in ways:
             if one.place in LANDMARKS:
-                high = _high(stand, one.place, label) if stand else 0.0
-                cost[i, _AT[one.place]] = spelled(one.rank) + high - _nats("named")
+                cost[i, _AT[one.place]] = _spelled(one.rank) - _nats("named")
+                cost[i, _AT[one.place]] += _high(stand, one.place, label) if stand else 0.0
     return {LANDMARKS[j]: list(said)[i] for i, j in _cheapest(cost)[0]}
 
 
@@ -112,14 +112,14 @@ def _squares(shares: Array, known: Mapping[str, int]) -> Array:
         x = shares[:, axis, None] * (sides if axis == 0 else np.ones(len(places)))
         mean, variance = at[:, axis].copy(), np.diag(cov).copy()
         if have:
-            inverse = np.linalg.inv(cov[np.ix_(have, have)] + rule("glued") ** 2 * np.eye(len(have)))
+            inverse = np.linalg.inv(cov[np.ix_(have, have)] + bound("glued") ** 2 * np.eye(len(have)))
             off = x[[known[places[k]] for k in have], have] - mean[have]
             off = np.clip(off, *(sign * 3 * np.sqrt(variance[have]) for sign in (-1, 1)))  # one odd marker moves little
             left_out = off - inverse @ off / np.diag(inverse)
             mean += cov[:, have] @ inverse @ off
             variance -= np.einsum("ij,jk,ik->i", cov[:, have], inverse, cov[:, have])
             mean[have], variance[have] = at[have, axis] + left_out, 1 / np.diag(inverse)
-        total += (x - mean) ** 2 / np.maximum(variance, rule("glued") ** 2)
+        total += (x - mean) ** 2 / np.maximum(variance, bound("glued") ** 2)
     return total
 
 
@@ -143,7 +143,7 @@ class PersonLabels:
         self._shares = stand.shares(self.rows)
         told = sides_of(stand.at)
         agree = [told[label] == SIDES[int(self._shares[i, 0] < 0)] for label, i in self.rows.items() if label in told]
-        self._sides = told if agree and np.mean(agree) > rule("believed") else {}
+        self._sides = told if agree and np.mean(agree) > bound("believed") else {}
         self.words = np.full((len(self.rows), len(LANDMARKS)), np.inf)
         self.free = np.zeros(self.words.shape, dtype=bool)
         for label, i in self.rows.items():
@@ -162,21 +162,21 @@ class PersonLabels:
         misread, end = [], other_end(said)
         # A forearm turns: names of the two ends of an elbow are believed, unless both have the same.
         twice = sum(other[0].place == said for other in self.said.values() if other) > 1
-        if end and part_of(end).startswith(("knee", "ankle", "toe", *["elbow"] * twice)):
+        if end and part_of(end).startswith(("knee", "ankle", *["elbow"] * twice, *["toe"] * (end in self.named))):
             misread.append((end, _nats("other_end")))
         if said in LANDMARKS and said.startswith(SIDES) and not self._stand.believed(said, label):
             misread.append((other_side(said), _nats("other_side")))
         for place, more in misread:
             if self._stand.believed(place, label):
-                yield place, spelled(ways[0].rank) + more
+                yield place, _spelled(ways[0].rank) + more
         for one in reversed(self.confirmed[label]):
             if one.place in LANDMARKS:
-                yield one.place, spelled(one.rank)
+                yield one.place, _spelled(one.rank)
 
     def _open_to(self, label: str) -> Iterator[str]:
         """Yield what a label may mark that does not name it: it says nothing, or no more than the segment."""
         ways, own = self.confirmed[label], self._sides.get(label)
-        have, middle = {part_of(one) for one in self._sure}, abs(self._shares[self.rows[label], 0]) < rule("same")
+        have, middle = {part_of(one) for one in self._sure}, abs(self._shares[self.rows[label], 0]) < bound("same")
         for place in _FREE:
             side, part = place.partition("_")[0], part_of(place)
             named = {"mid_psis"} if part == "psis" else {"mid_psis", "psis"} if part == "mid_psis" else set()
@@ -200,7 +200,7 @@ class PersonLabels:
             either = np.isfinite(self.words[:, [lateral, medial]]).any(axis=1)
             out = OUTWARDS[side] * self._shares[:, 0]
             middle = out[either].mean() if either.any() else 0.0
-            outside = _nats("outer") * np.clip((out - middle) / rule("same"), -1.0, 1.0)
+            outside = _nats("outer") * np.clip((out - middle) / bound("same"), -1.0, 1.0)
             cost[:, [lateral, medial]] += np.stack([-outside, outside], axis=1)
         return cost
 
@@ -222,7 +222,7 @@ class PersonLabels:
             away = self._distances(new)
             for place, label in tuple(new.items()):
                 i, j = self.rows[label], _AT[place]
-                if free[i, j] and part_of(place) not in _TOES and away[i, j] > rule("near") / 2:
+                if free[i, j] and part_of(place) not in _TOES and away[i, j] > bound("near") / 2:
                     free[i, j] = False  # what was taken with it says that it is elsewhere
                     del new[place]
             if new == fixed:
@@ -241,8 +241,8 @@ class PersonLabels:
         front = [_AT[f"{side}_{toe}"] for side in SIDES for toe in _TOES]
         away[:, front] = usual[:, front]  # it is not known which toe is there: the foot may turn
         away += np.array([[_nats("segment") * bool(ways)] for ways in self.confirmed.values()])
-        rivals = np.where(open_ & (away < rule("near") / 2 + _nats("margin")), away - _nats("mute") - gain, np.inf)
-        for i, j in np.argwhere(open_ & (away < rule("near") / 2)):
+        rivals = np.where(open_ & (away < bound("near") / 2 + _nats("margin")), away - _nats("mute") - gain, np.inf)
+        for i, j in np.argwhere(open_ & (away < bound("near") / 2)):
             if self._stand.believed(LANDMARKS[j], labels[i]):
                 cost[i, j] = rivals[i, j]
         for place, label in fixed.items():
@@ -257,7 +257,7 @@ class PersonLabels:
 
     def _next_best(self, row: int, column: int, cost: Array, rivals: Array) -> float:
         """Return the sum of the next best assignment, in which no marker at this place is the landmark."""
-        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= rule("same")
+        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= bound("same")
         other = cost.copy()
         other[:, column] = np.where(beside, np.inf, np.minimum(cost[:, column], rivals[:, column]))
         return _cheapest(other)[1]
@@ -277,10 +277,9 @@ class PersonLabels:
         """Return (N, P) whether a label may be a heel or toe by its place: the hindmost and foremost of a foot, or both
         markers at its ball where both feet have two.
         """
-        ends: dict[str, int] = {}
-        balls: dict[str, int] = {}
+        ends, balls = dict[str, int](), dict[str, int]()
         mute = np.array([not ways for ways in self.confirmed.values()])
-        here = free & (away < rule("near") / 2) & np.array([[label not in taken] for label in self.rows])
+        here = free & (away < bound("near") / 2) & np.array([[label not in taken] for label in self.rows])
         for side in SIDES:
             out, ahead = OUTWARDS[side] * self._shares[:, 0], self._shares[:, 1]
             hind, front = (np.flatnonzero(here[:, _AT[f"{side}_{end}"]]) for end in ("heel", "toe"))
@@ -291,7 +290,7 @@ class PersonLabels:
                 ends[f"{side}_toe"] = front[ahead[front].argmax()]
                 outer, inner = front[out[front].argmax()], front[out[front].argmin()]
                 across, along = np.abs(self._shares[outer] - self._shares[inner])[:2]
-                if along < across and np.hypot(across, along) > rule("ball"):
+                if along < across and np.hypot(across, along) > bound("ball"):
                     balls |= {f"{side}_toe_lateral": outer, f"{side}_toe_medial": inner}
         if len(balls) == 2 * len(SIDES):
             ends = balls | {place: row for place, row in ends.items() if part_of(place) == "heel"}

@@ -17,8 +17,8 @@ from biodance.lab.markers.spelling import plain_labels, side_words
 from biodance.lab.markers.still import median_places, posture_frames
 from biodance.lab.markers.upright import (
     Standing,
+    bound,
     mirror_images,
-    rule,
     standing_by_names,
     standing_by_points,
 )
@@ -95,10 +95,10 @@ def _guess_of(person: PersonLabels) -> GuessedSet:
     if "mid_psis" not in places and not {"left_psis", "right_psis"} <= places.keys():
         absent.append("the posterior iliac spines or the sacrum")
     reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
-    usual = [label for label in person.named.values() if person.said[label][0].rank < rule("usual")]
+    usual = [label for label in person.named.values() if person.said[label][0].rank < bound("usual")]
     other = {places.get(other_side(place)) for place, label in person.named.items() if not person.confirmed[label]}
     refuted = [label for label in usual if not person.confirmed[label] and label not in other]
-    if len(usual) - len(refuted) < rule("believed") * len(usual):
+    if len(usual) - len(refuted) < bound("believed") * len(usual):
         reasons.append(
             f"Only {len(usual) - len(refuted)} of {len(usual)} landmarks that the labels name stand where a person has "
             f"them; elsewhere: {', '.join(refuted)}."

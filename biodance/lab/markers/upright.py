@@ -42,7 +42,7 @@ def usual_standing() -> dict[str, Any]:
     return read_toml(locate("anthropometry", "standing"))
 
 
-def rule(name: str) -> float:
+def bound(name: str) -> float:
     """Return one of the numbers by which a standing person is told: ``[rules]`` of ``anthropometry/standing.toml``."""
     return float(usual_standing()["rules"][name])
 
@@ -89,14 +89,14 @@ class Standing:
         if not lowest <= high <= highest or self.misfit(place, label) > 1:
             return False
         if side not in SIDES:
-            return bool(abs(out) < rule("off_middle")) or place.startswith("head") or _height_of(place) is None
+            return bool(abs(out) < bound("off_middle")) or place.startswith("head") or _height_of(place) is None
         own = OUTWARDS[side] * out
-        if own >= usual["widest"].get(part, np.inf) or (own <= -rule("across") and part.startswith(_ON_THE_SIDE)):
+        if own >= usual["widest"].get(part, np.inf) or (own <= -bound("across") and part.startswith(_ON_THE_SIDE)):
             return False
         ankle, shoulder = (self.named.get(f"{side}_{end}", label) for end in ("ankle_lateral", "acromion"))
         _, before, lifted = self.shares([ankle])[0]
-        if part.startswith(("heel", "toe")) and ankle != label and lifted < rule("lifted"):
-            return bool(ahead < before if part == "heel" else ahead - before > rule("across"))
+        if part.startswith(("heel", "toe")) and ankle != label and lifted < bound("lifted"):
+            return bool(ahead < before if part == "heel" else ahead - before > bound("across"))
         reach = next((span for key, span in usual["reach"].items() if part.startswith(key)), None)
         away = float(np.linalg.norm(self.at[label] - self.at[shoulder])) / self.stature
         return reach is None or shoulder == label or bool(reach[0] <= away <= reach[1])
@@ -151,7 +151,7 @@ def standing_by_points(at: Mapping[str, Array]) -> Standing | None:
     plane = _plane_between(np.array(list(at.values())).reshape(-1, 3))
     ways = [_fitted(at, sign * plane[0], sign * plane[1]) for sign in (1.0, -1.0)] if plane else []
     fits = sorted((fit for fit in ways if fit is not None), key=lambda fit: fit[0])
-    if not fits or (len(fits) > 1 and fits[1][0] - fits[0][0] < rule("ways")):
+    if not fits or (len(fits) > 1 and fits[1][0] - fits[0][0] < bound("ways")):
         return None
     return fits[0][1]
 
@@ -165,7 +165,7 @@ def mirror_images(stand: Standing) -> list[tuple[str, str]]:
     return [
         (labels[i], labels[j])
         for i, j in enumerate(nearest)
-        if nearest[j] == i and i != j and away[i, j] < rule("paired_m") and out[i] > out[j]
+        if nearest[j] == i and i != j and away[i, j] < bound("paired_m") and out[i] > out[j]
     ]
 
 
@@ -175,20 +175,20 @@ def _plane_between(xyz: Array) -> tuple[Array, float] | None:
     """
     step = xyz[:, None] - xyz[None]
     flat = np.hypot(step[..., 0], step[..., 1])
-    first, second = np.nonzero(np.triu((np.abs(step[..., 2]) < rule("level_m")) & (flat > rule("wide_m"))))
+    first, second = np.nonzero(np.triu((np.abs(step[..., 2]) < bound("level_m")) & (flat > bound("wide_m"))))
     best, plane = 0.0, None
-    level = np.argsort(np.abs(step[first, second, 2]))[: int(rule("tried"))]
+    level = np.argsort(np.abs(step[first, second, 2]))[: int(bound("tried"))]
     for i, j in zip(first[level], second[level], strict=True):
         axis = step[i, j] * [1.0, 1.0, 0.0] / flat[i, j]
         offset = float((xyz[i] + xyz[j]) @ axis / 2)
-        here = float(np.clip(1.5 - _mirrored(xyz, axis, offset).min(axis=1) / rule("paired_m"), 0.0, 1.0).sum())
+        here = float(np.clip(1.5 - _mirrored(xyz, axis, offset).min(axis=1) / bound("paired_m"), 0.0, 1.0).sum())
         if here > best:
             best, plane = here, (axis, offset)
-    if plane is None or best < rule("half") * len(xyz):
+    if plane is None or best < bound("half") * len(xyz):
         return None
     axis, offset = plane
     away = _mirrored(xyz, axis, offset)
-    one = np.flatnonzero((away.min(axis=1) < rule("paired_m")) & (xyz @ axis > offset + rule("wide_m") / 4))
+    one = np.flatnonzero((away.min(axis=1) < bound("paired_m")) & (xyz @ axis > offset + bound("wide_m") / 4))
     if not one.size:
         return plane
     # The plane in the middle of all pairs, not of the one that it was found by.
@@ -210,20 +210,20 @@ def _fitted(at: Mapping[str, Array], right: Array, offset: float) -> tuple[float
     xyz = np.array(list(at.values()))
     ahead = np.cross([0.0, 0.0, 1.0], right)
     out, along, up = xyz @ right - offset, xyz @ ahead, xyz[:, 2]
-    person = np.hypot(out, along - np.median(along)) < rule("reach_m")
+    person = np.hypot(out, along - np.median(along)) < bound("reach_m")
     low = float(up[person].min()) if person.any() else 0.0
     best = (float("inf"), 0.0, 0.0)
     for stature in _STATURES:
-        shares = np.stack([out, along, up - low], axis=1) / stature + [0.0, 0.0, rule("sole")]
+        shares = np.stack([out, along, up - low], axis=1) / stature + [0.0, 0.0, bound("sole")]
         lateral = person & (np.abs(shares[:, 2] - 0.044) < 0.02) & (np.abs(shares[:, 0]) > 0.05)
         origins = np.unique(along[lateral].round(2))
         if origins.size:
             misfits = _misfit(shares, origins[:, None] / stature)
             best = min(best, (float(misfits.min()), float(stature), float(origins[int(misfits.argmin())])))
     ill, stature, origin = best
-    if ill > rule("near") * len(_NEEDED):
+    if ill > bound("near") * len(_NEEDED):
         return None
-    return ill, Standing(at, {}, right, ahead, right * offset + ahead * origin, low - rule("sole") * stature, stature)
+    return ill, Standing(at, {}, right, ahead, right * offset + ahead * origin, low - bound("sole") * stature, stature)
 
 
 def _misfit(shares: Array, origin: Array) -> Array:
@@ -243,7 +243,7 @@ def _misfit(shares: Array, origin: Array) -> Array:
     behind = np.minimum(nearest("psis", 1.0), nearest("mid_psis", 1.0))
     trunk = shares[np.abs(shares[:, 0]) < 0.12]
     over = max(float(trunk[:, 2].max(initial=0.0)) - 1.03, 0.0) / 0.02
-    return np.asarray(np.minimum([*near, behind], 2 * rule("near")).sum(axis=0) + over**2)
+    return np.asarray(np.minimum([*near, behind], 2 * bound("near")).sum(axis=0) + over**2)
 
 
 def axis_to_head(markers: Markers) -> Array | None:
@@ -274,12 +274,12 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
     """Return the signed axis (3,) along which alone the points are a standing person; None if none or several are."""
     points = median_places(markers, quietest(markers))
     at = {label: points[label] for label in plain_labels(points)}
-    if len(at) < rule("cloud"):
+    if len(at) < bound("cloud"):
         return None
     extent = np.ptp(np.percentile(list(at.values()), (5, 95), axis=0), axis=0)
     found = []
     for up in (
-        sign * np.eye(3)[k] for k in np.flatnonzero(extent > rule("tall") * extent.max()) for sign in (1.0, -1.0)
+        sign * np.eye(3)[k] for k in np.flatnonzero(extent > bound("tall") * extent.max()) for sign in (1.0, -1.0)
     ):
         first = np.roll(np.abs(up), 1)
         turned = np.stack([first, np.cross(up, first), up])
@@ -293,7 +293,7 @@ def clear_axis(direction: Array) -> Array | None:
     finite.
     """
     size = np.sort(np.abs(direction))
-    if not np.isfinite(size).all() or size[2] <= rule("clear") * size[1]:
+    if not np.isfinite(size).all() or size[2] <= bound("clear") * size[1]:
         return None
     i = int(np.argmax(np.abs(direction)))
     axis: Array = np.eye(3)[i] * np.sign(direction[i])
