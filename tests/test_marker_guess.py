@@ -55,10 +55,10 @@ def test_of_two_nameless_markers_as_near_to_a_joint_none_is_taken() -> None:
     numbered = {place: f"M{k:02d}" for k, place in enumerate(OWN)}
     still = stand(numbered)
     knees = [numbered[f"{side}_knee_lateral"] for side in ("right", "left")]
-    lower = np.stack([still[label] for label in knees], axis=1) - [0.0, 0.0, 0.05]
-    both = Markers((*still.names, "M90", "M91"), still.time, np.concatenate([still.xyz, lower], axis=1))
-    both.xyz.setflags(write=True)
-    both.xyz[:, [both.names.index(label) for label in knees], 2] += 0.01
+    columns = [still.names.index(label) for label in knees]
+    xyz = np.concatenate([still.xyz, still.xyz[:, columns] - [0.0, 0.0, 0.025]], axis=1)
+    xyz[:, columns, 2] += 0.025
+    both = Markers((*still.names, "M90", "M91"), still.time, xyz)
     guess = guess_set(both)
     assert guess.name == ""
     assert "right knee lateral" in guess.doubts[0]
