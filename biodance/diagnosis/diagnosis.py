@@ -88,6 +88,8 @@ class Finding:
         Of one that is only resembled: what its size varies with ("" for none), though a true cause has one size.
     trials : tuple of str
         The trials in which it is; () for all.
+    probability : float
+        That it, or another cause of its set, is there.
 
     Examples
     --------
@@ -105,6 +107,7 @@ class Finding:
     changes: tuple[str, ...] = ()
     varies_with: str = ""
     trials: tuple[str, ...] = ()
+    probability: float = 1.0
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)
@@ -169,6 +172,8 @@ class Diagnosis:
         Why it says no more (only standing, an unusual body), each with what it concerns.
     witnesses : WitnessEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
+    probability : float
+        Of what the verdict says; NaN where nothing could be judged.
 
     Examples
     --------
@@ -190,6 +195,7 @@ class Diagnosis:
     judged: tuple[Judged, ...] = ()
     why: Mapping[Reason, tuple[str, ...]] = field(default_factory=dict)
     witnesses: "WitnessEvidence | None" = None
+    probability: float = float("nan")
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"

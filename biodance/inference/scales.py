@@ -97,6 +97,11 @@ class Fit:
         half = solve_triangular(self.lower, unit, lower=True, check_finite=False)
         return self.u[len(self.u) - count :], half.T @ half
 
+    def variance(self, row: Array) -> float:
+        """Return the posterior variance of ``row`` (K,) times the scaled coefficients."""
+        half = solve_triangular(self.lower, row, lower=True, check_finite=False)
+        return float(half @ half)
+
     @cached_property
     def coefficients(self) -> Array:
         """(K,) posterior mean per unit of the unscaled columns."""

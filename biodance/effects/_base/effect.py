@@ -210,6 +210,7 @@ class Effect(Checked):
         """
         return np.zeros(len(self.parameters))
 
+
     def reported_size(self, size: float) -> float:
         """Return a detection limit in reported form, from a ``size`` of the first parameter; by default the same."""
         return size
