@@ -5,7 +5,7 @@ SI units; six channels are Fx Fy Fz (N) and Mx My Mz (N·m) about the middle of 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from biodance import display
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, DiagnosisStatus, Reason, status_of
+from biodance.effects import known_cause
 from biodance.identification.knowledge import SIGMAS
 from biodance.records.attention import Attention, Judged
 
@@ -22,23 +23,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from biodance.diagnosis.witness_evidence import WitnessEvidence
-    from biodance.effects import QualityCheck
+    from biodance.effects import Cause, Checked, QualityCheck
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
-HABITS = ("toe_landmark",)
-"""Effects that are no fault of an instrument: told as findings, and nothing is wrong with them alone."""
 ABOUT = "diagnosis"
 """What the one of a diagnosis's sentences is about that says the verdict."""
 
 
 @dataclass(frozen=True)
 class Alias:
-    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` (natural) against "nothing wrong"."""
+    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` (natural) against "nothing wrong";
+    ``kind`` as in `Finding`.
+    """
 
     effect: str
     target: str
     log_bayes_factor: float
+    kind: "Cause | None" = field(default=None, compare=False, repr=False)
+
+    @property
+    def cause(self) -> "Cause | Checked":
+        """All that is known of the effect."""
+        return self.kind or known_cause(self.effect)
 
 
 @dataclass(frozen=True)
@@ -88,6 +95,8 @@ class Finding:
         Of one that is only resembled: what its size varies with ("" for none), though a true cause has one size.
     trials : tuple of str
         The trials in which it is; () for all.
+    kind : Cause or None
+        The effect itself where it is known (`of_family`); None: by its name, if it is of biodance or an entry point.
 
     Examples
     --------
@@ -105,6 +114,12 @@ class Finding:
     changes: tuple[str, ...] = ()
     varies_with: str = ""
     trials: tuple[str, ...] = ()
+    kind: "Cause | None" = None
+
+    @property
+    def cause(self) -> "Cause | Checked":
+        """All that is known of the effect."""
+        return self.kind or known_cause(self.effect)
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)
@@ -215,7 +230,7 @@ class Diagnosis:
     @property
     def faults(self) -> tuple[Finding, ...]:
         """The findings without what is only a habit of the laboratory."""
-        return tuple(one for one in self.findings if one.effect not in HABITS)
+        return tuple(one for one in self.findings if not one.cause.habit)
 
     @property
     def told(self) -> str:
@@ -277,3 +292,15 @@ class Diagnosis:
     def worst(self) -> float:
         """Largest z of the residual that is left; 0 without any."""
         return float(np.max([a.z for a in self.adequacy], initial=0.0))
+
+
+def of_family(one: Diagnosis, family: "Mapping[str, Cause]") -> Diagnosis:
+    """Return the diagnosis whose findings hold their effects of the ``family`` that was asked: what is known of one
+    that was given as an object stands nowhere else.
+    """
+
+    def known(finding: Finding) -> Finding:
+        alike = tuple(replace(alias, kind=family.get(alias.effect)) for alias in finding.set)
+        return replace(finding, kind=family.get(finding.effect), set=alike)
+
+    return replace(one, findings=tuple(map(known, one.findings)), resembles=tuple(map(known, one.resembles)))

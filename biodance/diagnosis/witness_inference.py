@@ -16,7 +16,6 @@ from biodance.diagnosis.candidates import TOGETHER
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.diagnosis.witness_evidence import WitnessEvidence, undo_causes
 from biodance.diagnosis.witness_fit import (
-    ALIKE,
     THRESHOLD,
     LaplaceFit,
     explain,
@@ -25,6 +24,7 @@ from biodance.diagnosis.witness_fit import (
     is_told,
     prior_odds,
     typical_size,
+    widened,
 )
 from biodance.diagnosis.witness_landmark import landmark_alias, landmark_finding
 from biodance.effects import causes
@@ -163,7 +163,7 @@ def _findings(
             size, sd = float(last.theta[i]), float(last.covariance[i, i] ** 0.5)
             if not is_beyond_usual(evidence, one.names, size, sd):
                 continue
-            whole = float(np.hypot(sd, ALIKE.get(cause.effect, 0.0)))
+            whole = widened(sd, cause.effect)
             estimates = (Estimate(cause.parameter, size, whole, cause.unit),)
             visible = _visible_share(evidence, one.names)
         found.append(
@@ -182,7 +182,7 @@ def size_from_witnesses(evidence: WitnessEvidence, names: tuple[str, str]) -> tu
     value = np.array([one.value - one.expected for one in counting.observations])
     one = _fit_sizes(counting, value, (names,))
     sd = _disagreement(counting, names, value - counting.traces[names] * one.theta[0]) * one.covariance[0, 0] ** 0.5
-    return float(one.theta[0]), float(np.hypot(sd, ALIKE.get(names[0], 0.0)))
+    return float(one.theta[0]), widened(float(sd), names[0])
 
 
 def _disagreement(evidence: WitnessEvidence, names: tuple[str, str], left: Array) -> float:

@@ -1,10 +1,4 @@
-"""A channel of a force plate reads a constant factor too much.
-
-Signature: the residual of one channel follows that channel itself. Look-alikes: all six gains together are a wrong body
-mass, exactly; the gain of Fz alone re-fits into the segment masses and leaves the fit as good as before. Separated by
-the scale's weight and by differences between channels. Where one of several plates reads too little in all channels,
-the pressure of all lies beside the body, on the other plate's side: so large a gain is found before any statistics.
-"""
+"""A channel of a force plate reads a constant factor too much."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,6 +9,7 @@ from biodance.effects._base.carried import Carried, carried_by_plates
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.words import CALIBRATE, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.effects.body_mass import BodyMass
 from biodance.records import Array, Trial, Wrench
 from biodance.spatial import wrench_shift
@@ -34,6 +29,12 @@ _LASTS = 1.0
 _NAMED, _TOLD = 4.0, 9.0
 """Differences of squared deviations: two in natural logarithm of the evidence for a name, as everywhere
 (`witness_inference.THRESHOLD`); three standard deviations from which two causes are told apart."""
+_LEAST = 0.005
+"""Gain that matters: makers' accuracy, 0.2 to 0.5 % of full scale."""
+_USUAL = 0.02
+"""Gain up to which laboratories have it without calling it a fault."""
+_ALIKE = 0.004
+"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
 class PlateGain(ChannelEffect):
@@ -42,10 +43,33 @@ class PlateGain(ChannelEffect):
     name = "plate_gain"
     by_load = True
     parameters = (
-        Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),
+        Parameter(
+            "gain",
+            "1",
+            0.02,
+            "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)",
+            least=_LEAST,
+            usual=_USUAL,
+            alike=_ALIKE,
+        ),
     )
     separated_by = "Squats against standing: the channel's own size must change."
     advice = "Check the channel with dead weights; correct sensitivity or calibration matrix."
+    about = About(
+        what="A channel of a force plate reads a constant factor too much.",
+        signature="The residual of one channel follows that channel itself.",
+        look_alikes=(
+            "All six gains together are a wrong body mass, exactly; the gain of Fz alone re-fits into the segment "
+            "masses and leaves the fit as good as before."
+        ),
+        settled_by=(
+            "The scale's weight and by differences between channels. Where one of several plates reads too little in "
+            "all channels, the pressure of all lies beside the body, on the other plate's side: so large a gain is "
+            "found before any statistics."
+        ),
+    )
+    words = CauseWords("{it} reads {size} too {more}{between}", CALIBRATE, "a wrong gain", TOO_MUCH)
+    explains = (CheckKind.WEIGHT, CheckKind.FORCES)
 
     def in_channel(self, case: Case) -> Array:
         """Return the predicted channel itself."""

@@ -13,13 +13,14 @@ size by themselves). Causes that are found by a check instead of a fit (units, l
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.quality_check import Checked
+from biodance.effects._base.quality_check import Checked, unit_at
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_origin
@@ -27,12 +28,34 @@ from biodance.spatial import wrench_about_origin
 
 @dataclass(frozen=True)
 class Parameter:
-    """``name``, ``unit`` as printed, ``typical`` size in that unit and the ``source`` of that size."""
+    """``name``, ``unit`` as printed, ``typical`` size in that unit and the ``source`` of that size.
+
+    Where it is known, ``least`` the smallest size that matters to a laboratory (0: every size does), ``usual`` up to
+    which size laboratories have it without calling it a fault (both by unit, or by channel, where targets differ), and
+    ``alike`` the standard deviation of what careful laboratories have, so that no size is surer than that.
+    """
 
     name: str
     unit: str
     typical: float
     source: str
+    least: float | Mapping[str, float] = 0.0
+    usual: float | Mapping[str, float] = 0.0
+    alike: float = 0.0
+
+    def least_at(self, target: str) -> float:
+        """Return the smallest size at a target that matters."""
+        return self._at(self.least, target)
+
+    def usual_at(self, target: str) -> float:
+        """Return the size at a target up to which laboratories have it without calling it a fault."""
+        return self._at(self.usual, target)
+
+    def _at(self, sizes: float | Mapping[str, float], target: str) -> float:
+        if not isinstance(sizes, Mapping):
+            return sizes
+        unit = sizes.get(unit_at(self.unit, target), 0.0)
+        return sizes.get(target.rpartition(":")[2], unit)
 
 
 @dataclass(frozen=True)
@@ -42,10 +65,7 @@ class Effect(Checked):
     """
 
     target: str = ""
-    name: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    separated_by: ClassVar[str] = ""
-    """The movement that tells this cause from its look-alikes, in words for the analyst."""
     taken_up_by_calibration: ClassVar[bool] = False
     """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
     anybody looks.
@@ -56,6 +76,8 @@ class Effect(Checked):
     """Whether it is named only alone: several at once (cross-talks of a plate that lies elsewhere) are what a cause
     looks like that nobody described.
     """
+    rarer: ClassVar[float] = 0.0
+    """Natural logarithm: so much rarer than other faults it is."""
     screened_at: ClassVar[tuple[float, ...]] = ()
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
@@ -65,8 +87,6 @@ class Effect(Checked):
     """
     distinguished_by: ClassVar[str] = ""
     """The parameter without which it is another, simpler cause (a load in which nothing sloshes); "" for none."""
-    advice: ClassVar[str] = ""
-    """What to do in the laboratory to settle it, and how it is mended."""
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
