@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from biodance.diagnosis.consequence import matters
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, of_family
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.of_family import of_family
 from biodance.effects import About, Case, CauseWords, CheckKind, Effect, Parameter, causes, known_cause
 from biodance.pipeline.cause_words import alternatives, spoken
 from biodance.pipeline.finding_words import cause_of, in_words

@@ -5,7 +5,7 @@ SI units; six channels are Fx Fy Fz (N) and Mx My Mz (N·m) about the middle of 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -292,15 +292,3 @@ class Diagnosis:
     def worst(self) -> float:
         """Largest z of the residual that is left; 0 without any."""
         return float(np.max([a.z for a in self.adequacy], initial=0.0))
-
-
-def of_family(one: Diagnosis, family: "Mapping[str, Cause]") -> Diagnosis:
-    """Return the diagnosis whose findings hold their effects of the ``family`` that was asked: what is known of one
-    that was given as an object stands nowhere else.
-    """
-
-    def known(finding: Finding) -> Finding:
-        alike = tuple(replace(alias, kind=family.get(alias.effect)) for alias in finding.set)
-        return replace(finding, kind=family.get(finding.effect), set=alike)
-
-    return replace(one, findings=tuple(map(known, one.findings)), resembles=tuple(map(known, one.resembles)))

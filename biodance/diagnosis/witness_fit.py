@@ -122,11 +122,11 @@ def is_beyond_usual(evidence: WitnessEvidence, names: tuple[str, str], size: flo
     """
     cause = evidence.causes[names]
     usual = effect(cause.effect).parameters[0].usual_at(cause.target)
-    whole = widened(sd, cause.effect)
+    whole = no_surer(sd, cause.effect)
     return abs(size) > usual + whole and abs(size) > _SURE * whole
 
 
-def widened(sd: float, name: str) -> float:
+def no_surer(sd: float, name: str) -> float:
     """Return the standard deviation of a size against "as the file says": none is surer than careful laboratories are
     alike (`Parameter.alike`).
     """

@@ -16,6 +16,7 @@ from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
+from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.errors import UnknownName
 from biodance.records import Session
@@ -32,6 +33,7 @@ __all__ = [
     "Effect",
     "Parameter",
     "QualityCheck",
+    "Quantity",
     "Recorded",
     "causes",
     "check_quality",

@@ -1,12 +1,9 @@
 """A load on one channel of a force plate shows in another channel."""
 
-import numpy as np
-
-from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.words import CALIBRATE, About, CauseWords, CheckKind
-from biodance.records import CHANNELS, Array
-from biodance.spatial import wrench_about_origin
+from biodance.lab.plates.faults import CROSSTALK
 
 _LEAST = {"1": 0.002, "m": 0.001, "1/m": 0.01}
 """1, m, 1/m that matter: makers' accuracy, 0.05 to 0.2 % of full scale."""
@@ -16,12 +13,13 @@ _ALIKE = 0.005
 """Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
-class PlateCrosstalk(Effect):
+class PlateCrosstalk(InstalledPlate):
     """``ratio`` of the second channel to the first (1, or m for a moment from a force) about the plate's centre;
     target ``Fz->My``.
     """
 
     name = "plate_crosstalk"
+    fault = CROSSTALK
     by_load = True
     parameters = (
         Parameter(
@@ -49,21 +47,6 @@ class PlateCrosstalk(Effect):
     words = CauseWords("{size}{between} of {it} leaks into {other}", CALIBRATE, "a cross-talk")
     explains = (CheckKind.PRESSURE, CheckKind.FORCES)
     rarer = 1.0
-
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every ordered pair of different channels, of every plate when there are several."""
-        pairs = tuple(f"{a}->{b}" for a in CHANNELS for b in CHANNELS if a != b)
-        if len(case.trial.plates) == 1:
-            return pairs
-        return tuple(f"{plate.name}:{pair}" for plate in case.trial.plates for pair in pairs)
-
-    def columns(self, case: Case) -> Array:
-        """Return the predicted first channel in the place of the second, moved to the lab origin."""
-        plate = self.plate_of(case)
-        first, _, second = self.target.rpartition(":")[2].partition("->")
-        change = case.predicted_on(plate)[:, CHANNELS.index(first), None] * np.eye(6)[CHANNELS.index(second)]
-        return wrench_about_origin(change, plate.centre)[:, :, None]
 
 
 EFFECT = PlateCrosstalk

@@ -7,10 +7,13 @@ import numpy as np
 
 from biodance.effects._base.carried import Carried, carried_by_plates
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import ChannelEffect, Parameter
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import CALIBRATE, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.effects.body_mass import BodyMass
+from biodance.lab.plates.faults import GAIN
 from biodance.records import Array, Trial, Wrench
 from biodance.spatial import wrench_shift
 
@@ -37,10 +40,11 @@ _ALIKE = 0.004
 """Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
-class PlateGain(ChannelEffect):
+class PlateGain(InstalledPlate):
     """A relative ``gain`` (0.04: reads 4 % too much) of channel ``target`` about the plate's centre."""
 
     name = "plate_gain"
+    fault = GAIN
     by_load = True
     parameters = (
         Parameter(
@@ -70,14 +74,12 @@ class PlateGain(ChannelEffect):
     )
     words = CauseWords("{it} reads {size} too {more}{between}", CALIBRATE, "a wrong gain", TOO_MUCH)
     explains = (CheckKind.WEIGHT, CheckKind.FORCES)
-
-    def in_channel(self, case: Case) -> Array:
-        """Return the predicted channel itself."""
-        return case.predicted_on(self.plate_of(case))[:, self.channel]
+    followed = (Quantity("gain", "1", name, "Fz", 0.003, 0.01, 0.1),)
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md)."""
 
     def in_proportion(self, case: Case, theta: Array) -> Array:
         """Return the gain of its channel about the plate's centre."""
-        there, only = wrench_shift(self.plate_of(case).centre), np.diag(np.eye(6)[self.channel])
+        there, only = wrench_shift(self.plate_of(case).centre), self.fault.slope(self.place)
         return np.asarray(theta[0] * np.linalg.inv(there) @ only @ there)
 
     @classmethod

@@ -8,6 +8,7 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import ACCEPT, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.records import CHANNELS, Array, Plate, Session, Trial, Wrench, runs
 from biodance.spatial import wrench_about_origin, wrench_about_point
@@ -62,6 +63,14 @@ class PlateOffset(ChannelEffect):
         "{it} reads {size} too {more}{between} all the time", f"Zero the plate, {ACCEPT}", "a wrong zero", TOO_MUCH
     )
     explains = (CheckKind.WEIGHT, CheckKind.PRESSURE, CheckKind.FORCES)
+    followed = (
+        Quantity("offset_x", "N", name, "Fx", 0.5, 2.0, 0.05),
+        Quantity("offset_y", "N", name, "Fy", 0.5, 2.0, 0.05),
+        Quantity("offset_z", "N", name, "Fz", 0.5, 2.0, 0.05),
+    )
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md) and the re-zeroing rules of
+    laboratory guides (+-5 N).
+    """
 
     def in_channel(self, case: Case) -> Array:
         """Return one; zero in a trial that saw the plate empty: there its reading was taken off."""

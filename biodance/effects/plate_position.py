@@ -1,11 +1,10 @@
 """A force plate lies elsewhere than the laboratory's file says."""
 
-import numpy as np
-
-from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axis_targets
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.installed_plate import InstalledPlate
+from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, CheckKind
-from biodance.records import Array
+from biodance.lab.plates.faults import POSITION
 
 _LEAST = 0.003
 """m that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,
@@ -16,12 +15,13 @@ _ALIKE = 0.005
 """Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
-class PlatePosition(Effect):
+class PlatePosition(InstalledPlate):
     """A ``shift`` (m) along a lab axis of where the file puts the plate, relative to where it is; target
     ``plate1:x``.
     """
 
     name = "plate_position"
+    fault = POSITION
     by_load = True
     parameters = (
         Parameter(
@@ -51,16 +51,11 @@ class PlatePosition(Effect):
         "{plate} lies {size}{between} along {axis} from where the file says", MEASURE_CORNERS, "a plate elsewhere"
     )
     explains = (CheckKind.PRESSURE,)
-
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every axis of every plate."""
-        return plate_axis_targets(case)
-
-    def columns(self, case: Case) -> Array:
-        """Return the moment of the predicted force over a shift of one metre."""
-        force = case.predicted_on(self.plate_of(case))[:, :3]
-        return np.concatenate([np.zeros_like(force), np.cross(axis_vector(self.target), force)], axis=1)[:, :, None]
+    followed = (
+        Quantity("place_x", "m", name, "x", 0.002, 0.003, 0.3, 0.004),
+        Quantity("place_y", "m", name, "y", 0.002, 0.003, 0.3, 0.004),
+    )
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md)."""
 
 
 EFFECT = PlatePosition

@@ -3,10 +3,11 @@
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter, axis_vector, plate_axis_targets
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.words import MEASURE_CORNERS, About, CauseWords, CheckKind
+from biodance.lab.plates.faults import ROTATION
 from biodance.records import Array
-from biodance.spatial import axis_rotation, wrench_about_origin
 
 _LEAST = 0.005
 """rad that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,
@@ -17,12 +18,13 @@ _ALIKE = 0.01
 """Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
-class PlateRotation(Effect):
+class PlateRotation(InstalledPlate):
     """An ``angle`` (rad) about a lab axis through the plate's centre by which the recorded wrench is turned; target
     ``plate1:z`` for yaw.
     """
 
     name = "plate_rotation"
+    fault = ROTATION
     by_load = True
     parameters = (
         Parameter(
@@ -49,18 +51,10 @@ class PlateRotation(Effect):
     words = CauseWords("{plate} is turned {size}{between} about {axis}", MEASURE_CORNERS, "a turned plate")
     explains = (CheckKind.PRESSURE, CheckKind.FORCES)
 
-    @classmethod
-    def targets(cls, case: Case) -> tuple[str, ...]:
-        """Return every axis of every plate."""
-        return plate_axis_targets(case)
-
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose plate wrench is turned by ``theta``: exact for any angle."""
-        plate = self.plate_of(case)
-        turn = axis_rotation(axis_vector(self.target), np.atleast_1d(theta))[0]
-        local = case.predicted_on(plate)
-        turned = np.concatenate([local[:, :3] @ turn.T, local[:, 3:] @ turn.T], axis=1)
-        return case.with_added(plate, wrench_about_origin(turned - local, plate.centre))
+        turned = self.fault.mixing(self.place, float(np.ravel(theta)[0])) - np.eye(6)
+        return case.with_added(self.plate_of(case), self._added(case, turned))
 
 
 EFFECT = PlateRotation

@@ -8,6 +8,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass
 from biodance.records import Array, Trial, Wrench
@@ -70,6 +71,8 @@ class TimeDelay(Effect):
         ("forces late", "forces early"),
     )
     explains = (CheckKind.FORCES,)
+    followed = (Quantity("delay", "s", name, "", 0.002, 0.004, 0.15, 0.003),)
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md)."""
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces come ``theta[0]`` seconds late."""

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.combine_witnesses import SimulatedSize
-from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict, of_family
+from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.naming import Naming, required_evidence
+from biodance.diagnosis.of_family import of_family
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason

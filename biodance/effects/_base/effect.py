@@ -262,11 +262,6 @@ class ChannelEffect(Effect, ABC):
         return wrench_about_origin(only, self.plate_of(case).centre)[:, :, None]
 
 
-def plate_axis_targets(case: Case) -> tuple[str, ...]:
-    """Return the targets ``plate1:x``, ``plate1:y``, ``plate1:z`` of every plate."""
-    return tuple(f"{plate.name}:{axis}" for plate in case.trial.plates for axis in "xyz")
-
-
 def axis_vector(target: str) -> Array:
     """Return the unit vector (3,) of the axis that a target ends with."""
     return np.eye(3)["xyz".index(target[-1])]

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import ClassVar
 
 from biodance.effects._base.case import Case
+from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass, newton_of
 from biodance.records import Session, Trial
@@ -80,6 +81,8 @@ class Checked:
     """Checks outside their limits that may come from it; one of weight adds or takes weight, as a load does."""
     raw: ClassVar[bool] = False
     """Whether it spoils the raw channels: what feet, clocks and weights measure in such recordings has no size."""
+    followed: ClassVar[tuple[Quantity, ...]] = ()
+    """What is followed of it from visit to visit in an archive."""
     habit: ClassVar[bool] = False
     """Whether it is no fault of an instrument: told as a finding, and nothing is wrong with it alone."""
 
