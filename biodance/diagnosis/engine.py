@@ -250,7 +250,7 @@ def _finding(one: NamedCause, found: Round, known: Tolerances, case: Case) -> Fi
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.model_error(one.effect.name) * length)
-    reported = one.effect.reported(one.theta + one.effect.origin(case), sd)
+    reported = one.effect.reported(case, one.theta, sd)
     place = one.effect.target
     parameters = tuple(Estimate(name, size, own, unit_at(unit, place)) for name, size, own, unit in reported)
     advice = f"{one.effect.advice} {in_plate_axes(place, case.trial.plates)}".strip()

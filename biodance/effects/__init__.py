@@ -17,6 +17,7 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
 from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.transient import Transient
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.errors import UnknownName
 from biodance.records import Session
@@ -35,6 +36,7 @@ __all__ = [
     "QualityCheck",
     "Quantity",
     "Recorded",
+    "Transient",
     "causes",
     "check_quality",
     "discrete_effects",

@@ -57,6 +57,10 @@ class AddedMass(Effect):
         load = point_mass(theta[0], self.origin(case)[1:] + np.asarray(theta[1:4]))
         return case.needed_by(load, case.body.segment_index(self.target))
 
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+        """Return the place from the joint of the segment, from where everything else counts, instead of its CoM."""
+        return super().reported(case, theta + self.origin(case), sd)
+
     def origin(self, case: Case) -> Array:
         """Return (4,) no mass, and the CoM that its place is counted from, in the segment's joint frame."""
         index = case.body.segment_index(self.target)

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.transient import Transient
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
@@ -20,7 +21,7 @@ _LEAST = 2.0
 
 
 @dataclass(frozen=True)
-class ExternalContact(Effect):
+class ExternalContact(Transient):
     """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, or ``place`` (m,
     segment axes) from it, which the plates lack.
     """

@@ -59,7 +59,7 @@ class FilterMismatch(Effect):
             case.trial.plates[0], _passed(case, case.predicted, float(np.ravel(theta)[0])) - case.predicted
         )
 
-    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the cut-off itself, Hz; its standard deviation to first order."""
         inverse = 1 / REFERENCE**4 + STRENGTH * max(float(theta[0]), 0.0)
         cutoff = inverse**-0.25

@@ -91,9 +91,9 @@ class SloshingLoad(Effect):
         level = np.array([1.0, 1.0, 0.0])
         return rigid, oscillator_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 
-    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the frequency itself instead of its difference."""
-        mass, sloshing, _, high = super().reported(theta, sd)
+        mass, sloshing, _, high = super().reported(case, theta, sd)
         return mass, sloshing, ("frequency", _frequency(theta), float(sd[2]), "Hz"), high
 
     def possible(self, theta: Array) -> bool:

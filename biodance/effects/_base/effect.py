@@ -143,22 +143,6 @@ class Effect(Checked):
         """
         return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
 
-    def local(self, case: Case) -> Array | None:
-        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and
-        goes; None for the others. The k parameters follow one another in time, as many for each of `parameters`.
-        """
-        return None
-
-    def beside(self, place: Array) -> "Effect | None":
-        """Return the cause where it acts ``place`` (3,) m from its usual point, in the axes of its segment; None for
-        one that acts at no point.
-        """
-        return None
-
-    def at_full_rate(self) -> "Effect":
-        """Return the cause with the finest allowed time course (`local`)."""
-        return self
-
     def marker_columns(self, case: Case) -> Array | None:
         """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say
         nothing.
@@ -215,17 +199,11 @@ class Effect(Checked):
         """Return whether a cause of size ``theta`` (p,) can be in the person and laboratory of ``case``."""
         return self.possible(theta)
 
-    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd``
-        (p,).
+        (p,) in ``case``.
         """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
-
-    def origin(self, case: Case) -> Array:
-        """Return (p,) what a report adds to the parameters, so that they count from where everything else counts: a
-        place from the joint of its segment; by default nothing.
-        """
-        return np.zeros(len(self.parameters))
 
     def reported_size(self, size: float) -> float:
         """Return a detection limit in reported form, from a ``size`` of the first parameter; by default the same."""
