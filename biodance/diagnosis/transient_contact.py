@@ -90,7 +90,8 @@ def with_transient_contact(naming: Naming, chosen: Chosen[Effect] = None) -> Nam
 
 def _log_bayes_factor_of_contact(base: Model, naming: Naming) -> float:
     """Return the log Bayes factor of the contact named last, against the model ``base`` without it."""
-    sized = _best_size(base, naming.accepted[-1].suspects[0].effect)
+    contact = naming.accepted[-1].suspects[0].effect
+    sized = _best_size(base, contact) if isinstance(contact, Transient) else None
     return sized.log_bayes_factor if sized else -np.inf
 
 
