@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from diagnosed_sessions import body, known, windows
 
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.of_family import of_family
-from biodance.effects import About, Case, CauseWords, CheckKind, Effect, Parameter, causes, known_cause
+from biodance.effects import About, Case, CauseWords, CheckKind, Effect, Parameter, causes, effects, known_cause
 from biodance.pipeline.cause_words import alternatives, spoken
 from biodance.pipeline.finding_words import cause_of, in_words
 from biodance.pipeline.headline import headline
@@ -67,3 +69,29 @@ def test_its_sizes_count_at_each_target(target: str, size: float, matter: bool) 
     assert matters(rope, np.array([size])) is matter
     own = rope.parameters[0]
     assert [own.usual_at(at) for at in ("Fx", "plate2:Fz", "Mx")] == [6.0, 9.0, 0.0]
+
+
+def shaken(time: Array) -> Array:
+    """Return the wrench (T, 6) of one newton sideways, one metre over the lab's origin, 1.3 times a second."""
+    force = np.outer(np.sin(2 * np.pi * 1.3 * time), [0.0, 1.0, 0.0])
+    return np.concatenate([force, np.cross([0.0, 0.0, 1.0], force)], axis=1)
+
+
+@pytest.mark.parametrize(("least", "found"), [(10.0, ["rope"]), (80.0, [])])
+def test_the_engine_asks_an_object_which_size_matters(least: float, found: list[str]) -> None:
+    """50 N are hidden."""
+
+    class Shaken(Rope):
+        """A rope that is shaken sideways."""
+
+        parameters = (Parameter("pull", "N", 20.0, "a spring balance", least),)
+
+        def columns(self, case: Case) -> Array:
+            """Return the wrench of one newton."""
+            return shaken(case.motion.time)[:, :, None]
+
+    some = windows(1, hidden=lambda wrench, session, moving: wrench + 50.0 * shaken(moving.time))
+    family = effects(("plate_offset", "plate_gain")) | {"rope": Shaken()}
+    one = of_family(diagnose_trials(body(), some, tolerances=known(), effects=family).diagnosis, family)
+    assert [finding.effect for finding in one.findings] == found
+    assert all(finding.cause.words is Rope.words for finding in one.findings)
