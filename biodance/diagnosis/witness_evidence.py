@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.effects.axis_error import AxisError
 from biodance.records import Array, Session
 from biodance.witnesses import (
     Alteration,
@@ -185,7 +186,7 @@ def collect_evidence(
             if cause.names in known:
                 parts[cause.names][i] = traces(one, some, cause)
         shift = np.array([o.expected - p.expected for o, p in zip(some, plainly[i], strict=True)])
-        for name, undo in turned_signs(one, single=single).items() if one.steps and "axis_error" in asked else ():
+        for name, undo in turned_signs(one, single=single).items() if one.steps and AxisError.name in asked else ():
             turned.setdefault(name, [value.copy() for value in plain])[i] = _observe_again(undo(one), some) - shift
     return WitnessEvidence(
         tuple(o for some in found for o in some),

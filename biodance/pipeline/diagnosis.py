@@ -13,6 +13,7 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.naming import Naming, required_evidence
+from biodance.diagnosis.of_family import of_family
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason
@@ -133,14 +134,15 @@ def diagnose_session(
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     tell("looking for faults too large for statistics")
-    mended = with_faults_undone(result, mended, causes(effects), reference=reference, tell=tell)
+    family = causes(effects)
+    mended = with_faults_undone(result, mended, family, reference=reference, tell=tell)
     result = result if mended is None else mended.result
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
     tell("asking the witnesses: feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
     measured = _measured(naming, found.diagnosis.why) if naming else {}
-    whole = combined_with_witnesses(result, found.diagnosis, found.examined, evidence, measured)
+    whole = combined_with_witnesses(result, of_family(found.diagnosis, family), found.examined, evidence, measured)
     if naming:
         whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
     whole = named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
@@ -150,6 +152,7 @@ def diagnose_session(
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
     looked_at = found.examined.naming.found.problem.looked_at if found.examined else frozenset[str]()
+    whole = of_family(whole, family)
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, looked_at)))

@@ -25,7 +25,8 @@ from biodance.effects import Case
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
-from biodance.lab.corrections import PARAMETER_OF, PlateCorrection, corrected_trial
+from biodance.lab.corrections import PlateCorrection, corrected_trial
+from biodance.lab.plates.faults import PLATE_FAULTS
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.judged_trials import cases_of, windows
 from biodance.pipeline.results import SessionResult
@@ -64,7 +65,8 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
     """Return the ``findings`` that can be corrected in recordings, found in ``source``."""
     out = []
     for one in findings:
-        size = {p.name: p for p in one.parameters}.get(PARAMETER_OF.get(one.effect, ""))
+        fault = PLATE_FAULTS.get(one.effect)
+        size = {p.name: p for p in one.parameters}.get(fault.parameter) if fault else None
         if size is not None and np.isfinite(size.value):
             out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
     return tuple(out)

@@ -10,8 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from biodance.records import CHANNELS, Array, Plate, Wrench
-from biodance.spatial import axis_rotation, wrench_about_origin, wrench_about_point
+from biodance.effects.axis_error import AxisError
+from biodance.effects.body_mass import BodyMass
+from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, POSITION, ROTATION, PlateFault
+from biodance.records import CHANNELS, Plate, Wrench
+from biodance.spatial import wrench_about_origin, wrench_about_point
 from biodance.witnesses._recording import SeenTrial
 
 
@@ -40,28 +43,18 @@ def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[Alt
     """
     single = len(seen.trial.plates) == 1 if single is None else single
     found = [
-        Alteration("time_delay", "", "delay", "s", 0.004, _late),
-        Alteration("body_mass", "", "error", "kg", 0.5, lambda seen, size: replace(seen, mass=seen.mass - size)),
+        _of_plates(DELAY, tuple(plate.name for plate in seen.trial.plates), "", "", "s", 0.004),
+        Alteration(BodyMass.name, "", "error", "kg", 0.5, lambda seen, size: replace(seen, mass=seen.mass - size)),
     ]
     for plate in seen.trial.plates:
-        prefix = "" if single else f"{plate.name}:"
-        found += [
-            Alteration("plate_position", f"{plate.name}:{a}", "shift", "m", 0.004, _moved(plate.name, a)) for a in "xy"
-        ]
-        found.append(Alteration("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02, _turned(plate.name)))
-        for k, name in enumerate(CHANNELS):
-            unit = "N" if k < 3 else "N·m"
-            found.append(
-                Alteration(
-                    "plate_offset", f"{prefix}{name}", "offset", unit, 2.0 if k < 3 else 0.5, _offset(plate.name, k)
-                )
-            )
-        for k, name in enumerate(CHANNELS[:3]):
-            found.append(Alteration("plate_gain", f"{prefix}{name}", "gain", "1", 0.02, _gained(plate.name, k)))
-        for k, name in ((3, "Mx"), (4, "My")):
-            found.append(
-                Alteration("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004, _crossed(plate.name, k))
-            )
+        name = plate.name
+        prefix = "" if single else f"{name}:"
+        found += [_of_plates(POSITION, (name,), f"{name}:", axis, "m", 0.004) for axis in "xy"]
+        found.append(_of_plates(ROTATION, (name,), f"{name}:", "z", "rad", 0.02))
+        found += [_of_plates(OFFSET, (name,), prefix, channel, "N", 2.0) for channel in CHANNELS[:3]]
+        found += [_of_plates(OFFSET, (name,), prefix, channel, "N·m", 0.5) for channel in CHANNELS[3:]]
+        found += [_of_plates(GAIN, (name,), prefix, channel, "1", 0.02) for channel in CHANNELS[:3]]
+        found += [_of_plates(CROSSTALK, (name,), prefix, f"Fz->{moment}", "m", 0.004) for moment in ("Mx", "My")]
     return tuple(found)
 
 
@@ -74,79 +67,43 @@ def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], C
     prefix = {plate.name: "" if single else f"{plate.name}:" for plate in seen.trial.plates}
     return MappingProxyType(
         {
-            ("axis_error", f"{prefix[plate.name]}{name}"): _mirrored(plate.name, name)
+            (AxisError.name, f"{prefix[plate.name]}{name}"): _mirrored(plate.name, name)
             for plate in seen.trial.plates
             for name in CHANNELS[:5]
         }
     )
 
 
-def _with(seen: SeenTrial, plate: Plate) -> SeenTrial:
-    """Return the recording with one plate replaced by its altered self."""
-    plates = tuple(plate if one.name == plate.name else one for one in seen.trial.plates)
-    return replace(seen, trial=replace(seen.trial, plates=plates))
+def _of_plates(
+    fault: PlateFault, plates: tuple[str, ...], prefix: str, place: str, unit: str, step: float
+) -> Alteration:
+    """Return a fault of some plates; a zero that the reader found and took off is still what the plate reads empty."""
 
+    def recorded(plate: Plate, size: float) -> Plate:
+        if fault is OFFSET and was_zeroed(plate):
+            return replace(plate, zero=plate.zero + size * fault.zero(place)[:3])
+        return fault.done(plate, place, size)
 
-def _about_centre(seen: SeenTrial, name: str, change: Callable[[Array], Array]) -> SeenTrial:
-    """Return the recording with a change of a plate's wrench (S, 6) about its centre."""
-    plate = seen.plate(name)
-    value = wrench_about_origin(change(wrench_about_point(plate.wrench.value, plate.centre)), plate.centre)
-    return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value)))
+    def alter(seen: SeenTrial, size: float) -> SeenTrial:
+        every = (recorded(plate, size) if plate.name in plates else plate for plate in seen.trial.plates)
+        return replace(seen, trial=replace(seen.trial, plates=tuple(every)))
 
-
-def _in_channel(seen: SeenTrial, name: str, k: int, added: Array | float) -> SeenTrial:
-    """Return the recording with ``added`` (S,) or always the same in channel ``k`` of a plate, about its centre."""
-    plate = seen.plate(name)
-    unit = wrench_about_origin(np.eye(6)[k], plate.centre)
-    value = plate.wrench.value + np.multiply.outer(added, unit)
-    value.setflags(write=False)  # the record keeps it without a copy
-    return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value)))
-
-
-def _late(seen: SeenTrial, delay: float) -> SeenTrial:
-    plates = tuple(replace(p, wrench=Wrench(p.wrench.time + delay, p.wrench.value)) for p in seen.trial.plates)
-    return replace(seen, trial=replace(seen.trial, plates=plates))
-
-
-def _moved(name: str, axis: str) -> Callable[[SeenTrial, float], SeenTrial]:
-    def alter(seen: SeenTrial, shift: float) -> SeenTrial:
-        plate, vector = seen.plate(name), shift * np.eye(3)["xyz".index(axis)]
-        value = wrench_about_origin(plate.wrench.value, vector)
-        return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value), corners=plate.corners + vector))
-
-    return alter
-
-
-def _turned(name: str) -> Callable[[SeenTrial, float], SeenTrial]:
-    def alter(seen: SeenTrial, angle: float) -> SeenTrial:
-        turn = axis_rotation(np.array([0.0, 0.0, 1.0]), np.array([angle]))[0]
-        return _about_centre(seen, name, lambda w: np.concatenate([w[:, :3] @ turn.T, w[:, 3:] @ turn.T], axis=1))
-
-    return alter
-
-
-def _offset(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    def alter(seen: SeenTrial, offset: float) -> SeenTrial:
-        plate = seen.plate(name)
-        if was_zeroed(plate):
-            return _with(seen, replace(plate, zero=plate.zero + offset * np.eye(6)[k][:3]))
-        return _in_channel(seen, name, k, offset)
-
-    return alter
-
-
-def _gained(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    return lambda seen, gain: _in_channel(seen, name, k, gain * seen.plate(name).wrench.value[:, k])
-
-
-def _crossed(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    return lambda seen, ratio: _in_channel(seen, name, k, ratio * seen.plate(name).wrench.value[:, 2])
+    return Alteration(fault.name, f"{prefix}{place}", fault.parameter, unit, step, alter)
 
 
 def _mirrored(name: str, channel: str) -> Callable[[SeenTrial], SeenTrial]:
     sign = 1.0 - 2.0 * np.eye(6)[CHANNELS.index(channel)]
     sign = -sign if channel == "Fz" else sign
-    return lambda seen: _about_centre(seen, name, lambda w: w * sign)
+
+    def mirrored(plate: Plate) -> Plate:
+        local = wrench_about_point(plate.wrench.value, plate.centre) * sign
+        return replace(plate, wrench=Wrench(plate.wrench.time, wrench_about_origin(local, plate.centre)))
+
+    def undo(seen: SeenTrial) -> SeenTrial:
+        every = (mirrored(plate) if plate.name == name else plate for plate in seen.trial.plates)
+        return replace(seen, trial=replace(seen.trial, plates=tuple(every)))
+
+    return undo
 
 
 def was_zeroed(plate: Plate) -> bool:

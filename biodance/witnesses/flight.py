@@ -4,6 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from biodance.effects.plate_drift import PlateDrift
+from biodance.effects.plate_offset import PlateOffset
 from biodance.records import Array, runs
 from biodance.witnesses import FootPath, Observation, SeenTrial, Witness
 
@@ -21,7 +23,7 @@ class Flight(Witness):
     """Mean force (N) of every plate while both feet are in the air."""
 
     name = "flight"
-    sees = ("plate_offset", "plate_drift")
+    sees = (PlateOffset.name, PlateDrift.name)
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 

@@ -6,6 +6,10 @@ tell it from where the laboratory puts its toe marker. A turned plate shows as a
 
 from collections.abc import Mapping
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_position import PlatePosition
+from biodance.effects.plate_rotation import PlateRotation
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._landmark import landmark_across
 from biodance.witnesses._stance import by_step, step_course
@@ -27,7 +31,7 @@ class FootAcross(Witness):
     """Centre of pressure outwards of the line from the heel marker to the front of the foot, m, by phase of stance."""
 
     name = "foot_across"
-    sees = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
+    sees = (PlatePosition.name, PlateRotation.name, PlateCrosstalk.name, AxisError.name)
     needs = "A step with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

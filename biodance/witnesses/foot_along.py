@@ -4,6 +4,9 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 plates, tell plate from foot.
 """
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_position import PlatePosition
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._landmark import landmark_along
 from biodance.witnesses._stance import by_step, step_course
@@ -23,7 +26,7 @@ class FootAlong(Witness):
     """Centre of pressure ahead of the heel marker along the foot, m, early and late in stance."""
 
     name = "foot_along"
-    sees = ("plate_position", "plate_crosstalk", "axis_error")
+    sees = (PlatePosition.name, PlateCrosstalk.name, AxisError.name)
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_position import PlatePosition
 from biodance.motion.contact.over import distance_to_hull
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import by_step
@@ -16,7 +18,7 @@ class FootOutline(Witness):
     """Median distance (m) of the centre of pressure outside the sole that stands there; 0 inside."""
 
     name = "foot_outline"
-    sees = ("plate_position", "axis_error")
+    sees = (PlatePosition.name, AxisError.name)
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "Pressure cannot act where nothing touches; soles by Winter 2009 and ANSUR II 2012."
 

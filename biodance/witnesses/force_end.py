@@ -6,6 +6,7 @@ that runs, has no such instant: its largest acceleration is anywhere (40 ms apar
 
 import numpy as np
 
+from biodance.effects.time_delay import TimeDelay
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import by_step, steps, walks
@@ -23,7 +24,7 @@ class ForceEnd(Witness):
     """
 
     name = "force_end"
-    sees = ("time_delay",)
+    sees = (TimeDelay.name,)
     needs = "Walking steps that leave an empty plate and swing off; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -6,6 +6,10 @@ whole on a plate, no step and no posture; a chair that carries along lowers the 
 
 import math
 
+from biodance.effects.body_mass import BodyMass
+from biodance.effects.plate_gain import PlateGain
+from biodance.effects.plate_offset import PlateOffset
+from biodance.effects.time_delay import TimeDelay
 from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses.stride_force import DECLARED, StrideForce
 
@@ -24,7 +28,7 @@ class Newton(Witness):
     """Lag (s) of the total vertical force behind the trunk, and the mass (kg) that it weighs."""
 
     name = "newton"
-    sees = ("time_delay", "body_mass", "plate_gain", "plate_offset")
+    sees = (TimeDelay.name, BodyMass.name, PlateGain.name, PlateOffset.name)
     needs = "Movement up and down with both feet on the plates (walking, squats); markers of pelvis or trunk, and feet."
     source = "Newton's second law; 13 public laboratories"
 

@@ -7,6 +7,8 @@ slows down brakes more.
 
 import numpy as np
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_rotation import PlateRotation
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._stance import StepCourse, by_step, step_course
@@ -32,7 +34,7 @@ class Shear(Witness):
     """
 
     name = "shear"
-    sees = ("plate_rotation", "axis_error")
+    sees = (PlateRotation.name, AxisError.name)
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
     source = "65 steps of 20 persons of 12 public laboratories; Winter 2009, chapter 5"
 

@@ -6,6 +6,7 @@ is the zero of Mz; horizontal forces, which are small, hardly enter.
 
 import numpy as np
 
+from biodance.effects.plate_offset import PlateOffset
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 from biodance.witnesses import Observation, SeenTrial, Witness
@@ -18,7 +19,7 @@ class StandingTwist(Witness):
     """Mean moment (N·m) of all plates about the vertical through the mean centre of pressure in quiet standing."""
 
     name = "standing_twist"
-    sees = ("plate_offset",)
+    sees = (PlateOffset.name,)
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still does not turn; 11 static trials of 3 public laboratories"
 

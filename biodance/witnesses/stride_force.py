@@ -13,6 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.effects.body_mass import BodyMass
+from biodance.effects.clipping import Clipping
+from biodance.effects.plate_gain import PlateGain
 from biodance.motion.newton import fading
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
@@ -42,7 +45,7 @@ class StrideForce(Witness):
     """
 
     name = "stride_force"
-    sees = ("plate_gain", "body_mass", "clipping")
+    sees = (PlateGain.name, BodyMass.name, Clipping.name)
     needs = "Two steps one after the other on two plates, or one step while the other foot swings; pelvis markers."
     source = "21 whole steps and 40 single supports of 10 persons of 5 public laboratories"
 

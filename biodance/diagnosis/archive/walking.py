@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
+from biodance.effects.plate_position import PlatePosition
 from biodance.records import Array
 from biodance.witnesses import Observation, SeenTrial, observe, possible_causes, traces
 
@@ -49,7 +50,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
     for plate in dict.fromkeys(step.plate for step in seen.steps):
         own = tuple(one for one in found if one.plate == plate)
         if own:
-            causes = {one.target: one for one in possible_causes(seen) if one.effect == "plate_position"}
+            causes = {one.target: one for one in possible_causes(seen) if one.effect == PlatePosition.name}
             columns = np.column_stack([traces(seen, own, causes[f"{plate}:{axis}"], _PLACE) for axis in "xy"])
             out += [
                 StepRow(
