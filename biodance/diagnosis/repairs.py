@@ -114,27 +114,23 @@ def _named(effect: Effect, sizes: list[tuple[str, float]], sd: float) -> Finding
     return Finding(effect.name, effect.target, parameters, (cause,), 1.0, advice=effect.advice)
 
 
-def by_checks(
-    checks: tuple[QualityCheck, ...], left: Diagnosis | None = None, *, suspicious: bool = False
-) -> Diagnosis:
-    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
-    recordings: of what the statistics ``left``, with something ``suspicious`` or not, no findings are taken.
+def with_failed(failed: tuple[QualityCheck, ...], left: Diagnosis) -> Diagnosis:
+    """Return the diagnosis of a session in which checks ``failed``: what they found, and nothing that the simulation of
+    unmended recordings would say; what feet, clocks and weights show stays.
     """
-    findings = tuple(failed_check(quality) for quality in checks if not quality.ok)
     note = (
         "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
         "recordings that are wrong."
     )
-    clean = left is not None and left.verdict == "named, complete" and not suspicious
-    return Diagnosis(
-        verdict="named, complete" if clean else "named, incomplete",
-        findings=findings,
-        checks=checks,
-        adequacy=left.adequacy if left else (),
-        unobservable=left.unobservable if left else (),
-        limits=left.limits if left else (),
-        notes=(note, *(left.notes if left else ())),
-        why={reason: about for reason, about in left.why.items() if reason not in DOUBTS} if left else {},
+    known = {(one.effect, one.target) for one in map(failed_check, failed)}
+    rest = tuple(one for one in left.findings if (one.effect, one.target) not in known)
+    return replace(
+        left,
+        verdict="named, complete" if left.verdict in ("nothing wrong", "named, complete") else "named, incomplete",
+        findings=(*map(failed_check, failed), *rest),
+        notes=(note, *left.notes),
+        why={reason: about for reason, about in left.why.items() if reason not in DOUBTS},
+        probability=1.0,
     )
 
 

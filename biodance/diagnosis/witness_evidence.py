@@ -1,7 +1,7 @@
 """Evidence of the witnesses of a session: their observations, and the contribution of every cause to each of them."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -71,6 +71,16 @@ class WitnessEvidence:
             {name: value[kept] for name, value in self.turned.items()},
             self.seconds,
             self.recorded,
+        )
+
+    def only(self, names: Collection[str]) -> "WitnessEvidence":
+        """Return the evidence of some observations alone, by the names of what sees them."""
+        kept = np.array([one.witness in names for one in self.observations], dtype=bool)
+        return replace(
+            self,
+            observations=tuple(one for one in self.observations if one.witness in names),
+            traces={name: trace[kept] for name, trace in self.traces.items()},
+            turned={},
         )
 
     @cached_property

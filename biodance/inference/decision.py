@@ -18,8 +18,8 @@ from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.reasons import Reason
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.left import adequacy
-from biodance.inference.scales import SOFT, prior_sd
 from biodance.inference.rows import BODY, Rows
+from biodance.inference.scales import SOFT, prior_sd
 from biodance.inference.sets import Hypothesis, Posterior, Search, cause_key, hypothesis
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
@@ -99,9 +99,14 @@ def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...
     out = []
     for cause in best.causes:
         rest = best.names - {cause_key(cause)}
-        here = {next(iter(names - rest)): v for names, v in total.items() if len(names) == len(best.names) and rest < names}
+        here = {
+            next(iter(names - rest)): v for names, v in total.items() if len(names) == len(best.names) and rest < names
+        }
         none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
-        shares = sorted(((name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()), key=lambda one: -one[1])
+        shares = sorted(
+            ((name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()),
+            key=lambda one: -one[1],
+        )
         out.append(Place(_averaged(posterior, cause), float(1 / (1 + np.exp(none - some))), tuple(shares)))
     return tuple(out)
 
@@ -124,10 +129,8 @@ def _averaged(posterior: Posterior, cause: NamedCause) -> NamedCause:
     return replace(cause, theta=mean, covariance=np.einsum("h,hij->ij", weight, [one[2] for one in found]) + spread)
 
 
-def decide(search: Search, posterior: Posterior, bare: Diagnosis, *, strange: bool = True) -> Inferred:
-    """Return what a session ends with; ``bare`` its diagnosis without any judgement of causes, ``strange`` whether an
-    unusual body or soft tissue may excuse what is left.
-    """
+def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
+    """Return what a session ends with; ``bare`` its diagnosis before any judgement of causes."""
     rows, best = search.rows, posterior.best
     every = [(place, _finding(place, rows, best)) for place in places(posterior, search.prior)]
     named = [(p, f) for p, f in every if p.probability >= NAMED and _told(rows, p.cause)]
@@ -152,7 +155,11 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis, *, strange: bo
         tolerated=tuple(small),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
-        probability=posterior.unknown if verdict == "unexplained" else clean if not named else max(p.probability for p, _ in named),
+        probability=posterior.unknown
+        if verdict == "unexplained"
+        else clean
+        if not named
+        else max(p.probability for p, _ in named),
     )
     return Inferred(told, search, posterior, tuple(p.cause for p, _ in named))
 
@@ -166,7 +173,7 @@ def _told(rows: Rows, one: NamedCause) -> bool:
     if one.course:
         return True
     if rows.problem is None:
-        usual = one.effect.usual_at(one.effect.target)
+        usual = one.effect.parameters[0].usual_at(one.effect.target)
         return bool(abs(one.theta[0]) > usual + one.covariance[0, 0] ** 0.5)
     felt = rows.problem.felt(changes(rows.problem, one.effect, one.theta)[:, None])[0]
     return bool(felt >= 1.0 or (rows.observed(one.effect) != 0).any())
@@ -178,15 +185,18 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
     """
     one, known = place.cause, rows.tolerances
     theta, covariance = one.theta, one.covariance
-    case = rows.problem.cases[0] if rows.problem is not None else None
     if rows.problem is not None and not one.course:
         theta = one.effect.measured(theta, *rows.problem.cases)
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), known.model_error(one.effect.name) * length)
-    origin = one.effect.origin(case) if case is not None else 0.0
-    reported = one.effect.reported(theta + origin, sd)
+    if rows.problem is None:
+        reported = tuple(
+            (p.name, float(t), float(s), p.unit) for p, t, s in zip(one.effect.parameters, theta, sd, strict=True)
+        )
+    else:
+        reported = one.effect.reported(rows.problem.cases[0], theta, sd)
     sizes = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
     return Finding(
         one.effect.name,
@@ -196,6 +206,7 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
         _visible(one, rows, best),
         advice=one.effect.advice,
         probability=place.probability,
+        kind=one.effect,
     )
 
 
@@ -242,10 +253,16 @@ def _habit(best: Hypothesis, rows: Rows, findings: tuple[Finding, ...]) -> tuple
     of the laboratory.
     """
     shown = {name: (v, sd) for name, (v, sd) in _landmarks(best, rows).items() if abs(v) > max(_HABIT + sd, 2 * sd)}
-    contacts = {one.contact for one in (rows.evidence.observations if rows.evidence else ()) if any(LANDMARK in n for n in one.norms)}
+    contacts = {
+        one.contact
+        for one in (rows.evidence.observations if rows.evidence else ())
+        if any(LANDMARK in n for n in one.norms)
+    }
     if not shown or len(contacts) < 2 or any(a.effect == ToeLandmark.name for f in findings for a in f.set):
         return ()
-    sizes = tuple(Estimate("backwards" if name.endswith("along") else "inwards", v, sd, "m") for name, (v, sd) in shown.items())
+    sizes = tuple(
+        Estimate("backwards" if name.endswith("along") else "inwards", v, sd, "m") for name, (v, sd) in shown.items()
+    )
     own = Alias(ToeLandmark.name, _feet(rows), float("inf"))
     return (Finding(own.effect, own.target, sizes, (own,), 1.0, advice=ToeLandmark.advice),)
 

@@ -32,12 +32,20 @@ def adequacy(one: Hypothesis, rows: Rows) -> tuple[Adequacy, ...]:
         here = where.band == b
         total = np.array([np.sum(left[here & (where.trial == t)] ** 2, axis=0) for t in range(len(names))])
         found += [
-            Adequacy(channel, (BANDS.edges[b], BANDS.edges[b + 1]), float(z[6 * b + c]), names[int(np.argmax(total[:, c]))], size=float(size[b, c]))
+            Adequacy(
+                channel,
+                (BANDS.edges[b], BANDS.edges[b + 1]),
+                float(z[6 * b + c]),
+                names[int(np.argmax(total[:, c]))],
+                size=float(size[b, c]),
+            )
             for c, channel in enumerate(CHANNELS)
         ]
     found.sort(key=lambda row: -row.z)
     told = {0, next((i for i, row in enumerate(found) if row.matters), 0)}
-    return tuple(replace(row, second=_second(rows.problem, left, row)) if i in told else row for i, row in enumerate(found))
+    return tuple(
+        replace(row, second=_second(rows.problem, left, row)) if i in told else row for i, row in enumerate(found)
+    )
 
 
 def _newtons(rows: Rows, left: Array) -> Array:
