@@ -12,10 +12,11 @@ import numpy as np
 from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import changes
-from biodance.diagnosis.consequence import matters, unit_at
+from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.reasons import Reason
+from biodance.effects import unit_at
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, Rows
@@ -197,7 +198,7 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
         )
     else:
         reported = one.effect.reported(rows.problem.cases[0], theta, sd)
-    sizes = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
+    sizes = tuple(Estimate(name, size, own, unit_at(unit, one.effect.target)) for name, size, own, unit in reported)
     return Finding(
         one.effect.name,
         one.effect.target,

@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding, Verdict
 from biodance.diagnosis.naming import build_model, causes_of
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
@@ -31,11 +31,11 @@ _SURE = 0.85
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a session shows: the ``problem`` of its simulated trials (None without any), all ``causes`` with their
-    columns, and whether it is only quiet ``standing``, in which no cause of the simulation has a size.
+    """What the simulation of a session shows: its ``problem``, all ``causes`` with their columns, and whether it is only
+    quiet ``standing``, in which no cause of the simulation has a size.
     """
 
-    problem: Problem | None
+    problem: Problem
     causes: tuple[Candidate, ...]
     standing: bool = False
 
@@ -65,20 +65,17 @@ def judge(
     bare: Diagnosis,
     *,
     simulate: bool = True,
-) -> Inferred | None:
+) -> Inferred:
     """Return the diagnosis of a session from everything it shows; from observations alone where nothing was ``seen``,
-    it only stands, or the simulation cannot be believed (``simulate`` False). None where there is nothing at all.
+    it only stands, or the simulation cannot be believed (``simulate`` False).
     """
-    if seen is not None and seen.problem is not None:
+    if seen is not None:
         bare = _with_limits(bare, seen, known, asked)
-        if seen.standing:
-            bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()})
-    if seen is not None and seen.problem is not None and simulate and not seen.standing:
+        bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
+    if seen is not None and simulate and not seen.standing:
         rows = rows_of(seen.problem, seen.causes, known, evidence)
         causes = tuple(one for one in seen.causes if one.names[0] in asked)
     else:
-        if not evidence.counting.observations:
-            return None
         causes = observed_causes(evidence, asked)
         rows = rows_of(None, causes, known, evidence)
     search = Search.of(rows, causes)
@@ -87,9 +84,7 @@ def judge(
     if sign:  # what all other causes do holds only once the sign is mended
         told = replace(found.diagnosis, findings=sign, verdict="named, incomplete")
         found = replace(found, diagnosis=told, named=())
-    if rows.problem is None and seen is not None and seen.problem is not None:
-        found = replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
-    return found
+    return found if rows.problem is not None else replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
 
 
 def is_moving(case: Case) -> bool:
@@ -103,7 +98,6 @@ def is_moving(case: Case) -> bool:
 
 def _with_limits(bare: Diagnosis, seen: Seen, known: Tolerances, asked: Mapping[str, Cause]) -> Diagnosis:
     """Return the diagnosis with the smallest sizes of all causes that the session would show."""
-    assert seen.problem is not None
     kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
     first, causes = build_model(seen.problem, known, kinds, seen.causes)
     limits = detection_limits(visibility(first, causes), seen.problem.cases[0].body, known.threshold)
@@ -111,16 +105,18 @@ def _with_limits(bare: Diagnosis, seen: Seen, known: Tolerances, asked: Mapping[
     return replace(bare, limits=rows, unobservable=hidden(limits), notes=(*bare.notes, *seen.problem.notes))
 
 
-def _with_rest(one: Diagnosis, seen: Seen, known: Tolerances) -> Diagnosis:
-    """Return the diagnosis with what the body leaves of the forces, where only observations were asked for causes."""
-    assert seen.problem is not None
+def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosis:
+    """Return the diagnosis with what the body leaves of the forces, where only observations were asked for causes;
+    where nothing was compared with a body, nothing found is not nothing wrong.
+    """
+    if seen is None:
+        return replace(one, verdict="unexplained") if one.verdict == "nothing wrong" else one
     rows = rows_of(seen.problem, seen.causes, known, None)
     bare = with_unknown(hypothesis(Search.of(rows, ()), ()))
     left = adequacy(bare, rows)
-    unknown = bare.log_unknown > bare.log_posterior and any(row.matters and row.z > 0 for row in left)
-    if not unknown:
+    if not (bare.log_unknown > bare.log_posterior and any(row.matters and row.z > 0 for row in left)):
         return replace(one, adequacy=left)
-    verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
+    verdict: Verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
     return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()})
 
 

@@ -22,7 +22,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
-from biodance.inference.session import Seen, judge, see
+from biodance.inference.session import judge, see
 from biodance.pipeline.another_body import beside_another_body
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted
@@ -198,29 +198,16 @@ def _judged(
                 *own.notes,
             )
             unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
-            why = {reason: () for reason, holds in unsure.items() if holds}
-            bare, looked_at = replace(bare, notes=notes, why=why), seen.problem.looked_at if seen.problem else looked_at
-            simulate = simulate and not why
+            reasons: dict[Reason, tuple[str, ...]] = {reason: () for reason, holds in unsure.items() if holds}
+            bare, looked_at = replace(bare, notes=notes, why=reasons), seen.problem.looked_at
+            simulate = simulate and not reasons
     found = judge(seen, evidence, own.tolerances if own else known, asked, bare, simulate=simulate)
-    one = _unsimulated(found.diagnosis if found else bare, seen)
-    if found is not None:
+    if result.body is not None:
         joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
-        found = replace(found, diagnosis=one)
-        found = (
-            beside_another_body(found, result.body, joints) if result.body is not None and seen is not None else found
-        )
-        tell("measuring what the findings change")
-        told = _with_gains(result, found)
-        told = replace(told, looked_at=looked_at)
-        return told if not failed else replace(told, diagnosis=with_failed(failed, told.diagnosis))
-    return SessionDiagnosis(with_failed(failed, one) if failed else one, looked_at=looked_at)
-
-
-def _unsimulated(one: Diagnosis, seen: Seen | None) -> Diagnosis:
-    """Return the diagnosis of a session of which no movement was compared with a body: nothing found is not nothing
-    wrong.
-    """
-    return replace(one, verdict="unexplained") if seen is None and one.verdict == "nothing wrong" else one
+        found = beside_another_body(found, result.body, joints)
+    tell("measuring what the findings change")
+    told = replace(_with_gains(result, found), looked_at=looked_at)
+    return replace(told, diagnosis=with_failed(failed, told.diagnosis)) if failed else told
 
 
 def standing_notes(result: SessionResult) -> tuple[str, ...]:
