@@ -80,3 +80,9 @@ def clear_axis(direction: Array) -> Array | None:
     i = int(np.argmax(np.abs(direction)))
     axis: Array = np.eye(3)[i] * np.sign(direction[i])
     return axis
+
+
+def turn_to(up: Array) -> Array:
+    """Return the rotation (3, 3) whose third row is a coordinate axis ``up``; its first row is x where possible."""
+    first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
+    return np.stack([first, np.cross(up, first), up]) + 0.0
