@@ -2,7 +2,7 @@
 own stamps, and what that costs is said. One place for tables, .trc and .mot; C3D holds a rate and no stamps.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +14,7 @@ ROUNDED = 0.2
 """Share of a step by which a stamp may lie off equal steps: writers round the time column."""
 _HOLE = 2.5
 """Steps between two stamps from which on nothing is told between them: one row is missing at two."""
-_FEWEST = 4
-"""Rows that a cubic needs."""
-_SLOWEST = 0.2
+LONGEST_STEP = 0.2
 """s: rows farther apart are postures. Below 5 Hz a movement of 2 Hz, the fastest that a person repeats with the whole
 body, cannot be told (Nyquist).
 """
@@ -32,6 +30,11 @@ class TimeAxis:
     time: Array
     sampled: bool
     said: str = ""
+
+    def from_zero(self) -> "TimeAxis":
+        """Return the same axis with its first time at 0."""
+        first = self.time[0] if self.time.size else 0.0
+        return replace(self, stamps=self.stamps - first, time=self.time - first)
 
     def at(self, values: Array) -> Array:
         """Return ``values`` (S, ...) on ``time``, by cubic splines between samples that are known; NaN where one of the
@@ -63,6 +66,8 @@ class TimeAxis:
     @property
     def noise(self) -> float:
         """Factor on the standard deviation of white noise: what a cubic through four samples makes of it on average."""
+        if self.stamps.size < 4:
+            return 1.0
         at = np.clip(np.searchsorted(self.stamps, self.time) - 2, 0, self.stamps.size - 4)
         around = self.stamps[at + np.arange(4)[:, None]]
         power = np.zeros(self.time.size)
@@ -92,11 +97,11 @@ class TimeAxis:
         return float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else float("nan")
 
 
-def time_axis(stamps: Array, *, where: str) -> TimeAxis:
-    """Return the time axis of rows with ``stamps`` (S,) s.
+def time_axis(stamps: Array, *, where: str, row: str = "row") -> TimeAxis:
+    """Return the time axis of rows with ``stamps`` (S,) s; ``row`` is what the file calls one.
 
     Stamps within a fifth of a step of equal steps are equal steps, rounded. Others are resampled at their median step;
-    fewer than four rows at an end, before or behind a hole of more than 2.5 steps, are left out. Rows
+    single rows at an end, before or behind a hole of more than 2.5 steps, are left out. Rows
     more than 0.2 s apart are single postures: they are kept as they are, on equal steps.
 
     Raises
@@ -106,9 +111,9 @@ def time_axis(stamps: Array, *, where: str) -> TimeAxis:
     """
     bad = np.isnan(stamps)
     if bad.any() or np.any(np.diff(stamps) <= 0):
-        row = int(np.argmax(bad)) if bad.any() else int(np.argmax(np.diff(stamps) <= 0)) + 1
+        at = int(np.argmax(bad)) if bad.any() else int(np.argmax(np.diff(stamps) <= 0)) + 1
         raise FileRefused(
-            f"{where}: the time does not increase at row {row + 1} ({stamps[row]:g} s). Export the file again."
+            f"{where}: the time does not increase at {row} {at + 1} ({stamps[at]:g} s). Export the file again."
         )
     if stamps.size < 2:
         return TimeAxis(stamps, stamps, False)
@@ -116,14 +121,10 @@ def time_axis(stamps: Array, *, where: str) -> TimeAxis:
     if np.abs(stamps - even).max() <= ROUNDED * (even[1] - even[0]):
         return TimeAxis(stamps, even, False)
     step = float(np.median(np.diff(stamps)))
-    if step > _SLOWEST:
+    if step > LONGEST_STEP:
         said = f"{_varying(stamps)}: too far apart to tell a movement between rows. Each was kept as a posture."
         return TimeAxis(stamps, stamps[0] + step * np.arange(stamps.size), False, said)
-    pieces = [(a, b) for a, b in _pieces(stamps, np.ones(stamps.size, dtype=bool)) if b - a >= _FEWEST]
-    if not pieces:
-        raise FileRefused(
-            f"{where}: {_varying(stamps)}, and no {_FEWEST} rows follow each other. Export it again with every row."
-        )
+    pieces = [(a, b) for a, b in _pieces(stamps, np.ones(stamps.size, dtype=bool)) if b - a > 1]
     first, last = pieces[0][0], pieces[-1][1] - 1
     kept = stamps[first : last + 1]
     time = kept[0] + step * np.arange(int((kept[-1] - kept[0]) / step + 1e-6) + 1)
@@ -141,7 +142,7 @@ def _varying(stamps: Array) -> str:
 def _pieces(stamps: Array, known: Mask) -> list[tuple[int, int]]:
     """Return the runs (start, stop) of ``known`` samples (S,) without a hole between their stamps."""
     holes = np.flatnonzero(np.diff(stamps) > _HOLE * np.median(np.diff(stamps))) + 1
-    found = []
+    found: list[tuple[int, int]] = []
     for start, stop in runs(known):
         cuts = [start, *holes[(holes > start) & (holes < stop)].tolist(), stop]
         found += pairwise(cuts)

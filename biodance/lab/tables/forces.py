@@ -114,7 +114,6 @@ def table_plates(
         if done.warnings:
             return TablePlates(tuple(placed), tuple(history), done.warnings)
     plates = sorted((_told(plate, told.plates.get(plate.name, NOTHING_TOLD)) for plate in placed), key=_number)
-    history += [f"{plate.name}: {sentence}" for plate in plates for sentence in plate.decisions]
     idle = [f"{n}: {', '.join(keys)}" for n, keys in _idle(told).items()]
     warnings = [f"{one} of session.toml can be followed in C3D files only." for one in idle]
     return TablePlates(tuple(plates), tuple(history), tuple(warnings))

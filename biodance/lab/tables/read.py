@@ -9,8 +9,8 @@ import numpy as np
 from biodance.errors import FileRefused
 from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.resampled import resampled
 from biodance.lab.markers.sets import MarkerSet, read_marker_set, recognise
-from biodance.lab.markers.signals import faulty_markers, without_faults
 from biodance.lab.markers.upright import axis_to_head, turn_to
 from biodance.lab.opensim.trc import body_is_tall_along_z
 from biodance.lab.plain_text import read_bytes, sha256
@@ -22,7 +22,7 @@ from biodance.lab.time_axis import TimeAxis, time_axis
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
-_LONGEST_STEP = 1.5
+_IN_SECONDS = 1.5
 """Steps of a time column up to which it is in s (in ms, µs beyond): from 0.7 Hz on, so from 667 Hz down in ms."""
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _PERSON = 1.5
@@ -49,14 +49,13 @@ def read_table(path: Path, *, role: Role, told: Told | None = None) -> Trial:
             f"(LASI_x, LASI_y, LASI_z). The columns are {', '.join(cells.labels[:6])} ..."
         )
     stamps, timed = _stamps(cells, columns, path)
-    axis = time_axis(stamps, where=str(path))
-    markers, lengths, turn = _markers(cells, columns, stamps, path)
-    markers, unseen = _as_seen(markers)
+    axis = time_axis(stamps, where=str(path)).from_zero()
+    rows, lengths, turn = _markers(cells, columns, stamps, path)
     loads, weighed = loads_of(columns.plates, cells.labels, cells.units, cells.values)
-    known, worn = recognise(markers.names), _worn(markers)
-    resampled = Markers(markers.names, axis.time, axis.at(markers.xyz))
+    known, worn = recognise(rows.names), _worn(rows)
+    markers, unseen = resampled(rows.names, rows.xyz, axis)
     plates = table_plates(
-        [Load(one.columns, axis.at(one.value)) for one in loads], axis.time, turn, resampled, worn, told or Told()
+        [Load(one.columns, axis.at(one.value)) for one in loads], axis.time, turn, markers, worn, told or Told()
     )
     history = (
         *cells.said,
@@ -65,14 +64,14 @@ def read_table(path: Path, *, role: Role, told: Told | None = None) -> Trial:
         *lengths,
         *unseen,
         *([weighed] if weighed else []),
-        *_time_said(axis, markers, loads),
+        *_time_said(axis, rows, loads),
         *plates.history,
     )
     rate = plates.plates[0].wrench.rate if plates.plates else math.nan
-    source = Source(path, sha256(content), "table", rate=resampled.rate, analog_rate=rate)
+    source = Source(path, sha256(content), "table", rate=markers.rate, analog_rate=rate)
     warnings = (*_broken(columns), *([axis.said] if not axis.sampled and axis.said else []), *plates.warnings)
     name = known.name if known else ""
-    return Trial(path.stem, role, resampled, plates.plates, source, name, history=history, warnings=warnings)
+    return Trial(path.stem, role, markers, plates.plates, source, name, history=history, warnings=warnings)
 
 
 def _worn(markers: Markers) -> MarkerSet | None:
@@ -99,13 +98,11 @@ def _stamps(cells: Cells, columns: Columns, path: Path) -> tuple[Array, list[str
     if unit not in _SECONDS:
         step = float(np.median(np.diff(raw))) if raw.size > 1 else 0.0
         whole = step >= 1 and bool((raw == np.rint(raw)).all())
-        factors = [_LONGEST_STEP * 1000**k for k in range(3)]
+        factors = [_IN_SECONDS * 1000**k for k in range(3)]
         unit = "ms" if whole and step < factors[0] else list(_SECONDS)[int(np.searchsorted(factors, step))]
         by = f"steps of {step:.4g}"
     label = cells.labels[columns.time]
-    return (raw - raw[0]) * _SECONDS[unit], [
-        f"Time: column {label} in {unit} ({by}), from its first row ({raw[0]:.10g}) on."
-    ]
+    return (raw - raw[0]) * _SECONDS[unit], [f"Time: column {label} in {unit} ({by}), counted from its first row."]
 
 
 def _markers(cells: Cells, columns: Columns, stamps: Array, path: Path) -> tuple[Markers, list[str], Array]:
@@ -134,12 +131,6 @@ def _markers(cells: Cells, columns: Columns, stamps: Array, path: Path) -> tuple
     turned = "" if axis == "+Z" else "; everything was turned so that z points up"
     said = [f"Coordinates were read in {unit} ({by}) and turned into m.", f"Up is {axis} in the table{turned}.", *zeros]
     return Markers(names, stamps, markers.xyz @ turn.T), said, turn
-
-
-def _as_seen(markers: Markers) -> tuple[Markers, list[str]]:
-    """Return the markers without samples that no body makes, and a sentence for each marker that has some."""
-    faults = faulty_markers(markers)
-    return without_faults(markers, faults), [one.sentence(one.when(markers.time)) for one in faults]
 
 
 def _columns_said(columns: Columns, cells: Cells) -> list[str]:
