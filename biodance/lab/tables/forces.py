@@ -218,7 +218,8 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
             continue
         decisions = (f"Columns {load.columns}, along the axes of the markers.", empty, said, about)
         corners = _around(np.concatenate([cop, feet.middle]) if own and feet is not None else cop)
-        plates.append(Plate(f"plate{number}", 0, corners, wrench, decisions, zero, placed=False, columns=load.columns))
+        name, put = f"plate{number}", shift if own else None
+        plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
     return TablePlates(tuple(plates), tuple(history))
 
 
