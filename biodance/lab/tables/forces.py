@@ -33,6 +33,8 @@ _MARGIN = 0.15
 """m that a foot reaches beyond its markers and pressures."""
 _FLAT = 0.03
 """m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
+_SINKS = 0.02
+"""m by which the mean marker may be lower than when the person stands as high as ever: who squats or bends leans."""
 PLACE_SD = 0.015
 """m by which the pressure of somebody who stands differs from the middle of heels and toes: the way a person leans. The
 three recordings of one man (LAAS) agree to 0.005 m; the pressure of seven adults at rest spreads by 0.015 m.
@@ -166,13 +168,13 @@ def _at_corners(number: int, load: Load, corners: Array, time: Array) -> Plate:
 
 @dataclass(frozen=True, eq=False)
 class _Feet:
-    """Where the feet are: ``middle`` (F, 2) m of the feet on the ground at ``time`` (F,), NaN while none is, and
-    ``both`` (F,) whether both are; ``height`` m of the ground.
+    """Where the feet are: ``middle`` (F, 2) m of the feet on the ground at ``time`` (F,), NaN while none is;
+    ``standing`` (F,) whether both are and the person stands as high as ever.
     """
 
     time: Array
     middle: Array
-    both: Mask
+    standing: Mask
 
 
 def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
@@ -187,7 +189,10 @@ def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
     down = (places[..., 2] < lowest + _FLAT).all(axis=1)  # (side, T)
     foot = np.where(down[..., None], places[..., :2].mean(axis=1), np.nan)
     middle = np.where(down.all(axis=0)[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
-    return _Feet(markers.time, middle, down.all(axis=0))
+    both = down.all(axis=0)
+    height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
+    upright = height > np.nanpercentile(height[both], 95) - _SINKS if both.any() else both
+    return _Feet(markers.time, middle, both & upright)
 
 
 def _pressure(value: Array) -> Array:
@@ -237,8 +242,8 @@ def _put(shift: Array) -> str:
 
 
 def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
-    """Return the median (2,) m by which the feet on the ground lie beside the pressure; of both feet where they stand
-    together, which is known best. None where they never do under load.
+    """Return the median (2,) m by which the feet on the ground lie beside the pressure, while the person stands upright
+    on both where that is seen. None where no foot is on the ground under load.
     """
     known = np.isfinite(_pressure(total)).all(axis=1)
     if known.sum() < 1:
@@ -246,7 +251,7 @@ def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
     pressure = np.stack([np.interp(feet.time, time[known], axis[known]) for axis in _pressure(total).T], axis=1)
     beside = feet.middle - pressure
     told = np.isfinite(beside).all(axis=1)
-    best = told & feet.both if (told & feet.both).any() else told
+    best = told & feet.standing if (told & feet.standing).any() else told
     return np.asarray(np.median(beside[best], axis=0)) if best.any() else None
 
 
