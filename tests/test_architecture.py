@@ -17,7 +17,7 @@ LINE = 120
 CONTRACTS = {
     "biodance.effects": {"EFFECT"},
     "biodance.dance.limits": {"LIMIT"},
-    "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "sniff", "read"},
+    "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "FOLLOWS_TOLD", "sniff", "read"},
     "biodance.body.export": {"FORMAT", "SUFFIX", "text", "data", "beside"},
     "biodance.witnesses": {"WITNESS"},
 }

@@ -21,7 +21,7 @@ POINT = np.array([0.9, 0.47, 0.0])
 
 
 def one_load(stamps):
-    """Columns of one plate that carries everything: the load on it, about its own point."""
+    """TableColumns of one plate that carries everything: the load on it, about its own point."""
     value = -about(sum(wrenches(stamps)), POINT)
     return {f"{name}0": value[:, k] for k, name in enumerate(FORCES)}
 
@@ -205,10 +205,10 @@ def test_a_table_as_a_session_is_begun_without_a_word(tmp_path):
 def test_wrong_tables_are_refused_in_a_sentence(tmp_path, change, sentence):
     path = write_table(tmp_path / "squat.csv", EVEN, {}, Style())
     path.write_text(change(path.read_text()))
-    from biodance.lab.tables.read import read_table
+    from biodance.lab.tables.read import read_marker_table
 
     with pytest.raises(FileRefused, match=sentence):
-        read_table(path, role="fit")
+        read_marker_table(path, role="fit")
 
 
 def test_notes_and_results_are_no_recordings(tmp_path):

@@ -15,7 +15,7 @@ from biodance.lab.filters import LowPass, force_filter
 from biodance.lab.markers.gaps import Gap, fill_gaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import faulty_markers, without_faults
-from biodance.lab.time_axis import LONGEST_STEP
+from biodance.lab.markers.time_axis import LONGEST_STEP
 from biodance.records import Array, Markers, Plate, Trial, Wrench
 from biodance.settings import GapSettings
 

@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
-from biodance.lab.time_axis import LONGEST_STEP
+from biodance.lab.markers.time_axis import LONGEST_STEP
 from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.records import Array, Motion
 from biodance.records.arrays import rate_of

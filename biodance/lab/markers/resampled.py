@@ -1,7 +1,7 @@
 """Markers of rows with changing time steps on equal ones: what no body does is taken out before it can spread."""
 
 from biodance.lab.markers.signals import faulty_markers, without_faults
-from biodance.lab.time_axis import TimeAxis
+from biodance.lab.markers.time_axis import TimeAxis
 from biodance.records import Array, Markers
 
 

@@ -22,6 +22,8 @@ _CLOUD = 16
 """Markers of a body of which pelvis, knees, ankles and feet can be told without names."""
 _TALL = 0.7
 """Share of the longest extent of a body that its height may be; arms may be spread."""
+_CLEARLY_TALLER = 1.3
+"""A body stands along an axis along which it is so many times as long: arms spread sideways stay below."""
 _CLEAR = 2.0
 """A direction counts if its largest component is so many times the others."""
 
@@ -86,3 +88,20 @@ def turn_to(up: Array) -> Array:
     """Return the rotation (3, 3) whose third row is a coordinate axis ``up``; its first row is x where possible."""
     first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
     return np.stack([first, np.cross(up, first), up]) + 0.0
+
+
+def body_is_tall_along_z(xyz: Array) -> bool:
+    """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
+
+    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
+    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
+    False.
+    """
+    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
+    if seen.shape[1] < 2:
+        return False
+    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
+    if not len(frames):
+        return False
+    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    return bool(extent[2] > _CLEARLY_TALLER * extent[1])

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.lab.markers.time_axis import time_axis
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.opensim.mot import TimeTable
 from biodance.lab.plates.zero import find_baseline
-from biodance.lab.time_axis import time_axis
 from biodance.records import Array, Plate, Wrench
 from biodance.settings import COP_FORCE
 from biodance.spatial import wrench_about_origin

@@ -16,7 +16,8 @@ from biodance.errors import FileRefused, TrialRefused
 from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.resampled import resampled
 from biodance.lab.markers.sets import recognise
-from biodance.lab.markers.upright import axis_to_head
+from biodance.lab.markers.time_axis import time_axis
+from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.plain_text import (
     COMMAS_READ,
@@ -28,11 +29,9 @@ from biodance.lab.plain_text import (
     with_points,
     write_new,
 )
-from biodance.lab.time_axis import time_axis
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-_CLEARLY_TALLER = 1.3
 _HEADER_ROWS = 4
 _WIDEST = 50.0  # m, between the markers of one frame
 _NARROWEST = 0.05  # m, the same of a hand
@@ -243,20 +242,3 @@ def _is_z_up(markers: Markers) -> bool:
     """Return whether z is up in the file: by the labels of high and low markers, else by where the cloud is tall."""
     axis = axis_to_head(markers)
     return body_is_tall_along_z(markers.xyz) if axis is None or axis[0] else bool(axis[2])
-
-
-def body_is_tall_along_z(xyz: Array) -> bool:
-    """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
-
-    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
-    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
-    False.
-    """
-    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
-    if seen.shape[1] < 2:
-        return False
-    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
-    if not len(frames):
-        return False
-    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
-    return bool(extent[2] > _CLEARLY_TALLER * extent[1])

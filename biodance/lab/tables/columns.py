@@ -16,12 +16,12 @@ _TIME = re.compile(
 _BEHIND = re.compile(r"(.+?)[\s_.:\-]*([xyz])(?:[\s_.]+(mm|cm|m))?", flags=re.IGNORECASE)
 _BEFORE = re.compile(r"([xyz])[\s_.:\-]+(.+?)(?:[\s_.]+(mm|cm|m))?", flags=re.IGNORECASE)
 _TURNED = re.compile(r"(force|moment|torque)[\s_.]*([xyz])|(?<![A-Za-z])(t)([xyz])(?![a-z])", flags=re.IGNORECASE)
-FEWEST = 3
+FEWEST_MARKERS = 3
 """Markers that a table must hold: fewer have no frame."""
 
 
 @dataclass(frozen=True)
-class Columns:
+class TableColumns:
     """``time`` column, None = none, and the unit that its label says; ``markers`` label -> columns of x, y, z, and the
     ``length`` unit their labels say; ``plates`` columns of Fx Fy Fz Mx My Mz of each; ``others`` labels of columns that
     are none of these; ``broken`` markers of which an axis is missing.
@@ -36,7 +36,7 @@ class Columns:
     broken: tuple[str, ...]
 
 
-def columns_in(labels: Sequence[str]) -> Columns:
+def columns_in(labels: Sequence[str]) -> TableColumns:
     """Return what the columns with these ``labels`` hold."""
     times = [(k, match) for k, label in enumerate(labels) if (match := _TIME.fullmatch(label))]
     time = times[0][0] if times else None
@@ -50,7 +50,7 @@ def columns_in(labels: Sequence[str]) -> Columns:
     broken = tuple(name for name, axes in found.items() if len(axes) == 2)
     used = taken | {k for some in markers.values() for k in some}
     others = tuple(labels[k] for k in range(len(labels)) if k not in used and labels[k])
-    return Columns(time, (times[0][1][1] or "") if times else "", markers, length, plates, others, broken)
+    return TableColumns(time, (times[0][1][1] or "") if times else "", markers, length, plates, others, broken)
 
 
 def _as_channel(label: str) -> str:

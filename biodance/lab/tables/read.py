@@ -11,14 +11,13 @@ from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.resampled import resampled
 from biodance.lab.markers.sets import MarkerSet, read_marker_set, recognise
-from biodance.lab.markers.upright import axis_to_head, turn_to
-from biodance.lab.opensim.trc import body_is_tall_along_z
+from biodance.lab.markers.time_axis import TimeAxis, time_axis
+from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z, turn_to
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.told import Told
 from biodance.lab.tables.cells import Cells, read_cells
-from biodance.lab.tables.columns import FEWEST, Columns, columns_in
+from biodance.lab.tables.columns import FEWEST_MARKERS, TableColumns, columns_in
 from biodance.lab.tables.forces import Load, loads_of, table_plates
-from biodance.lab.time_axis import TimeAxis, time_axis
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
@@ -29,7 +28,7 @@ _PERSON = 1.5
 """m, largest extent of the markers on a person: 0.9 for legs alone to 2.3 with arms spread or raised."""
 
 
-def read_table(path: Path, *, role: Role, told: Told | None = None) -> Trial:
+def read_marker_table(path: Path, *, role: Role, told: Told | None = None) -> Trial:
     """Return the trial of a table with a column of time, three columns a marker and, where there are any, six a plate.
 
     Lengths and times are in the units of the labels, else in those in which a person has a person's size and the steps
@@ -43,10 +42,10 @@ def read_table(path: Path, *, role: Role, told: Told | None = None) -> Trial:
     content = read_bytes(path)
     cells = read_cells(content, path)
     columns = columns_in(cells.labels)
-    if len(columns.markers) < FEWEST:
+    if len(columns.markers) < FEWEST_MARKERS:
         raise FileRefused(
-            f"{path}: holds {len(columns.markers)} markers; at least {FEWEST} are needed, each as three columns "
-            f"(LASI_x, LASI_y, LASI_z). The columns are {', '.join(cells.labels[:6])} ..."
+            f"{path}: holds {len(columns.markers)} markers; at least {FEWEST_MARKERS} are needed, each as three "
+            f"columns (LASI_x, LASI_y, LASI_z). The columns are {', '.join(cells.labels[:6])} ..."
         )
     stamps, timed = _stamps(cells, columns, path)
     axis = time_axis(stamps, where=str(path)).from_zero()
@@ -83,7 +82,7 @@ def _worn(markers: Markers) -> MarkerSet | None:
     return read_marker_set(guess.name) if guess.name else None
 
 
-def _stamps(cells: Cells, columns: Columns, path: Path) -> tuple[Array, list[str]]:
+def _stamps(cells: Cells, columns: TableColumns, path: Path) -> tuple[Array, list[str]]:
     """Return the time of every row in s from the first on, and the sentence about its unit."""
     if columns.time is None:
         raise FileRefused(
@@ -105,15 +104,15 @@ def _stamps(cells: Cells, columns: Columns, path: Path) -> tuple[Array, list[str
     return (raw - raw[0]) * _SECONDS[unit], [f"Time: column {label} in {unit} ({by}), counted from its first row."]
 
 
-def _markers(cells: Cells, columns: Columns, stamps: Array, path: Path) -> tuple[Markers, list[str], Array]:
+def _markers(cells: Cells, columns: TableColumns, stamps: Array, path: Path) -> tuple[Markers, list[str], Array]:
     """Return the markers in m, z up, what was decided, and lab_R_file (3, 3)."""
     names = tuple(columns.markers)
     raw = cells.values[:, np.array([columns.markers[name] for name in names])]
     raw, zeros = unseen_at_origin(raw)
-    seen = raw[np.isfinite(raw).all(axis=2).sum(axis=1) >= FEWEST]
+    seen = raw[np.isfinite(raw).all(axis=2).sum(axis=1) >= FEWEST_MARKERS]
     extent = float(np.median((np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)).max(axis=1))) if len(seen) else 0.0
     if not extent > 0:
-        raise FileRefused(f"{path}: no row shows {FEWEST} markers at different places. Check what the columns hold.")
+        raise FileRefused(f"{path}: no row shows {FEWEST_MARKERS} markers apart. Check what the columns hold.")
     written = {plain for k in columns.markers.values() for i in k if (plain := cells.units[i].lower())}
     label = columns.length or (written.pop() if len(written) == 1 else "")
     unit = label if label in _METRES else min(_METRES, key=lambda u: abs(math.log(extent * _METRES[u] / _PERSON)))
@@ -133,7 +132,7 @@ def _markers(cells: Cells, columns: Columns, stamps: Array, path: Path) -> tuple
     return Markers(names, stamps, markers.xyz @ turn.T), said, turn
 
 
-def _columns_said(columns: Columns, cells: Cells) -> list[str]:
+def _columns_said(columns: TableColumns, cells: Cells) -> list[str]:
     some = list(columns.markers)
     said = [f"{len(some)} markers ({some[0]} ... {some[-1]}), {len(columns.plates)} force plates by their labels."]
     if columns.others:
@@ -142,7 +141,7 @@ def _columns_said(columns: Columns, cells: Cells) -> list[str]:
     return said
 
 
-def _broken(columns: Columns) -> tuple[str, ...]:
+def _broken(columns: TableColumns) -> tuple[str, ...]:
     if not columns.broken:
         return ()
     return (f"Of {', '.join(columns.broken)} only two coordinates are there: they were left out. Export all three.",)
