@@ -11,9 +11,11 @@ from two_plates import CENTRES, HALF
 import biodance
 from biodance.errors import FileRefused
 from biodance.lab.inspect import inspect_file
+from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.plates.told import Told, ToldPlate
 from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.write import init_session
+from biodance.lab.tables.forces import Load, table_plates
 
 EVEN = 0.2 + np.arange(100) / 60
 POINT = np.array([0.9, 0.47, 0.0])
@@ -47,7 +49,7 @@ def test_three_kinds_of_quotes_and_jittering_seconds_are_read_on_their_own_stamp
     for sentence in ("time in s", "read in mm", "read in N, moments in N·m", "steps are not equal", "noise of single"):
         assert sentence in said
     (plate,) = trial.plates
-    assert np.linalg.norm(plate.put - POINT[:2]) < 0.03  # as a person leans; the point itself nobody wrote
+    assert np.linalg.norm(plate.put - POINT[:2]) < 0.05  # the drawn squat presses behind its feet; people: below
     truth = sum(wrenches(at))
     moved = np.hstack([truth[:, :3], truth[:, 3:] + np.cross([*(plate.put - POINT[:2]), 0.0], truth[:, :3])])
     assert worst(plate.wrench.value, truth, slice(0, 3)) < 4.0
@@ -229,11 +231,22 @@ def test_the_published_tables_of_a_man_are_read_without_a_word(data):
     assert "1 row apart" in said
     (plate,) = trial.plates
     assert np.nanmean(plate.wrench.force[:, 2]) / 9.81 == pytest.approx(94.4, abs=0.2)
-    np.testing.assert_allclose(plate.put, [0.895, 0.475], atol=0.015)  # by the feet of the T-pose, by hand
+    np.testing.assert_allclose(plate.put, [0.895, 0.475], atol=0.026)  # by hand; twice what standing leaves open
     fx, fy, fz, mx, my, mz = about(plate.wrench.value, np.array([*plate.put, 0.0])).T
     twist = {sign: np.std(mz - (-my / fz * sign * fy - mx / fz * fx)) for sign in (1, -1)}
     assert twist[1] > 30
     assert twist[-1] < 4  # the table's Fy has the wrong sign: told by `diagnose`, not mended when it is read
+
+
+@pytest.mark.parametrize("name", ["HC032A", "HC044A", "HC055A"])
+def test_a_plate_of_known_place_is_found_by_the_feet(data, name):
+    """The wrench about the lab's origin is the truth: a plate put by the feet would have to be moved by nothing."""
+    trial = read_trial(data / "biomechzoo" / name / f"{name}01.c3d", role="static")
+    total = sum(plate.wrench.value for plate in trial.plates)
+    time = trial.plates[0].wrench.time
+    load = Load("Fx ... Mz", about(total, POINT))
+    found = table_plates([load], time, np.eye(3), trial.markers, read_marker_set(trial.marker_set), Told())
+    assert np.linalg.norm(found.plates[0].put - POINT[:2]) < 0.03
 
 
 def test_inspect_says_how_a_table_was_read(data):
@@ -241,5 +254,5 @@ def test_inspect_says_how_a_table_was_read(data):
     assert record["status"] == "warning"
     said = " ".join(record["history"])
     assert "too far apart to tell a movement between rows" in said
-    assert "known to 15 mm" in " ".join(record["plates"][0]["decisions"])
+    assert "known to 13 mm" in " ".join(record["plates"][0]["decisions"])
     assert record["mass_on_plates_kg"] is None or record["mass_on_plates_kg"] == pytest.approx(94.4, abs=0.3)

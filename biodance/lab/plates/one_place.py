@@ -9,8 +9,8 @@ from biodance.records import Array, Plate, Trial, Wrench
 from biodance.records.attention import WARNING
 
 _MOVED = 0.05
-"""m between two trials from which on the plate was another one, or moved: three times what the feet leave open (0.015
-m each)."""
+"""m between two trials from which on the plate was another one, or moved: nearly three times what the feet
+leave open in two (0.013 m each)."""
 
 
 def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
