@@ -41,8 +41,7 @@ _LOWER = 0.02
 _STRAIGHT = -0.05
 """rad: its elbows bend at least so much."""
 _BONES = ("thigh", "shank", "foot")
-_ROUNDS = 8
-"""Corrections of the pelvis."""
+_ROUNDS = 8  # corrections of the pelvis
 
 
 def windows(shown: tuple[Shown, ...], count: int) -> list[tuple[int, float, float]]:

@@ -1,7 +1,7 @@
 """Break important lines one at a time and see whether the tests notice: a mutant that no test kills is a line that
 nobody guards.
 
-    python benchmarks/mutants.py [NAME ...] [--jobs 1] [--out build/mutants] [--again]
+    python -m benchmarks mutants [NAME ...] [--jobs 1] [--out build/mutants] [--again]
 
 The mutants stand in `benchmarks/mutants.toml`: the exact snippet of one file, what it becomes, the tests that must
 fail. Each job works in its own temporary copy of the checkout, which itself is never touched. The named tests are run
@@ -248,7 +248,3 @@ def main() -> int:
     bad = [one.name for one in asked if not is_good(one, outcomes[one.name])]
     print(f"{len(asked) - len(bad)} of {len(asked)} killed" + (f"; NOT, or too late: {', '.join(bad)}" if bad else ""))
     return 1 if bad else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

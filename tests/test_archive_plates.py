@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plate_archives import Step, draw
 
+from benchmarks.plates import Step, draw
 from biodance.cli import run
 from biodance.diagnosis.archive.conditions import pool
 from biodance.diagnosis.archive.judge import judge

@@ -1,45 +1,35 @@
-"""What the benchmark of coverage counts (benchmarks/bench_coverage.py), and about which truth CoM are judged."""
+"""What the benchmark of coverage counts (benchmarks/coverage.py), and about which truth CoM are judged."""
 
 import json
 
 import numpy as np
 import pytest
-from bench_chain import covered
-from bench_coverage import held, range_in_bar, rows_of, spread, standard_errors
+
+from benchmarks.coverage import held, range_in_bar, rows_of, spread
+from benchmarks.people import covered, standard_errors
 
 SEGMENTS = 12
 
 
-def worth_row() -> dict:
-    """Return a row of `bench_worth.py`: masses 2 sd too heavy, CoM right about the true centres alone."""
+def row() -> dict:
+    """Return a row of `people.identified`: masses 2 sd too heavy, CoM right about the true centres alone."""
     own = np.full((SEGMENTS, 3), 0.05)
     return {
-        "true": {"mass": np.full((SEGMENTS, 1), 4.0), "com": own + 0.02, "own_com": own},
-        "identified": {"mass": np.full((SEGMENTS, 1), 5.0), "com": own},
-        "sd": {"mass": np.full((SEGMENTS, 1), 0.5), "com": np.full((SEGMENTS, 3), 0.004)},
+        "true": {"mass": np.full(SEGMENTS, 4.0), "com": own + 0.02, "own_com": own},
+        "identified": {"mass": np.full(SEGMENTS, 5.0), "com": own},
+        "sd": np.tile([0.5, 0.004, 0.004, 0.004], (SEGMENTS, 1)),
     }
 
 
-def people_row() -> dict:
-    """Return a row of `bench_people.py` of the same person."""
-    row = worth_row()
-    true, found = row["true"], row["identified"]
-    words = {"mass": true["mass"][:, 0], "com": true["com"], "own_com": true["own_com"]}
-    words |= {"found_mass": found["mass"][:, 0], "found_com": found["com"]}
-    return words | {"sd": np.hstack([row["sd"]["mass"], row["sd"]["com"]])}
+def test_errors_are_in_units_of_what_is_stated():
+    assert standard_errors(row()) == pytest.approx(np.tile([2.0, 0.0, 0.0, 0.0], (SEGMENTS, 1)))
 
 
-@pytest.mark.parametrize("row", [worth_row(), people_row(), {"person": people_row()}])
-def test_rows_of_every_benchmark_are_in_units_of_what_is_stated(row):
-    assert standard_errors(row) == pytest.approx(np.tile([2.0, 0.0, 0.0, 0.0], (SEGMENTS, 1)))
-
-
-def test_a_danced_centre_of_mass_is_judged_about_the_true_joint_centres():
-    row = worth_row()
-    assert covered(row, "com").all()
-    row["true"]["own_com"] = row["true"]["com"]
-    assert not covered(row, "com").any()
-    assert not covered(row, "mass").any()
+def test_a_centre_of_mass_is_judged_about_the_true_joint_centres():
+    one = row()
+    assert covered(one) == (0.0, 1.0)
+    one["true"]["own_com"] = one["true"]["com"]
+    assert covered(one) == (0.0, 0.0)
 
 
 def test_wider_intervals_hold_more_and_the_bar_lies_between_two_factors():
@@ -56,8 +46,7 @@ def test_the_interval_is_over_people_not_over_values():
     assert (low, high) == pytest.approx((0.88, 0.92), abs=0.006)  # 0.9 -+ 1.96 * 0.1 / 10
 
 
-def test_files_of_lines_and_of_one_row_are_read_alike(tmp_path):
-    (tmp_path / "people.jsonl").write_text('{"seed": 1}\n{"seed": 2}\n')
+def test_rows_of_all_files_of_a_pattern_are_read(tmp_path):
     for number in (1, 2):
         (tmp_path / f"own_{number}.json").write_text(json.dumps({"seed": number}))
-    assert rows_of(f"{tmp_path}/own_*.json") == rows_of(f"{tmp_path}/people.jsonl") == [{"seed": 1}, {"seed": 2}]
+    assert rows_of(f"{tmp_path}/own_*.json") == [{"seed": 1}, {"seed": 2}]

@@ -1,10 +1,10 @@
-"""Points that the benchmark of public marker sets makes up ride on their segments: they turn with the person."""
+"""Points that public marker sets on real persons make up ride on their segments: they turn with the person."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bench_public_sets import _CORNERS, Person, carried
+from public_marker_sets import _CORNERS, Person, carried
 from scipy.spatial.transform import Rotation
 
 TURN, SHIFT = Rotation.from_euler("zyx", [0.7, -0.4, 0.9]), np.array([1.0, -2.0, 0.5])

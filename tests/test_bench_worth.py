@@ -3,18 +3,20 @@
 from typing import Any
 
 import numpy as np
-from bench_worth import lines, shares, shares_by_chance, squares, stated
+
+from benchmarks.chain import lines, shares, shares_by_chance, squares, stated
 
 
 def _row(mass: float, com: float) -> dict[str, Any]:
     """Return a session of two segments off by ``mass`` kg and ``com`` m along y; the table by 1 kg and 20 mm."""
     along = np.array([0.0, 1.0, 0.0])
-    zero = {"mass": np.zeros((2, 1)), "com": np.zeros((2, 3)), "own_com": np.zeros((2, 3))}
+    zero = {"mass": np.zeros(2), "com": np.zeros((2, 3)), "own_com": np.zeros((2, 3))}
     return {
         "true": zero,
-        "table": {"mass": np.ones((2, 1)), "com": np.tile(0.02 * along, (2, 1))},
-        "identified": {"mass": np.full((2, 1), mass), "com": np.tile(com * along, (2, 1))},
-        "sd": {"mass": np.full((2, 1), 0.5), "com": np.full((2, 3), 0.003)},
+        "table": {"mass": np.ones(2), "com": np.tile(0.02 * along, (2, 1))},
+        "identified": {"mass": np.full(2, mass), "com": np.tile(com * along, (2, 1))},
+        "sd": np.tile([0.5, 0.003, 0.003, 0.003], (2, 1)),
+        "chance": [0.8, 0.9, 0.75],
     }
 
 

@@ -1,5 +1,5 @@
 """Hide an effect in a session, write it as C3D files, and require that the public way finds it; full set:
-benchmarks/bench_diagnosis.py.
+`python -m benchmarks diagnosis`.
 
 The hiding side (`biodance.virtual_lab`) knows nothing of the effects; the finding side sees files only.
 """

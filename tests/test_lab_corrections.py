@@ -85,6 +85,19 @@ def test_a_lab_file_comes_back_and_adds_up(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("effect", "target", "values"), [("plate_gain", "Fz", (0.3, 0.2)), ("plate_position", "plate1:x", (0.03, 0.01))]
+)
+def test_what_is_accepted_twice_is_what_one_correction_after_the_other_does(
+    effect: str, target: str, values: tuple[float, float]
+) -> None:
+    first, later = (PlateCorrection(effect, target, value) for value in values)
+    in_turn = corrected_trial(corrected_trial(trial(), [first]), [later]).plates[0]
+    at_once = corrected_trial(trial(), joined_corrections([first], [later])).plates[0]
+    np.testing.assert_allclose(at_once.wrench.value, in_turn.wrench.value, atol=1e-9)
+    np.testing.assert_allclose(at_once.corners, in_turn.corners, atol=1e-12)
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ('[corrections.added_mass."trunk"]\nmass = 1', "nothing that can be corrected"),

@@ -7,8 +7,10 @@ import pytest
 from plate_emulator import RATE, Emulated, channels, random_pose, raw_file, step, yaw
 
 from biodance.errors import TrialRefused
+from biodance.lab.plates.decode import decode_plates
+from biodance.lab.plates.parameters import declared_plates
 from biodance.lab.plates.read import read_plates, total_wrench
-from biodance.lab.plates.wrench import centre_of_pressure
+from biodance.lab.plates.sense import pressure_point
 from biodance.records import Markers
 
 POLYNOMIAL = np.array([[1e-17, -5e-12, 3e-7, -2e-12, 4e-7, -1e-2], [2e-17, -2e-12, -7e-7, -1e-12, 5e-7, 2e-2]])
@@ -209,4 +211,9 @@ def test_total_wrench_needs_plates():
 
 
 def test_centre_of_pressure_is_unknown_without_load():
-    assert np.isnan(centre_of_pressure(np.zeros((3, 6)))).all()
+    plate = Emulated()
+    raw = raw_file([plate], [np.zeros((50, 6))])
+    turn = np.eye(3)
+    declared = declared_plates(raw, {}, metres=0.001, turn=turn)
+    (reading,) = decode_plates(raw, declared.plates, metres=0.001, turn=turn, mass=None).readings
+    assert np.isnan(pressure_point(reading)).all()

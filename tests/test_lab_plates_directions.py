@@ -7,7 +7,7 @@ import pytest
 from plate_emulator import RATE, Emulated, channels, raw_file, step, yaw
 
 from biodance.lab.plates.read import read_plates
-from biodance.lab.plates.wrench import sway_sign
+from biodance.lab.plates.sense import sway_sign
 from biodance.records import Markers
 
 HEIGHT, MASS = 0.95, 70.0
@@ -44,19 +44,20 @@ def file_of(plate, truth, order):
 
 def test_sway_tells_reaction_from_load():
     plate = Emulated(centre=np.zeros(3), rotation=np.eye(3))
-    truth, _, _ = standing(plate)
-    assert sway_sign(truth, RATE) == 1
-    assert sway_sign(-truth, RATE) == -1
-    assert sway_sign(np.hstack([truth[:, :1], -truth[:, 1:]]), RATE) == 0
-    assert sway_sign(truth[: int(2.2 * RATE)], RATE) == 0
-    assert sway_sign(np.zeros((4000, 6)), RATE) == 0
+    truth, point, _ = standing(plate)
+    force = truth[:, :3]
+    assert sway_sign(force, point, RATE) == 1
+    assert sway_sign(-force, point, RATE) == -1
+    assert sway_sign(force * [1, -1, -1], point, RATE) == 0  # x and y disagree
+    assert sway_sign(force[: int(2.2 * RATE)], point[: int(2.2 * RATE)], RATE) == 0
+    assert sway_sign(np.zeros((4000, 3)), np.zeros((4000, 3)), RATE) == 0
 
 
 def test_sway_is_not_seen_where_nobody_sways():
     rng = np.random.default_rng(0)
     for _ in range(20):
-        noise = np.column_stack([rng.normal(0, 2, (4000, 2)), np.full(4000, 700.0), rng.normal(0, 2, (4000, 3))])
-        assert sway_sign(noise, RATE) == 0
+        force = np.column_stack([rng.normal(0, 2, (4000, 2)), np.full(4000, 700.0)])
+        assert sway_sign(force, rng.normal(0, 2 / 700, (4000, 3)), RATE) == 0
 
 
 @pytest.mark.parametrize("reaction", [True, False])
@@ -134,6 +135,18 @@ def test_load_far_from_the_feet_is_warned_about():
     elsewhere = Markers(markers.names, markers.time, markers.xyz + np.array([0.25, -0.3, 0.0]))
     _, warnings, *_ = read_plates(file_of(plate, truth, [0, 1, 2, 3]), metres=0.001, markers=elsewhere)
     assert "from the feet that the markers show" in warnings[0]
+
+
+@pytest.mark.parametrize("reaction", [True, False])
+def test_a_knock_against_a_plate_does_not_turn_the_weight_of_a_person(reaction):
+    """Somebody of 700 N stands for 2 s; before, a hoist pulls the plate up with 2.5 kN for 0.3 s."""
+    plate = Emulated(reaction=reaction)
+    truth, _ = step(np.random.default_rng(0), plate)
+    time = np.arange(len(truth)) / RATE
+    force = np.where((time > 0.4)[:, None] & (time < 0.7)[:, None], [0.0, 0.0, -2500.0], truth[:, :3])
+    pulled = np.hstack([force, np.where(force[:, 2:] < 0, np.cross(plate.centre, force), truth[:, 3:])])
+    plates, *_ = read_plates(raw_file([plate], [channels(plate, pulled)]), metres=0.001)
+    np.testing.assert_allclose(plates[0].wrench.value, pulled, atol=1e-6)
 
 
 def test_shear_of_the_wrong_sign_is_warned_about():

@@ -197,6 +197,14 @@ def test_a_real_walk_with_an_untared_plate_has_one_sign(data: Path) -> None:
     assert abs(record["plates"][2]["mean_vertical_n"]) < 0.1
 
 
+def test_a_scale_with_which_the_person_weighs_tonnes_was_applied_already(tmp_path: Path) -> None:
+    truth = loads()
+    trial = read_c3d(write(tmp_path / "static.c3d", on_disk(truth), markers(), scale=np.full(12, 1e3)))
+    for plate, value in zip(trial.plates, truth, strict=True):
+        np.testing.assert_allclose(plate.wrench.value, value, atol=1e-3)
+    assert "SCALE was not applied" in trial.warnings[0]
+
+
 @pytest.mark.parametrize("squat", [0.0, 0.3])
 def test_data_that_are_scaled_already_are_told_by_the_weight(tmp_path: Path, squat: float) -> None:
     scale = np.array([0.05, 0.05, 0.1, 25.0, 25.0, 20.0] * 2)

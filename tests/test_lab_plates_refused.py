@@ -200,6 +200,34 @@ def test_slightly_crooked_corners_are_used_and_said():
     np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
 
 
+@pytest.mark.parametrize(("degrees", "stands"), [(0, True), (25, True), (70, False), (80, False)])
+def test_a_ramp_is_a_plate_and_a_wall_is_none(degrees, stands):
+    """Nobody walks up 70 degrees: such corners are in other axes than the markers, and so is the force."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    slope = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    plate = Emulated(rotation=slope @ np.diag([1.0, -1.0, -1.0]))
+    truth, _ = step(np.random.default_rng(0), plate)
+    plates, warnings, *_ = read_plates(raw_file([plate], [channels(plate, truth)]), metres=0.001)
+    if stands:
+        np.testing.assert_allclose(plates[0].wrench.value, truth, atol=1e-6)
+    else:
+        assert plates == ()
+        assert f"{degrees} degrees steep" in warnings[0]
+
+
+@pytest.mark.parametrize(("newton", "measured"), [(700.0, True), (15e3, True), (70e3, False)])
+def test_a_landing_is_believed_and_a_person_of_seven_tonnes_is_not(newton, measured):
+    """15 kN: 15 times the weight of 100 kg. 70 kN: a person of 700 N whose channels are a hundred times too large."""
+    plate = Emulated()
+    truth, _ = step(np.random.default_rng(0), plate, weight=newton)
+    plates, warnings, *_ = read_plates(raw_file([plate], [channels(plate, truth)]), metres=0.001)
+    if measured:
+        np.testing.assert_allclose(plates[0].wrench.value, truth, atol=1e-6)
+    else:
+        assert plates == ()
+        assert "no plate measures more" in warnings[0]
+
+
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True, width=32) | st.sampled_from(
     [0.0, 1.0, 2.0, 3.0, 4.0, 1e30, -1.0]
 )

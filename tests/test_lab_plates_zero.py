@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from plate_emulator import RATE, Emulated, channels, raw_file, step
 
+from biodance.lab.plates.decode import find_baseline, is_unloaded
 from biodance.lab.plates.read import read_plates
-from biodance.lab.plates.zero import find_baseline, is_unloaded
 
 OFFSET = np.array([3.0, -5.0, 40.0, 2.0, -1.0, 0.5])
 

@@ -121,6 +121,17 @@ def test_unknown_samples_stay_unknown() -> None:
     assert np.array_equal(unknown, np.isnan(ready.wrench.value).all(axis=1))
 
 
+def test_no_force_is_told_between_the_last_known_sample_and_the_next() -> None:
+    """Samples 500 to 599 are lost: whatever was pressed between samples 499 and 600 nobody measured."""
+    given = trial(analog=960.0)
+    value = given.wrench.value.copy()
+    value[500:600] = np.nan
+    plate = replace(given.plates[0], wrench=Wrench(given.wrench.time, value))
+    ready = prepare(replace(given, plates=(plate,)))
+    lost = (given.markers.time > 499 / 960) & (given.markers.time < 600 / 960)
+    assert np.array_equal(np.isnan(ready.wrench.value).all(axis=1), lost)
+
+
 def test_the_chosen_cutoff_is_that_of_the_forces() -> None:
     """A hum at the cut-off keeps 1 / sqrt(2) of its amplitude of 20 N; at the usual 10 Hz nothing of it is left."""
     given = trial(rate=200.0, frames=400, hum=20.0)

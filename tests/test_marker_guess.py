@@ -5,11 +5,11 @@ for a session.
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from standing_markers import OWN, stand
 
-from biodance.lab.markers.dress import dress
-from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.guess import dress, guess_set
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.upright import axis_to_head
 from biodance.lab.read import read_trial
@@ -51,6 +51,20 @@ def test_posture_names_what_no_label_says() -> None:
     assert guess_set(half).name == ""
 
 
+def test_of_two_nameless_markers_as_near_to_a_joint_none_is_taken() -> None:
+    numbered = {place: f"M{k:02d}" for k, place in enumerate(OWN)}
+    still = stand(numbered)
+    knees = [numbered[f"{side}_knee_lateral"] for side in ("right", "left")]
+    columns = [still.names.index(label) for label in knees]
+    xyz = np.concatenate([still.xyz, still.xyz[:, columns] - [0.0, 0.0, 0.025]], axis=1)
+    xyz[:, columns, 2] += 0.025
+    both = Markers((*still.names, "M90", "M91"), still.time, xyz)
+    guess = guess_set(both)
+    assert guess.name == ""
+    assert "right knee lateral" in guess.doubts[0]
+    assert not {"M90", "M91", *knees} & guess.map.keys()
+
+
 def test_a_refused_set_is_told_what_it_lacks() -> None:
     no_knee = {place: label for place, label in OWN.items() if "knee" not in place}
     few = guess_set(stand(no_knee | {"right_asis": OWN["right_heel"], "right_heel": OWN["right_asis"]}))
@@ -84,9 +98,9 @@ def test_words_nobody_knows_are_told_by_where_the_markers_are() -> None:
 def test_the_only_way_to_stand_is_up() -> None:
     numbered = {place: f"M{k:02d}" for k, place in enumerate((*OWN, "c7", "jugular_notch"))}
     upright = stand(numbered)
-    assert axis_to_head(upright) == pytest.approx([0.0, 0.0, 1.0])
+    assert axis_to_head(upright, None) == pytest.approx([0.0, 0.0, 1.0])
     lying = Markers(upright.names, upright.time, upright.xyz[..., [1, 2, 0]])
-    assert axis_to_head(lying) == pytest.approx([0.0, 1.0, 0.0])
+    assert axis_to_head(lying, None) == pytest.approx([0.0, 1.0, 0.0])
 
 
 SPEAKERS = {
@@ -145,3 +159,17 @@ def test_the_guess_agrees_with_a_known_set_on_a_real_person() -> None:
     assert {label: guess[label] for label in truth if label in trial.markers.names} == {
         label: place for label, place in truth.items() if label in trial.markers.names
     }
+
+
+def test_the_arm_of_a_knee_alignment_device_is_no_knee(data: Path) -> None:
+    """LKAX, outside the knee, was taken for the lateral marker and LKNE for the medial one."""
+    guess = guess_set(read_trial(data / "biomechzoo/HC030A/HC030A01.c3d").markers)
+    assert (guess.map["RKNE"], guess.map["LKNE"]) == ("right_knee_lateral", "left_knee_lateral")
+    assert "LKAX" not in guess.map
+
+
+def test_of_two_markers_at_the_fifth_metatarsal_none_is_the_first(data: Path) -> None:
+    guess = guess_set(read_trial(data / "opensim_models/raj_walk/static.trc").markers)
+    assert guess.name
+    assert (guess.map["R.MT5"], guess.map["L.MT5"]) == ("right_toe_lateral", "left_toe_lateral")
+    assert "right_toe_medial" not in guess.map.values()

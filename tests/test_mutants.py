@@ -1,6 +1,6 @@
 """The table of mutants holds: every snippet occurs once, every test exists, and the runner tells killed from survived.
 
-Nothing of biodance is broken here; `python benchmarks/mutants.py` does that.
+Nothing of biodance is broken here; `python -m benchmarks mutants` does that.
 """
 
 import hashlib

@@ -12,10 +12,10 @@ from browser import Page
 from example_results import html_of, refused_session
 from hidden_faults import hidden
 from identified_sessions import session_result
-from plate_archives import Step, draw
 from small_dances import small_dance
 
 import biodance
+from benchmarks.plates import Step, draw
 from biodance.batch.outcome import Outcome
 from biodance.batch.summary import write_summary
 from biodance.batch.work import rows_of

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-import bench_scan
 import numpy as np
 import pytest
 import trimesh
-from scanned_people import ScannedPerson, scanned_person
+from scanned_people import ScannedPerson, measured_skeleton, scanned_person
 from trimesh.triangles import mass_properties
 
 from biodance.body.human.prior import prior
@@ -55,7 +54,7 @@ def test_a_cut_box_has_the_closed_form() -> None:
 def test_segments_of_a_scan_weigh_what_the_solids_weigh(person: tuple[ScannedPerson, Path]) -> None:
     scanned, path = person
     subject = Subject(scanned.person.mass, scanned.person.stature, scanned.person.sex, 30.0)
-    bones = bench_scan.measured_skeleton(scanned, subject, np.random.default_rng(8))
+    bones = measured_skeleton(scanned, subject, np.random.default_rng(8))
     found = cut_scan(read_scan(str(path), subject.stature), bones)
     for name in SEGMENTS:
         assert found.lumps[name].mass == pytest.approx(scanned.person.masses[name], rel=0.16), name
@@ -67,7 +66,7 @@ def test_segments_of_a_scan_weigh_what_the_solids_weigh(person: tuple[ScannedPer
 def test_a_scan_beats_the_table_and_keeps_the_total(person: tuple[ScannedPerson, Path]) -> None:
     scanned, path = person
     plain = Subject(scanned.person.mass, scanned.person.stature, scanned.person.sex, 30.0)
-    bones = bench_scan.measured_skeleton(scanned, plain, np.random.default_rng(8))
+    bones = measured_skeleton(scanned, plain, np.random.default_rng(8))
     usual = reference(Settings.table, plain)
     table, given = (prior(usual, bones, one) for one in (plain, replace(plain, scan=str(path))))
     true = np.array([scanned.person.masses[name] for name in SEGMENTS])
@@ -107,7 +106,7 @@ def test_arms_at_the_sides_and_missing_feet_are_refused(person: tuple[ScannedPer
     with pytest.raises(SessionRefused, match="has no feet"):
         read_scan(str(tmp_path / "post.ply"), stature)
     subject = Subject(person[0].person.mass, stature, person[0].person.sex, 30.0)
-    bones = bench_scan.measured_skeleton(person[0], subject, np.random.default_rng(8))
+    bones = measured_skeleton(person[0], subject, np.random.default_rng(8))
     scan = read_scan(str(person[1]), stature)
     slim = scan.triangles * [1.0, 1.0, 0.35]
     with pytest.raises(SessionRefused, match=r"arm cannot be told from the trunk|arm is .* long"):
@@ -117,7 +116,7 @@ def test_arms_at_the_sides_and_missing_feet_are_refused(person: tuple[ScannedPer
 def test_a_scan_of_somebody_else_is_refused_by_its_weight(person: tuple[ScannedPerson, Path]) -> None:
     scanned, path = person
     heavy = Subject(1.4 * scanned.person.mass, scanned.person.stature, scanned.person.sex, 30.0, scan=str(path))
-    bones = bench_scan.measured_skeleton(scanned, heavy, np.random.default_rng(8))
+    bones = measured_skeleton(scanned, heavy, np.random.default_rng(8))
     with pytest.raises(SessionRefused, match=r"the scan weighs .* kg by volume and density, but the body mass is"):
         prior(reference(Settings.table, heavy), bones, heavy)
 

@@ -4,17 +4,18 @@ import ezc3d
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
-from third_lab import make_session
-from third_lab.faults import Fault
-from third_lab.movement import Plan, check_feet, find_zmp, realize
-from third_lab.people import Person, draw_person
-from third_lab.plates import draw_plates, find_corners
-from third_lab.session import LENGTHS
-from third_lab.skeleton import GRAVITY, NAMES, find_wrench, pose_segments
-from third_lab.tissue import draw_tissue, swing
-from third_lab.trials import plan_trial
-from third_lab.weigh import FORCE_RATE, share_ground, weigh_trial
-from third_lab.write import UP_Y, Room, lump, write_c3d
+
+from benchmarks.third_lab import make_session
+from benchmarks.third_lab.faults import Fault
+from benchmarks.third_lab.movement import Plan, check_feet, find_zmp, realize
+from benchmarks.third_lab.people import Person, draw_person
+from benchmarks.third_lab.plates import draw_plates, find_corners
+from benchmarks.third_lab.session import LENGTHS
+from benchmarks.third_lab.skeleton import GRAVITY, NAMES, find_wrench, pose_segments
+from benchmarks.third_lab.tissue import draw_tissue, swing
+from benchmarks.third_lab.trials import plan_trial
+from benchmarks.third_lab.weigh import FORCE_RATE, share_ground, weigh_trial
+from benchmarks.third_lab.write import UP_Y, Room, lump, write_c3d
 
 ROOM = Room("", UP_Y, "y", 100.0, 1000.0, 0.0, 0.0, "pig")
 

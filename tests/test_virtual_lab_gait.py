@@ -2,11 +2,13 @@
 forces are those that move the body; then what the readers make of the files.
 """
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from inject import inject
 
 from biodance.diagnosis.adequacy import strides_alike
 from biodance.diagnosis.witness_evidence import collect_evidence
@@ -16,6 +18,7 @@ from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.session import examine
 from biodance.records import Subject
+from biodance.virtual_lab.faults.causes import fault_of, parse_cause
 from biodance.virtual_lab.movement.gait import GaitPerformance, perform_gait
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.person.person import make_person
@@ -155,6 +158,26 @@ def test_the_heel_strikes_when_the_force_comes_and_equal_strides_tell_no_fault(r
     strides = [one for one in evidence.observations if one.stride in one.norms]
     assert len(strides) > 20
     assert all(one.norms[one.stride] == pytest.approx(one.sd) for one in strides)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("time_delay:delay=0.03", {"time_delay"}),
+        ("plate_gain:target=plate1:Fz,gain=0.05", {"plate_gain", "body_mass"}),
+        ("plate_position:target=plate1:x,shift=0.02", {"plate_position"}),
+    ],
+)
+def test_a_fault_in_the_bytes_of_a_walk_on_belts_is_named(
+    recorded: dict, text: str, names: set[str], tmp_path: Path
+) -> None:
+    """First, or in the set of what is named."""
+    source = Path(recorded["treadmill"].session.folder)
+    for path in sorted(source.glob("*.c3d")):
+        inject(path, tmp_path / path.name, fault_of(parse_cause(text), {path.stem: (0.0, 1.0)}))
+    shutil.copy(source / "session.toml", tmp_path)
+    found = infer_causes(collect_evidence(read_session(tmp_path))).findings
+    assert names & {one.effect for finding in found for one in (finding, *finding.set)}
 
 
 def test_equal_strides_are_counted_once(recorded: dict) -> None:

@@ -4,7 +4,7 @@ A clean room. Whoever wrote it had not read the package that it tests, nor the o
 soft tissue, plates and files come from published studies, pinocchio and ezc3d. One command makes a session with its
 truth beside it, the same for the same seed:
 
-    PYTHONPATH=benchmarks python -m third_lab OUT --seed 3 [--fault plate_place] [--set pig|isb|cgm2]
+    PYTHONPATH=benchmarks python -m benchmarks.third_lab OUT --seed 3 [--fault plate_place] [--set pig|isb|cgm2]
 
 OUT is a session folder (static, stand, six dances, two squats), OUT.truth.json
 holds what is true: masses, centres of mass and inertia per segment, and lumped to the seven kinds of segments that a
@@ -18,7 +18,7 @@ Frames: the world of this laboratory is z up, x along the walkway, SI. A segment
 with the axes of upright standing: x ahead, y left, z up.
 """
 
-from third_lab.faults import FAULTS, Fault
-from third_lab.session import make_session
+from benchmarks.third_lab.faults import FAULTS, Fault
+from benchmarks.third_lab.session import make_session
 
 __all__ = ["FAULTS", "Fault", "make_session"]

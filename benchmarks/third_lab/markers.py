@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from third_lab.arrays import Array
-from third_lab.people import Person
-from third_lab.skeleton import SIDES, pose_segments
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.people import Person
+from benchmarks.third_lab.skeleton import SIDES, pose_segments
 
 Places = dict[str, tuple[str, Array]]  # landmark: segment, and place in its frame, m
 _ARM = {

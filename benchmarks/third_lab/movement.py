@@ -7,9 +7,9 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.linalg import solve_banded
 from scipy.spatial.transform import Rotation
 
-from third_lab.arrays import Array
-from third_lab.people import Person
-from third_lab.skeleton import COLUMNS, GRAVITY, SIDES, WIDTH, find_wrench, pose_segments
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.people import Person
+from benchmarks.third_lab.skeleton import COLUMNS, GRAVITY, SIDES, WIDTH, find_wrench, pose_segments
 
 KNOTS = 50.0  # 1/s, of the splines that carry the movement
 MOST_KNEE = np.radians(135)

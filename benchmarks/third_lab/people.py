@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from third_lab.arrays import Array
-from third_lab.skeleton import PARENTS, SIDES
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.skeleton import PARENTS, SIDES
 
 # Shares of body mass, %: head and neck, thorax and abdomen, pelvis, upper arm, forearm, hand, thigh, shank, foot.
 # Dempster 1955 (WADC-TR-55-159, as in Winter 2009, table 4.1); Clauser et al. 1969 (AMRL-TR-69-70; its trunk less

@@ -7,17 +7,17 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from third_lab.arrays import Array
-from third_lab.faults import Fault, draw_fault
-from third_lab.markers import Places, film, name_markers, place_markers, see
-from third_lab.movement import realize
-from third_lab.people import Person, draw_person
-from third_lab.plates import draw_plates, measure, spoil_plates, still
-from third_lab.skeleton import add_mass
-from third_lab.tissue import Tissue, draw_tissue, slide_skin
-from third_lab.trials import DANCES, plan_trial
-from third_lab.weigh import weigh_trial
-from third_lab.write import UP_Y, UP_Z, Room, stand_true, write_c3d, write_session_file, write_truth
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Fault, draw_fault
+from benchmarks.third_lab.markers import Places, film, name_markers, place_markers, see
+from benchmarks.third_lab.movement import realize
+from benchmarks.third_lab.people import Person, draw_person
+from benchmarks.third_lab.plates import draw_plates, measure, spoil_plates, still
+from benchmarks.third_lab.skeleton import add_mass
+from benchmarks.third_lab.tissue import Tissue, draw_tissue, slide_skin
+from benchmarks.third_lab.trials import DANCES, plan_trial
+from benchmarks.third_lab.weigh import weigh_trial
+from benchmarks.third_lab.write import UP_Y, UP_Z, Room, stand_true, write_c3d, write_session_file, write_truth
 
 TRIALS = (
     ("static01", "stand"),

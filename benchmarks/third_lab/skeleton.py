@@ -8,10 +8,10 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from third_lab.arrays import Array
+from benchmarks.third_lab.arrays import Array
 
 if TYPE_CHECKING:
-    from third_lab.people import Person
+    from benchmarks.third_lab.people import Person
 
 SIDES = {"right": -1, "left": 1}  # sign of y
 GRAVITY = np.array([0.0, 0.0, -9.81])

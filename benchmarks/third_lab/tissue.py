@@ -6,9 +6,9 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.signal import bilinear, lfilter
 
-from third_lab.arrays import Array
-from third_lab.people import Person
-from third_lab.skeleton import COLUMNS, GRAVITY, PARENTS, SIDES, pose_segments
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.people import Person
+from benchmarks.third_lab.skeleton import COLUMNS, GRAVITY, PARENTS, SIDES, pose_segments
 
 SHARES = {"thigh": 0.22, "shank": 0.16, "lumbar": 0.18, "waist": 0.15, "upper_arm": 0.12}  # of the segment's mass
 SKIN_MM = {"pelvis": 5, "lumbar": 6, "waist": 6, "thorax": 4, "neck": 2, "head": 1, "clavicle": 7, "upper_arm": 6,

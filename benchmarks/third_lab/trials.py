@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from third_lab.arrays import Array
-from third_lab.movement import KNOTS, Plan, ease
-from third_lab.people import Person
-from third_lab.skeleton import NAMES, SIDES
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.movement import KNOTS, Plan, ease
+from benchmarks.third_lab.people import Person
+from benchmarks.third_lab.skeleton import NAMES, SIDES
 
 # joint: lowest and highest of flexion, abduction, rotation in degrees (abduction and rotation outwards)
 ARMS = {

@@ -3,13 +3,13 @@
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline
 
-from third_lab.arrays import Array
-from third_lab.faults import Fault
-from third_lab.movement import Plan
-from third_lab.people import Person
-from third_lab.skeleton import find_wrench, pose_segments
-from third_lab.tissue import Tissue, shake
-from third_lab.write import Room
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Fault
+from benchmarks.third_lab.movement import Plan
+from benchmarks.third_lab.people import Person
+from benchmarks.third_lab.skeleton import find_wrench, pose_segments
+from benchmarks.third_lab.tissue import Tissue, shake
+from benchmarks.third_lab.write import Room
 
 FORCE_RATE = 250.0  # 1/s, of the mechanics; nothing in these movements is faster than 14 Hz
 RAIL = ("dance_bend", "dance_half_squat", "dance_right_knee")  # trials in which a rail is held

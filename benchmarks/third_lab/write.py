@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline
 
-from third_lab.arrays import Array
-from third_lab.faults import Fault
-from third_lab.people import Person
-from third_lab.plates import Plate, find_corners, split_kistler
-from third_lab.skeleton import NAMES, PARENTS, SIDES, pose_segments
+from benchmarks.third_lab.arrays import Array
+from benchmarks.third_lab.faults import Fault
+from benchmarks.third_lab.people import Person
+from benchmarks.third_lab.plates import Plate, find_corners, split_kistler
+from benchmarks.third_lab.skeleton import NAMES, PARENTS, SIDES, pose_segments
 
 UP_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # world (z up) to a laboratory with y up
 UP_Z = np.eye(3)

@@ -19,6 +19,7 @@ class BodyMass(Effect):
     """An ``error`` (kg): the person weighs this much more than declared, in proportion everywhere."""
 
     name = "body_mass"
+    prior = 0.1
     parameters = (Parameter("error", "kg", 1.5, "1-4 % of body mass for clothes and shoes"),)
     separated_by = "Weigh the person on the plate and on a scale, as dressed for the recording."
     advice = "Enter the mass of the day, with clothes and shoes."

@@ -31,6 +31,7 @@ class ExternalContact(Effect):
     step: float = _STEP
 
     name = "external_contact"
+    prior = 0.02
     parameters = tuple(
         Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)") for axis in "xyz"
     )

@@ -27,6 +27,7 @@ class JointCentre(Effect):
     """
 
     name = "joint_centre"
+    prior = 0.02
     parameters = tuple(
         Parameter(f"shift_{axis}", "m", MISSED, "hip: 12.3 mm (Harrington) to 25 mm (Davis) of error (Mantovani 2016)")
         for axis in "xyz"

@@ -25,6 +25,7 @@ class MarkerMisplaced(Effect):
     """A ``shift`` (x, y, z: m, axes of its segment) from where the model has the marker ``target`` to where it sits."""
 
     name = "marker_misplaced"
+    prior = 0.02
     parameters = tuple(
         Parameter(f"shift_{axis}", "m", 0.010, "up to 20-30 mm between examiners (Osis 2016, PLoS ONE 0147111)")
         for axis in "xyz"

@@ -41,6 +41,7 @@ class PlateGain(ChannelEffect):
 
     name = "plate_gain"
     by_load = True
+    prior = 0.04
     parameters = (
         Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),
     )

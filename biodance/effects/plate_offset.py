@@ -22,7 +22,7 @@ USUAL_ZERO, VERTICAL_ZERO = 7.0, 18.0
 """N of horizontal and of vertical zero up to which laboratories have one without calling it a fault: public recordings
 have up to 6 and 16, and readers take the vertical off."""
 _EMPTY = 30.0
-"""N of vertical force within which a plate may be empty: larger zeros are found by the readers (`lab.plates.zero`)."""
+"""N of vertical force within which a plate may be empty: larger zeros are found by the readers (`find_baseline`)."""
 _RINGS, _SHORTEST = 0.02, 0.03
 """s at each end of an empty stretch in which a plate rings or is touched, and s of what is left: a flight of a slow run
 lasts 0.08 s."""
@@ -35,6 +35,7 @@ class PlateOffset(ChannelEffect):
     """A constant ``offset`` (N or N·m) about the plate's centre in channel ``target``."""
 
     name = "plate_offset"
+    prior = 0.04
     parameters = (Parameter("offset", "N or N·m", 5.0, "re-zeroing rule of +-5 N in laboratory guides (Codamotion)"),)
     separated_by = "Postures of different weight on the plate: squats, one leg, sitting down beside it."
     advice = "Record the empty plate before and after, and re-zero it."

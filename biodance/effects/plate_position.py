@@ -19,6 +19,7 @@ class PlatePosition(Effect):
 
     name = "plate_position"
     by_load = True
+    prior = 0.04
     parameters = (
         Parameter("shift", "m", 0.010, "centre-of-pressure errors up to 30 mm (PMID 11091955); 1-2 mm wand errors"),
     )

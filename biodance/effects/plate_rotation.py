@@ -20,6 +20,7 @@ class PlateRotation(Effect):
 
     name = "plate_rotation"
     by_load = True
+    prior = 0.02
     parameters = (
         Parameter(
             "angle", "rad", 0.02, "about 0.2 deg in a CalTester example report; 1 deg and more when corners are typed"

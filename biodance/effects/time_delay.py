@@ -36,6 +36,7 @@ class TimeDelay(Effect):
     """A ``delay`` (s) of all forces against the markers; forces late = positive."""
 
     name = "time_delay"
+    prior = 0.04
     parameters = (
         Parameter(
             "delay", "s", 0.005, "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)"

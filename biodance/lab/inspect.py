@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.markers.dress import said_of
 from biodance.lab.markers.gaps import report_gaps
-from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
 from biodance.lab.markers.still import standing_mass
 from biodance.lab.plates.told import Told

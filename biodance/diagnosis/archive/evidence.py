@@ -14,7 +14,7 @@ import numpy as np
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, of_steps, placed, step_rows
 from biodance.lab.markers.still import is_still, standing_mass
-from biodance.lab.plates.zero import block_means, find_baseline
+from biodance.lab.plates.decode import block_means, find_baseline
 from biodance.records import Array, Plate, Trial
 from biodance.witnesses import recording
 

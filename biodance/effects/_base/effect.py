@@ -50,6 +50,9 @@ class Effect(Checked):
     """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
     anybody looks.
     """
+    prior: ClassVar[float] = 0.01
+    """Probability that a session has it, before any data, at whichever target: judgement, told by how often
+    laboratories find it."""
     by_load: ClassVar[bool] = False
     """Whether it is in proportion to what a plate carries: one that is always empty cannot show it."""
     single: ClassVar[bool] = False

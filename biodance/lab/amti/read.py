@@ -10,9 +10,9 @@ from biodance.lab.amti.bsf import BsfContent, BsfPlate, parse_bsf
 from biodance.lab.amti.text import parse_amti_text
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
+from biodance.lab.plates.decode import DEEPEST, find_baseline, loaded_samples
 from biodance.lab.plates.parameters import INCH, POUND
-from biodance.lab.plates.wrench import DEEPEST, gravity_sign, sensor_below, wrench_in_lab
-from biodance.lab.plates.zero import find_baseline
+from biodance.lab.plates.sense import gravity_sign, sensor_below, wrench_in_lab
 from biodance.records import Array, Plate, Role, Source, Trial, Wrench
 from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import wrench_about_point
@@ -41,7 +41,7 @@ def amti_plate(
     channels, zeroed = _zeroed(channels, rate)
     below, placed = sensor_below(vector, _PLATE_UPRIGHT)
     wrench = wrench_about_point(channels, below)
-    sign = 1 if gravity_sign(wrench, _PLATE_UPRIGHT, rate) > 0 else -1
+    sign = 1 if gravity_sign(wrench[loaded_samples(wrench, rate)], _PLATE_UPRIGHT) > 0 else -1
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array(size) / 2
     corners = np.column_stack([half, np.zeros(4)]) @ _PLATE_UPRIGHT.T + centre
     directions = (

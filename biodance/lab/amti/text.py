@@ -12,8 +12,8 @@ import numpy as np
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.plain_text import COMMAS_READ, read_text, with_points
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
+from biodance.lab.plates.decode import DEEPEST
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
-from biodance.lab.plates.wrench import DEEPEST
 from biodance.library import read_toml
 from biodance.records import CHANNELS, Array
 

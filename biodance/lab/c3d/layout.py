@@ -212,11 +212,7 @@ def _analog_transform(
         lacking = [str(c + 1) for c in (*np.flatnonzero(np.isnan(whole)), *range(held.size, channels))]
         if lacking:
             how = "have no numbers" if name == "SCALE" else "have the offset 0"
-            notes.append(f"ANALOG:{name} has {held.size} values for {channels} channels: {_listed(lacking)} {how}.")
+            which = f"channels {', '.join(dict.fromkeys(lacking))}"
+            notes.append(f"ANALOG:{name} has {held.size} values for {channels} channels: {which} {how}.")
     gain, offset = filled[0] * (general[0] if channels else 1.0), filled[1]
     return gain, np.where((offset < 0) & unsigned, offset + 65536, offset)
-
-
-def _listed(channels: list[str]) -> str:
-    """Return channel numbers for a sentence, each once."""
-    return f"channels {', '.join(dict.fromkeys(channels))}"

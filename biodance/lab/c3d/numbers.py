@@ -98,17 +98,14 @@ def second_opinion(path: Path, numbers: Numbers, layout: Layout) -> str:
         return f"ezc3d does not take the file ({lines[-1] if lines else f'exit code {child.returncode}'})"
     with io.BytesIO(child.stdout) as answer:
         points, analog = np.load(answer).astype(float), np.load(answer).astype(float)
-    if layout.notes and (points.shape, analog.shape) != (numbers[0].shape, _shape(numbers[1], len(points))):
+    # without channels ezc3d still gives one row a frame
+    ours = (numbers[0].shape, numbers[1].shape if numbers[1].size else (len(points), 0))
+    if layout.notes and (points.shape, analog.shape) != ours:
         return (
             f"ezc3d believes the other of the two ({points.shape[1]} points, {analog.shape[1]} channels, "
             f"{len(points)} frames)"
         )
     return "confirmed" if _same_points(numbers[0], points) and _same_analog(numbers[1], analog, layout) else "refuted"
-
-
-def _shape(analog: Array, frames: int) -> tuple[int, ...]:
-    """Return the shape in which ezc3d gives analog values: without channels it still has one row a frame."""
-    return analog.shape if analog.size else (frames, 0)
 
 
 def _same_points(ours: Array, theirs: Array) -> bool:

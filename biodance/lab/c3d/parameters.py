@@ -225,16 +225,12 @@ def _record(section: bytes, at: int, processor: int, where: str) -> tuple[int, i
         raise damaged
     end += 1 + section[end]
     following = body + offset if offset else 0
-    if processor == MIPS and following > len(section) and body + _swapped(offset) == end:
+    swapped = (offset >> 8) | ((offset & 0xFF) << 8)  # so some software writes the last pointer of a MIPS file
+    if processor == MIPS and following > len(section) and body + swapped == end:
         following = 0 if not any(section[end:]) else end
     if end > len(section) or (following and not (end <= following <= len(section) and not any(section[end:following]))):
         raise damaged
     return following, abs(group), name, value
-
-
-def _swapped(word: int) -> int:
-    """Return a 16-bit word with its bytes exchanged: some software writes the last pointer of a MIPS file so."""
-    return (word >> 8) | ((word & 0xFF) << 8)
 
 
 def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tuple[ParameterValue, int]:

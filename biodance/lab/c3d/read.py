@@ -6,23 +6,19 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d.declared import parameter_numbers, texts
-from biodance.lab.c3d.raw import RawC3d, metres_per_unit, read_raw
+from biodance.lab.c3d.length import metres_per_unit
+from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
-from biodance.lab.markers.sets import recognise
+from biodance.lab.markers.sets import MarkerSet, recognise
 from biodance.lab.markers.upright import axis_to_head, clear_axis, turn_to
 from biodance.lab.plates.corners import is_rectangle
 from biodance.lab.plates.told import Told
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
-
-if TYPE_CHECKING:
-    from biodance.lab.plates.read import ReadPlates
-
 
 _CLOUD = 6
 """Markers that show how a body lies."""
@@ -65,18 +61,21 @@ def read_c3d(path: str | Path, *, role: Role = "fit", subject: str | None = None
     >>> biodance.read_c3d("visit/static.c3d", role="static").markers
     Markers(39 markers, 301 frames at 100 Hz, 3.00 s)
     """
+    from biodance.lab.plates.read import read_plates
+
     raw = read_raw(path)
     poses = poses_only(raw)
     if poses and not raw.analog.size:
         raise FileRefused(poses)
     labels = marker_labels(raw, subject=subject)
-    markers, metres, turn, axes_history, axes_warnings = _in_lab(raw, labels)
+    known = recognise(labels.names)
+    markers, metres, turn, axes_history, axes_warnings = _in_lab(raw, labels, known)
     measures, measure_history, measure_warnings = measurements_of(raw)
     told = told or Told()
     mass = measures.get("Bodymass") if told.mass is None else told.mass
-    read = _plates(raw, metres, turn, markers, mass, told)
-    marker_set = recognise(markers.names) if markers is not None else None
-    rate, worn = raw.rate if markers is not None else math.nan, marker_set.name if marker_set is not None else ""
+    read = read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=mass, told=told.plates)
+    rate = raw.rate if markers is not None else math.nan
+    worn = known.name if known is not None and markers is not None else ""
     source = Source(raw.path, raw.sha256, "C3D", rate, raw.analog_rate, raw.first_frame)
     history = (
         *_read(raw),
@@ -101,10 +100,13 @@ def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array
     FileRefused
         As `read_c3d`.
     """
-    return _in_lab(raw, marker_labels(raw, subject=subject))[1:3]
+    labels = marker_labels(raw, subject=subject)
+    return _in_lab(raw, labels, recognise(labels.names))[1:3]
 
 
-def _in_lab(raw: RawC3d, labels: MarkerLabels) -> tuple[Markers | None, float, Array, tuple[str, ...], tuple[str, ...]]:
+def _in_lab(
+    raw: RawC3d, labels: MarkerLabels, known: MarkerSet | None
+) -> tuple[Markers | None, float, Array, tuple[str, ...], tuple[str, ...]]:
     """Return the markers in m in the lab frame, the file's unit of length in m, lab_R_file (3, 3), what was decided
     and what is doubtful.
     """
@@ -112,7 +114,7 @@ def _in_lab(raw: RawC3d, labels: MarkerLabels) -> tuple[Markers | None, float, A
     points = raw.points if all_in_order else raw.points[:, list(labels.columns)]
     metres, units, doubts = metres_per_unit(raw.parameters, points, where=str(raw.path))
     own = _markers(raw, labels, points)
-    turn, axes, doubtful = _turn_to_z_up(raw, own)
+    turn, axes, doubtful = _turn_to_z_up(raw, own, known)
     markers = None if own is None else replace(own, xyz=_turned(own.xyz, metres * turn))
     return markers, metres, turn, (*units, *axes), (*doubts, *doubtful)
 
@@ -146,14 +148,6 @@ def _markers(raw: RawC3d, labels: MarkerLabels, points: Array) -> Markers | None
     return Markers(labels.names, np.arange(len(points)) / (raw.rate if math.isfinite(raw.rate) else 1.0), points)
 
 
-def _plates(
-    raw: RawC3d, metres: float, turn: Array, markers: Markers | None, mass: float | None, told: Told
-) -> "ReadPlates":
-    from biodance.lab.plates.read import read_plates
-
-    return read_plates(raw, metres=metres, turn=turn, markers=markers, body_mass=mass, told=told.plates)
-
-
 def _gaps(markers: Markers | None) -> tuple[str, ...]:
     """Say how much of the markers was not seen, and which never were."""
     if markers is None:
@@ -164,16 +158,18 @@ def _gaps(markers: Markers | None) -> tuple[str, ...]:
     return (f"{len(markers.names)} markers, {100 * share:.2g} % of their samples not seen{missing}.",)
 
 
-def _turn_to_z_up(raw: RawC3d, markers: Markers | None) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
+def _turn_to_z_up(
+    raw: RawC3d, markers: Markers | None, known: MarkerSet | None
+) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
     """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings; the identity if it does
     already.
 
-    ``markers`` are still in file axes. The floor of the plates decides the axis, the side on which the markers are its
-    sign; without plates the upright person overrules Y_SCREEN, unless Y_SCREEN says +Z (the person may lie down). x
-    stays where it is not the vertical itself.
+    ``markers``, of the set ``known``, are still in file axes. The floor of the plates decides the axis, the side on
+    which the markers are its sign; without plates the upright person overrules Y_SCREEN, unless Y_SCREEN says +Z (the
+    person may lie down). x stays where it is not the vertical itself.
     """
     floor, declared = _floor(raw, markers), _declared(raw, markers)
-    body = axis_to_head(markers) if markers else None
+    body = axis_to_head(markers, known) if markers else None
     witnesses = {"the plates": floor, "the markers from feet to head": body, "POINT:Y_SCREEN": declared}
     if floor is None and declared is not None and declared[2] == 1:
         witnesses = {name: witnesses[name] for name in ("POINT:Y_SCREEN", "the markers from feet to head")}

@@ -15,15 +15,7 @@ from biodance.lab.c3d.declared import parameter_numbers, texts
 from biodance.lab.c3d.layout import Layout
 from biodance.lab.c3d.numbers import read_numbers
 from biodance.lab.c3d.parameters import Parameters
-from biodance.lab.c3d.raw import (
-    RawC3d,
-    model_outputs,
-    open_c3d,
-    point_labels,
-    segment_poses,
-    split_label,
-    unlabelled,
-)
+from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, segment_poses, split_label
 from biodance.records import Array
 
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
@@ -109,18 +101,17 @@ def subjects_of(raw: RawC3d) -> tuple[str, ...]:
     """Return the names of the subjects in a file: label prefixes (`people_of`), or SUBJECTS:NAMES where labels have
     none.
     """
-    nameless = set(unlabelled(raw.labels))
-    labels = [label for i, label in enumerate(raw.labels) if i not in nameless]
-    if any(split_label(label)[0] for label in labels):
-        return people_of(labels)
+    prefixes = [prefix for i, (prefix, _) in enumerate(raw.split_labels) if i not in raw.nameless]
+    if any(prefixes):
+        return people_of(prefixes)
     return tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
 
 
-def people_of(labels: Iterable[str]) -> tuple[str, ...]:
-    """Return the prefixes of labels that name people: not those of things, which carry few markers; all of them where
-    nobody carries more.
+def people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the prefixes, one for each marker, that name people: not those of things, which carry few
+    markers; all of them where nobody carries more.
     """
-    counts = Counter(split_label(label)[0] for label in labels)
+    counts = Counter(prefixes)
     enough = {prefix for prefix, count in counts.items() if count > _OBJECT}
     return tuple(prefix for prefix in counts if prefix and (prefix in enough or not enough))
 
@@ -143,14 +134,14 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
     """
     history: list[str] = []
     warnings: list[str] = []
-    outputs = model_outputs(raw.labels, raw.parameters)
-    columns = [i for i in range(len(raw.labels)) if i not in set(outputs)]
+    outputs = set(raw.outputs)
+    columns = [i for i in range(len(raw.labels)) if i not in outputs]
     if outputs:
-        shown = ", ".join(raw.labels[i] for i in outputs[:3])
+        shown = ", ".join(raw.labels[i] for i in raw.outputs[:3])
         history.append(
             f"{len(outputs)} points are results of a model in the recording software, not markers: {shown} ..."
         )
-    nameless = set(columns) & set(unlabelled(raw.labels))
+    nameless = raw.nameless.intersection(columns)
     if nameless:
         history.append(f"{len(nameless)} unlabelled points are left out.")
     columns = _of_subject(raw, [i for i in columns if i not in nameless], subject, history)
@@ -160,7 +151,7 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
 
 def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: list[str]) -> list[int]:
     """Return the columns whose label belongs to the chosen subject."""
-    prefixes = people_of(raw.labels[i] for i in columns)
+    prefixes = people_of(raw.split_labels[i][0] for i in columns)
     columns = _without_things(raw, columns, prefixes, history)
     if subject is None and len(prefixes) > 1:
         raise FileRefused(
@@ -178,7 +169,7 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
         )
     if not prefixes:
         return columns
-    own = [i for i in columns if split_label(raw.labels[i])[0] in ("" if len(prefixes) == 1 else match, match)]
+    own = [i for i in columns if raw.split_labels[i][0] in ("" if len(prefixes) == 1 else match, match)]
     history.append(
         f"Markers of subject {match!r} taken, the prefix removed; {len(columns) - len(own)} points of others left out."
     )
@@ -187,8 +178,8 @@ def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: l
 
 def _without_things(raw: RawC3d, columns: list[int], people: tuple[str, ...], history: list[str]) -> list[int]:
     """Return the columns of labels without prefix or of people; what else there is is said."""
-    own = [i for i in columns if split_label(raw.labels[i])[0] in ("", *people)]
-    things = dict.fromkeys(split_label(raw.labels[i])[0] for i in columns if i not in set(own))
+    own = [i for i in columns if raw.split_labels[i][0] in ("", *people)]
+    things = dict.fromkeys(raw.split_labels[i][0] for i in columns if i not in set(own))
     if things:
         history.append(
             f"{len(columns) - len(own)} points of {', '.join(things)} left out: so few markers are those of a thing."
@@ -202,7 +193,7 @@ def _without_repeats(
     """Return columns and names: an unseen or equal repetition goes, a different one is numbered like the first."""
     places: dict[str, list[int]] = {}
     for column in columns:
-        places.setdefault(split_label(raw.labels[column])[1], []).append(column)
+        places.setdefault(raw.split_labels[column][1], []).append(column)
     kept: dict[int, str] = {}
     for name, same in places.items():
         if len(same) == 1:

@@ -1,42 +1,31 @@
 """A marker set that nobody described, guessed from what its labels say and from where the markers are on a standing
-person: one landmark a marker, right on the right, knees under hips, lateral outside medial.
+person (`assign`), and worn by the whole session.
 
 A wrong map is worse than none: a landmark whose marker stands where no person has it is left out, and a guess that
 lacks a landmark the body needs, or of which too much is contradicted, is none.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from biodance.lab.markers.absent import absent_landmarks, fill_absent
-from biodance.lab.markers.names import Meaning, joints_from_video, meanings_of, sides_exchanged
-from biodance.lab.markers.person import mirror_images, person_of
-from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, segment_of
-from biodance.lab.markers.sets import GUESSED
+from biodance.lab.markers.assign import NEEDS, PersonLabels, by_names
+from biodance.lab.markers.names import joints_from_video, meanings_of, sides_exchanged
+from biodance.lab.markers.set_file import LANDMARKS, MIDLINE, other_side, part_of, segment_of
+from biodance.lab.markers.sets import GUESSED, MarkerSet, read_marker_set
 from biodance.lab.markers.spelling import plain_labels, side_words
-from biodance.lab.markers.standing import Standing, standing_person
 from biodance.lab.markers.still import median_places, posture_frames
-from biodance.records import SIDES, Array, Markers
+from biodance.lab.markers.upright import (
+    Standing,
+    bound,
+    mirror_images,
+    standing_by_names,
+    standing_by_points,
+)
+from biodance.records import SIDES, Array, Markers, Trial
 
-_BELIEVED = 0.85
-"""Share of the named landmarks that the standing person must confirm, or the names mean something else here."""
-_USUAL = 30
-"""Rank of a spelling below which it is a common one, whose word counts."""
-_WEIGHT = 20.0
-"""Ranks of spelling by which a marker at the limit of where it is believed counts less than one at the usual place."""
-_AS_USUAL = 0.5
-"""Share of the way to that limit within which all places are equally usual."""
-_HALFWAY = 0.3
-"""Share of the width of a joint within which of its half a marker is the middle of it."""
-_JOINT_WIDTH = (0.03, 0.09)
-"""Shares of the stature between which a knee or ankle is wide, over the skin."""
-_LEVEL = 0.5
-"""Share of that width by which its two markers may differ in height and fore and aft."""
-_APART = 0.005
-"""m: by so much a lateral marker must lie farther out than the medial one, or the two are exchanged."""
+_SHARED = 6
+"""Labels of the session's set that a trial must have to be read with it: three markers on each of two segments."""
 _FROM_VIDEO = (
     "These labels are joints, as software estimates them from video, not markers on the skin: {named}. A body is "
     "placed by markers on both iliac spines, at the side of knees and ankles, on heels and toes. Give positions of "
@@ -67,196 +56,107 @@ def guess_set(markers: Markers) -> GuessedSet:
 
 
 def _guessed(at: Mapping[str, Array]) -> GuessedSet:
-    """Return the guess by names, else by the words that mirror images teach."""
-    named = _by_names(at)
-    if named.name:
-        return named
+    """Return the guess for the person whom the names show, else for the one whom the points show."""
+    said = meanings_of(at)
+    stand = standing_by_names(at, by_names(said))
+    if isinstance(stand, Standing):
+        stand = standing_by_names(at, by_names(said, stand))
+    if isinstance(stand, Standing):
+        named = _guess_of(PersonLabels(stand, said))
+    else:
+        named = GuessedSet(
+            {}, (stand or "Too few labels say which landmark they mark, so no marker set can be guessed.",)
+        )
     plain = plain_labels(at)
-    person = person_of({label: at[label] for label in plain})
+    person = None if named.name else standing_by_points({label: at[label] for label in plain})
     if person is None:
         return named
     words = side_words((plain[right], plain[left]) for right, left in mirror_images(person))
     if sides_exchanged(words):
         return named
-    stood = _on(replace(person, at=at), meanings_of(at, sides=words))
+    stood = _guess_of(PersonLabels(replace(person, at=at), meanings_of(at, sides=words)))
     return stood if stood.name or len(stood.map) > len(named.map) else named
 
 
-def _by_names(at: Mapping[str, Array]) -> GuessedSet:
-    """Return the guess in which the names say who stands where."""
-    said = meanings_of(at)
-    named = _assigned(said, lambda place, label: 0.0)
-    stand = standing_person(at, named)
-    if stand is not None and not isinstance(stand, str):
-        named = _assigned(said, stand.misfit)
-        stand = standing_person(at, named)
-    if stand is None:
-        return GuessedSet({}, ("Too few labels say which landmark they mark, so no marker set can be guessed.",))
-    return GuessedSet({}, (stand,)) if isinstance(stand, str) else _on(stand, said)
+def _words(place: str) -> str:
+    return place.replace("_", " ")
 
 
-def _on(stand: Standing, said: Mapping[str, tuple[Meaning, ...]]) -> GuessedSet:
-    """Return the guess for a standing person: what the labels say and the person confirms, then what posture tells."""
-    named = _assigned(said, stand.misfit)
-    said, crossed = _as_they_lie(said, named, stand)
-    named = _assigned(said, stand.misfit) if crossed else named
-    stand = replace(stand, named=named)
-    confirmed = {
-        label: tuple(one for one in found if stand.believed(one.place, label)) for label, found in said.items()
-    }
-    places = _assigned(confirmed, stand.misfit)
-    doubts = [
-        *crossed,
-        *(
-            f"{label} was not taken for the {one.replace('_', ' ')}: no standing person has it there."
-            for one, label in named.items()
-            if one in LANDMARKS and not confirmed[label]
-        ),
+def _guess_of(person: PersonLabels) -> GuessedSet:
+    """Return the guess: the assignment, if it has what a body needs and the person confirms what the labels name."""
+    places = person.assignment()
+    doubts = [*_contradictions(person, places), *_inferences(person, places)]
+    absent = [
+        f"{side} {_words(part)}"
+        for side in SIDES
+        for part, others in NEEDS.items()
+        if not any(f"{side}_{one}" in places for one in others)
     ]
-    _take_ends(places, stand, confirmed)
-    _take_outer(places, stand, doubts)
-    _sort_pairs(places, stand, doubts)
-    usual = [label for place, label in named.items() if said[label][0].rank < _USUAL]
-    believed, total = sum(bool(confirmed[label]) for label in usual), len(usual)
-    doubts += fill_absent(places, stand, confirmed) + _medial_alone(places)
-    absent = absent_landmarks(places)
-    map_ = _map(places, confirmed)
+    if "mid_psis" not in places and not {"left_psis", "right_psis"} <= places.keys():
+        absent.append("the posterior iliac spines or the sacrum")
     reasons = [f"No marker could be taken for: {', '.join(absent)}."] if absent else []
-    if believed < _BELIEVED * total:
+    usual = [label for label in person.named.values() if person.said[label][0].rank < bound("usual")]
+    other = {places.get(other_side(place)) for place, label in person.named.items() if not person.confirmed[label]}
+    refuted = [label for label in usual if not person.confirmed[label] and label not in other]
+    if len(usual) - len(refuted) < bound("believed") * len(usual):
         reasons.append(
-            f"Only {believed} of {total} landmarks that the labels name stand where a person has them; elsewhere: "
-            f"{', '.join(label for label in usual if not confirmed[label])}."
+            f"Only {len(usual) - len(refuted)} of {len(usual)} landmarks that the labels name stand where a person has "
+            f"them; elsewhere: {', '.join(refuted)}."
         )
+    map_ = {label: place for place, label in places.items()} | _segments(person, set(places.values()))
     if reasons:
         return GuessedSet(map_, (" ".join(reasons), *doubts))
     return GuessedSet(map_, tuple(doubts), GUESSED + json.dumps(map_, separators=(",", ":")))
 
 
-def _as_they_lie(
-    said: Mapping[str, tuple[Meaning, ...]], named: Mapping[str, str], stand: Standing
-) -> tuple[Mapping[str, tuple[Meaning, ...]], list[str]]:
-    """Return what the labels say, with two labels of one landmark exchanged where each stands where a person has the
-    other side's, and a sentence for each such pair: what lies on the right is right, whatever it is called.
-    """
-    meant, doubts = dict(said), []
-    for right, a in named.items():
-        left = right.replace("right_", "left_", 1)
-        b = named.get(left) if right.startswith("right_") else None
-        if b is None or stand.believed(right, a) or stand.believed(left, b):
+def _contradictions(person: PersonLabels, places: Mapping[str, str]) -> Iterator[str]:
+    """Yield, in sentences, what labels say and the person does not have."""
+    landmarks = {label: place for place, label in places.items()}
+    for place, label in person.named.items():
+        if label not in landmarks and not person.confirmed[label]:
+            yield f"{label} was not taken for the {_words(place)}: no standing person has it there."
+    for place, label in places.items():
+        if place in (one.place for one in person.confirmed[label]) or not person.is_named(place, label):
             continue
-        if stand.believed(right, b) and stand.believed(left, a):
-            meant[a], meant[b] = said[b], said[a]
-            words = right.removeprefix("right_").replace("_", " ")
-            doubts.append(f"{a} and {b} lie on each other's sides: taken for the {words} of the side where they are.")
-    return meant, doubts
-
-
-def _assigned(said: Mapping[str, tuple[Meaning, ...]], misfit: Callable[[str, str], float]) -> dict[str, str]:
-    """Return landmark -> label: of several labels for one landmark the one that is called and placed most usually, the
-    others take what else they may mean.
-    """
-    wishes = [
-        (one.rank + _WEIGHT * max(misfit(one.place, label) - _AS_USUAL, 0.0), label, one.place)
-        for label, ways in said.items()
-        for one in ways
-        if one.place in LANDMARKS
-    ]
-    places: dict[str, str] = {}
-    for _, label, place in sorted(wishes, key=lambda wish: wish[:2]):
-        if place not in places and label not in places.values():
-            places[place] = label
-    return places
-
-
-def _ends(joint: str) -> dict[str, tuple[str, str]]:
-    """Return side -> lateral and medial landmark of a joint."""
-    return {side: (f"{side}_{joint}_lateral", f"{side}_{joint}_medial") for side in SIDES}
-
-
-def _take_ends(places: dict[str, str], stand: Standing, confirmed: Mapping[str, tuple[Meaning, ...]]) -> None:
-    """Of several labels for one end of a joint take the marker at that end: Knee half way between KneeLat and KneeMed
-    is its middle, not its lateral marker; two that are called medial are the outer and the inner one.
-    """
-    for joint in ("knee", "ankle", "elbow"):
-        for side, (lateral, medial) in _ends(joint).items():
-            outer, inner = (
-                [label for label, said in confirmed.items() if said and said[0].place == place]
-                for place in (lateral, medial)
-            )
-            if lateral in places and medial in places:
-                now, inside = stand.at[places[lateral]], stand.at[places[medial]]
-                for label in outer:
-                    across = stand.at[label] - inside
-                    if np.linalg.norm(now - inside - across / 2) < _HALFWAY * np.linalg.norm(across):
-                        places[lateral] = label
-            elif lateral not in places and len(inner) > 1 and places.get(medial) in inner:
-                outward = [float(stand.at[label] @ stand.outwards(side)) for label in inner]
-                places[medial], places[lateral] = inner[int(np.argmin(outward))], inner[int(np.argmax(outward))]
-
-
-def _take_outer(places: dict[str, str], stand: Standing, doubts: list[str]) -> None:
-    """Take the only marker of a knee or ankle for its medial one where on both sides one that says nothing lies across
-    the joint from it, outside: a body has nothing there but its lateral marker.
-    """
-    for joint in ("knee", "ankle"):
-        alone = {side: [places[end] for end in both if end in places] for side, both in _ends(joint).items()}
-        outer = {side: _across(one[0], side, places, stand) if len(one) == 1 else [] for side, one in alone.items()}
-        if any(len(found) != 1 for found in outer.values()):
-            continue
-        for side, (lateral, medial) in _ends(joint).items():
-            (places[lateral],), (places[medial],) = outer[side], alone[side]
-            doubts.append(
-                f"{places[lateral]} lies across the {side} {joint} from {places[medial]}, outside: it was taken for "
-                f"the lateral marker, {places[medial]} for the medial one."
+        said, side, joint = person.said[label][0].place, place.partition("_")[0], place.rpartition("_")[0]
+        other = places.get(said, "")
+        if said == other_side(place) and other:
+            if side == "right":
+                yield (
+                    f"{label} and {other} lie on each other's sides: taken for the {_words(part_of(place))} of the "
+                    f"side where they are."
+                )
+        elif not other:
+            yield f"{label} is the only marker there: taken for the {_words(place)}, against its name."
+        elif place.endswith("lateral"):
+            yield (
+                f"{label} lies outside {other}, so it was taken for the lateral marker of the "
+                f"{_words(joint)}, against its name."
             )
 
 
-def _across(label: str, side: str, places: Mapping[str, str], stand: Standing) -> list[str]:
-    """Return the labels without a landmark that lie a joint's width outside a marker, as high as it."""
-    out, (narrowest, widest) = stand.outwards(side), _JOINT_WIDTH
-    found = []
-    for other in (other for other in stand.at if other not in places.values()):
-        way = stand.at[other] - stand.at[label]
-        wide = way @ out
-        level = np.linalg.norm(way - wide * out) < _LEVEL * wide
-        if level and narrowest * stand.stature < wide < widest * stand.stature:
-            found.append(other)
-    return found
+def _inferences(person: PersonLabels, places: Mapping[str, str]) -> Iterator[str]:
+    """Yield, in sentences, which labels were taken for landmarks that they do not name."""
+    mute = {place: label for place, label in places.items() if not person.is_named(place, label)}
+    for place, label in mute.items():
+        inner = places.get(place.replace("lateral", "medial"), label)
+        mirror = places.get(other_side(place))
+        if place.endswith("lateral") and inner not in (label, *mute.values()):
+            yield (
+                f"{label} lies across the {_words(place.rpartition('_')[0])} from {inner}, outside: it was taken for "
+                f"the lateral marker, {inner} for the medial one."
+            )
+        elif mirror and mirror not in mute.values():
+            yield f"{label} lies where the mirror image of {mirror} is: taken for the {_words(place)}."
+        else:
+            yield f"{label} stands where people have the {_words(place)}, and no other marker does: taken for it."
 
 
-def _medial_alone(places: dict[str, str]) -> list[str]:
-    """Take the only marker of a joint for the lateral one where both sides call it medial: nobody puts that alone."""
-    said = []
-    for joint in ("knee", "ankle"):
-        ends = _ends(joint).values()
-        if all(medial in places and lateral not in places for lateral, medial in ends):
-            for lateral, medial in ends:
-                places[lateral] = places.pop(medial)
-                words = lateral.replace("_", " ")
-                said.append(f"{places[lateral]} is the only marker there: taken for the {words}, against its name.")
-    return said
-
-
-def _sort_pairs(places: dict[str, str], stand: Standing, doubts: list[str]) -> None:
-    """Exchange the markers of a medial and lateral pair that lie the other way round, against their names."""
-    for side in SIDES:
-        for joint in ("knee", "ankle", "toe"):
-            lateral, medial = _ends(joint)[side]
-            if lateral in places and medial in places:
-                apart = (stand.at[places[lateral]] - stand.at[places[medial]]) @ stand.outwards(side)
-                if apart < -_APART:
-                    places[lateral], places[medial] = places[medial], places[lateral]
-                    doubts.append(
-                        f"{places[lateral]} lies outside {places[medial]}, so it was taken for the lateral marker of "
-                        f"the {side} {joint}, against its name."
-                    )
-
-
-def _map(places: Mapping[str, str], said: Mapping[str, tuple[Meaning, ...]]) -> dict[str, str]:
-    """Return label -> landmark, and for labels without one the segment that they name or whose landmark another has."""
-    found = {label: place for place, label in places.items()}
-    for label, several in said.items():
-        if label in found:
+def _segments(person: PersonLabels, taken: Collection[str]) -> dict[str, str]:
+    """Return label -> the segment that it names, or whose landmark another label has; the head's front or back."""
+    found = {}
+    for label, several in person.confirmed.items():
+        if label in taken:
             continue
         whole = next((one.place for one in several if one.place in MIDLINE and one.place.startswith("head")), None)
         segment = next((one.place for one in several if one.place not in LANDMARKS), None)
@@ -266,3 +166,60 @@ def _map(places: Mapping[str, str], said: Mapping[str, tuple[Meaning, ...]]) -> 
         if whole or segment:
             found[label] = whole or segment or ""
     return found
+
+
+def dress(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
+    """Return the trials, all with one marker set where their labels allow it, and what was found in sentences.
+
+    The set is that of the first static trial, else of the trial with most markers; where no known set fits that trial,
+    it is guessed from its names and posture. A moving trial that lacks markers of the static one (medial markers, an
+    alignment device) is read with the same set; a trial that a known set fits better keeps that.
+    """
+    worn = [trial for trial in trials if trial.markers is not None]
+    if not worn:
+        return list(trials), []
+    order = sorted(worn, key=lambda trial: (trial.role != "static", -len(trial.markers.names if trial.markers else ())))
+    if any(trial.marker_set for trial in order):
+        leader = next(trial for trial in order if trial.marker_set)
+        found, notes = read_marker_set(leader.marker_set), []
+    else:
+        guesses = [(trial, guess_set(trial.markers)) for trial in order if trial.markers is not None]
+        leader, guess = next(((trial, one) for trial, one in guesses if one.name), guesses[0])
+        notes = [said_of(guess, leader.name)]
+        if not guess.name:
+            return [_doubting(trial, guess) for trial in trials], notes
+        found = read_marker_set(guess.name)
+    return [_with(trial, found) for trial in trials], notes
+
+
+def said_of(guess: GuessedSet, name: str) -> str:
+    """Return what was guessed in ``name``, or why nothing was, as one sentence for a person."""
+    if not guess.name:
+        return (
+            f"{name}: its labels are of no known marker set, and none could be guessed: {guess.doubts[0]} Name the set "
+            f'with --markers FILE, or write [markers] map = {{LABEL = "left_asis", ...}} into session.toml.'
+        )
+    listed = ", ".join(f"{label} = {place}" for label, place in guess.map.items())
+    doubts = f" Doubtful: {' '.join(guess.doubts)}" if guess.doubts else ""
+    return (
+        f"{name}: its labels are of no known marker set; the map was guessed from names and posture: {listed}.{doubts} "
+        f"`biodance init` writes it into session.toml, to be confirmed or corrected."
+    )
+
+
+def _with(trial: Trial, found: MarkerSet) -> Trial:
+    """Return a trial with the session's set, unless its own fits more of its labels."""
+    if trial.markers is None or trial.marker_set == found.name:
+        return trial
+    matched = found.match(trial.markers.names)
+    own = len(read_marker_set(trial.marker_set).match(trial.markers.names)) if trial.marker_set else 0
+    if len(matched) < _SHARED or len(matched) < own:
+        return trial
+    return replace(trial, marker_set=found.name)
+
+
+def _doubting(trial: Trial, guess: GuessedSet) -> Trial:
+    """Return a trial of no known set with the reason why none was guessed."""
+    if trial.markers is None:
+        return trial
+    return replace(trial, warnings=(*trial.warnings, f"No marker set could be guessed: {guess.doubts[0]}"))

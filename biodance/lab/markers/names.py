@@ -7,7 +7,7 @@ The spellings are data: ``anthropometry/marker_names.toml``.
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from itertools import permutations, product
 from typing import TypeVar
 
@@ -85,7 +85,7 @@ def meanings_of(labels: Iterable[str], *, sides: Iterable[tuple[str, str]] = ())
     """Return label -> what it may mean, the most usual first, read as the whole set of labels is written; labels that
     mean nothing are left out. ``sides`` are words (right, left) that this set uses, beside those that are known.
     """
-    return {label: found for label, ways in _read(labels, sides).items() if (found := _meanings(ways))}
+    return {label: found for label, ways in _read(tuple(labels), tuple(sides)).items() if (found := _meanings(ways))}
 
 
 def sides_exchanged(sides: Iterable[tuple[str, str]]) -> bool:
@@ -95,7 +95,7 @@ def sides_exchanged(sides: Iterable[tuple[str, str]]) -> bool:
 
 def sides_of(labels: Iterable[str]) -> dict[str, str]:
     """Return label -> "right" or "left", for the labels that say one as the whole set of labels is written."""
-    sides = {label: {one.side for one in ways if one.side} for label, ways in _read(labels).items()}
+    sides = {label: {one.side for one in ways if one.side} for label, ways in _read(tuple(labels)).items()}
     return {label: next(iter(found)) for label, found in sides.items() if len(found) == 1}
 
 
@@ -113,7 +113,8 @@ def joints_from_video(labels: Iterable[str]) -> tuple[str, ...]:
     return tuple(plain[by_word[one]] for one in wanted) if by_word.keys() >= set(wanted) else ()
 
 
-def _read(labels: Iterable[str], sides: Iterable[tuple[str, str]] = ()) -> dict[str, tuple[Spelled, ...]]:
+@lru_cache(maxsize=8)
+def _read(labels: tuple[str, ...], sides: tuple[tuple[str, str], ...] = ()) -> Mapping[str, tuple[Spelled, ...]]:
     """Return label -> its readings as the whole set of labels is written."""
     words = _vocabulary()
     return readings_of(labels, tuple(dict.fromkeys((*sides, *words.pairs))), words.noise)

@@ -182,6 +182,23 @@ def segment_of(landmark: str) -> str:
     return f"{side}_{segment}" if f"{side}_{segment}" in _SEGMENTS else segment
 
 
+def part_of(landmark: str) -> str:
+    """Return a landmark without its side."""
+    return landmark.partition("_")[2] if landmark.startswith(SIDES) else landmark
+
+
+def other_side(landmark: str) -> str:
+    """Return the same landmark of the other side."""
+    side, _, part = landmark.partition("_")
+    return f"{'left' if side == 'right' else 'right'}_{part}"
+
+
+def other_end(landmark: str) -> str | None:
+    """Return the landmark at the other end of the joint; None for a landmark that is not one of two ends."""
+    joint, _, end = landmark.rpartition("_")
+    return {"lateral": f"{joint}_medial", "medial": f"{joint}_lateral"}.get(end)
+
+
 def _legal(path: Path, kind: str, found: tuple[str, ...], legal: tuple[str, ...]) -> None:
     wrong = [name for name in found if name not in legal]
     if wrong:

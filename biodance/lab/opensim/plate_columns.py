@@ -15,7 +15,7 @@ from biodance.errors import FileRefused
 from biodance.lab.markers.time_axis import time_axis
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.opensim.mot import TimeTable
-from biodance.lab.plates.zero import find_baseline
+from biodance.lab.plates.decode import find_baseline
 from biodance.records import Array, Plate, Wrench
 from biodance.settings import COP_FORCE
 from biodance.spatial import wrench_about_origin

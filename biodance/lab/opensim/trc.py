@@ -240,5 +240,5 @@ def _equal_steps(
 
 def _is_z_up(markers: Markers) -> bool:
     """Return whether z is up in the file: by the labels of high and low markers, else by where the cloud is tall."""
-    axis = axis_to_head(markers)
+    axis = axis_to_head(markers, recognise(markers.names))
     return body_is_tall_along_z(markers.xyz) if axis is None or axis[0] else bool(axis[2])

@@ -1,11 +1,15 @@
-"""What the FORCE_PLATFORM group of a C3D file says about each plate, and the units of its channels; nothing computed
-yet.
+"""What a C3D file says of its force plates (group FORCE_PLATFORM, labels and units of the analog channels), and what
+session.toml says instead; no sample is looked at yet.
+
+Sources: C3D user guide, FORCE_PLATFORM; Visual3D documentation, force platform types 5-7; Kistler 9287C manual, 8.4.3
+(FPCOPPOLY).
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from difflib import get_close_matches
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,20 +20,63 @@ from biodance.records import Array
 from biodance.settings import STANDARD_GRAVITY
 
 CHANNELS_OF_TYPE = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
+FOUR_SENSORS = (3, 6, 7)
+"""TYPEs whose ORIGIN holds the half distances a, b of four sensors and their depth."""
+CONTENT = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "FFFMMM", 5: "FFFMMM", 6: "F" * 12, 7: "F" * 8}
+"""What each channel (after the calibration matrix) holds: F force, M moment, L length."""
 _MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
 _USUAL_TYPE = 2
 """Three forces and three moments: taken for channels of which nothing else is said."""
 _NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
+
+_SIX = ("fx", "fy", "fz", "mx", "my", "mz")
+_EIGHT = ("fx12", "fx34", "fy14", "fy23", "fz1", "fz2", "fz3", "fz4")
+_AROUND_NAMES = re.compile(r"force|moment|torque|[\s._+:-]", flags=re.IGNORECASE)
+_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+_WORDS = {"F": "force", "M": "moment", "L": "length"}
+
+POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
+FORCE = {
+    **dict.fromkeys(("n", "newton", "newtons", "nt"), 1.0),
+    "kn": 1000.0,
+    **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), POUND),
+    **dict.fromkeys(("kgf", "kp"), KILOGRAM_FORCE),
+}
+_LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
+MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _LENGTH.items()} | {
+    length + force: f * s for force, f in FORCE.items() for length, s in _LENGTH.items() if force != "n"
+}
+"""N·m per unit, for unit texts without blanks and signs: ``nmm``, ``inlb``, ``lbfft`` ..."""
+TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
 
 
 @dataclass(frozen=True, eq=False)
 class PlateParameters:
     """One plate as the file describes it, in file units and file axes.
 
-    ``number`` from 1; ``type`` the C3D TYPE; ``channels`` columns of the analog data, from 0; ``corners`` (4, 3);
-    ``origin`` (3,); ``calibration`` (rows, columns), output = calibration @ channels, None where the type has none;
-    ``polynomial`` (2, 6) Kistler's correction of the centre of pressure in millimetres, None = none. ``told`` what of
-    it session.toml says; its sensitivity gives N and N·m, the file's matrix N and N times the file's length unit.
+    Attributes
+    ----------
+    number : int
+        From 1.
+    type : int
+        TYPE of the C3D standard.
+    channels : tuple of int
+        Columns of the analog data, from 0.
+    corners, origin : Array
+        (4, 3) and (3,), in the file's length unit; the corners in file axes, ORIGIN in plate axes.
+    factors : tuple of float
+        SI unit per unit of each channel, after the calibration matrix where there is one.
+    units_said : tuple of str
+        What was decided about the units; more than one sentence where the file does not say one of them.
+    zero : tuple of int or None
+        FORCE_PLATFORM:ZERO as written, first and last sample from 1; None if it is missing or not two numbers.
+    calibration : Array or None
+        (rows, columns), output = calibration @ channels: N, and N times the file's length unit; that of session.toml
+        gives N and N·m. None where the type has none.
+    polynomial : Array or None
+        (2, 6) Kistler's correction of the centre of pressure in millimetres; None = none.
+    told : ToldPlate
+        What of it session.toml says.
     """
 
     number: int
@@ -37,6 +84,9 @@ class PlateParameters:
     channels: tuple[int, ...]
     corners: Array
     origin: Array
+    factors: tuple[float, ...]
+    units_said: tuple[str, ...]
+    zero: tuple[int, int] | None = None
     calibration: Array | None = None
     polynomial: Array | None = None
     told: ToldPlate = NOTHING_TOLD
@@ -45,6 +95,49 @@ class PlateParameters:
     def name(self) -> str:
         """The lab's name of the plate, ``plate1`` ..."""
         return f"plate{self.number}"
+
+
+class DeclaredPlates(NamedTuple):
+    """The ``plates`` that a file and session.toml describe, the reason by number why others are ``refused``, what a
+    person should look at, what was decided without doubt.
+    """
+
+    plates: tuple[PlateParameters, ...]
+    refused: Mapping[int, str]
+    warnings: tuple[str, ...]
+    history: tuple[str, ...]
+
+
+def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array) -> DeclaredPlates:
+    """Return the plates of the file and those whose channels ``told`` names, without those that are not to be used.
+
+    ``told`` by the plate's name; ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the
+    lab.
+    """
+    count, warnings = count_plates(raw)
+    more = {int(name.removeprefix("plate")): one for name, one in told.items()}
+    if not count and not warnings and not more:
+        warnings = undescribed_plates(raw)
+    lacking = [n for n, one in more.items() if n > count and one.use and not one.channels] if raw.analog.size else []
+    warnings += tuple(
+        f"Plate {n} of session.toml is none of the file's {count} plates. Give its channels in [plates.plate{n}], or "
+        f"take it away."
+        for n in lacking
+    )
+    unused = [n for n, one in more.items() if not one.use]
+    numbers = sorted({*range(1, count + 1), *(n for n, one in more.items() if one.channels)} - set(unused))
+    history = tuple(f"plate{n} was left out, as session.toml says." for n in unused if n <= count)
+    if numbers and (raw.analog.shape[0] == 0 or not raw.analog_rate > 0):
+        lacks = "holds no analog samples" if raw.analog.shape[0] == 0 else f"has the analog rate {raw.analog_rate:g}"
+        declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
+        return DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
+    plates, refused = [], {}
+    for number in numbers:
+        try:
+            plates.append(plate_parameters(raw, number, more.get(number), metres=metres, turn=turn))
+        except TrialRefused as error:
+            refused[number] = str(error)
+    return DeclaredPlates(tuple(plates), refused, warnings, history)
 
 
 def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
@@ -78,14 +171,6 @@ def _misnamed(raw: RawC3d) -> tuple[str, ...]:
     )
 
 
-def zero_window(raw: RawC3d) -> tuple[int, int] | None:
-    """Return FORCE_PLATFORM:ZERO as written (first, last), or None if it is missing or not two numbers."""
-    values = _numbers(raw.parameters.get("FORCE_PLATFORM", {}), "ZERO")
-    if values.size < 2 or not np.isfinite(values[:2]).all():
-        return None
-    return int(values[0]), int(values[1])
-
-
 def plate_parameters(
     raw: RawC3d, number: int, told: ToldPlate | None = None, *, metres: float = 1.0, turn: Array | None = None
 ) -> PlateParameters:
@@ -106,8 +191,11 @@ def plate_parameters(
         known = ", ".join(map(str, CHANNELS_OF_TYPE))
         what = f" ({_NAMES_OF_TYPE[kind]})" if kind in _NAMES_OF_TYPE else ""
         raise TrialRefused(f"TYPE {kind}{what} cannot be computed; legal are {known}. Export the plate as TYPE 2.")
-    rows = _numbers(group, "CHANNEL", keep=True).shape[:1]
-    listed = told.columns(raw.analog_labels) if told.channels else _of_plate(group, "CHANNEL", rows or (0,), number)
+    if told.channels:
+        listed = _told_columns(told.channels, raw.analog_labels)
+    else:
+        rows = _numbers(group, "CHANNEL", keep=True).shape[:1]  # 6, 8 or 12 channels a plate, as the file has it
+        listed = _of_plate(group, "CHANNEL", rows or (0,), number)
     channels = _channels(listed, kind, raw.analog.shape[1])
     if told.corners is None:
         corners = _of_plate(group, "CORNERS", (3, 4), number).T
@@ -118,18 +206,44 @@ def plate_parameters(
     else:
         origin = told.origin / metres
     calibration = _calibration(group, kind, number) if told.sensitivity is None else told.sensitivity
-    _refuse_shape(calibration, kind)
-    return PlateParameters(number, kind, channels, corners, origin, calibration, _polynomial(group, number), told)
-
-
-def _refuse_shape(calibration: Array | None, kind: int) -> None:
-    """Refuse a sensitivity that does not fit the TYPE of the plate."""
     need = (len(CONTENT[kind]), CHANNELS_OF_TYPE[kind])
-    if calibration is not None and calibration.shape != need:
+    if told.sensitivity is not None and told.sensitivity.shape != need:
         raise TrialRefused(
-            f"the sensitivity in session.toml has the shape {calibration.shape}, TYPE {kind} needs {need}. Give the "
-            f"type, too, or correct it."
+            f"the sensitivity in session.toml has the shape {told.sensitivity.shape}, TYPE {kind} needs {need}. Give "
+            f"the type, too, or correct it."
         )
+    factors, units_said = _unit_factors(kind, told, [raw.analog_units[c] for c in channels], metres)
+    window = _numbers(group, "ZERO")[:2]
+    zero = (int(window[0]), int(window[1])) if window.size == 2 and np.isfinite(window).all() else None
+    where = (corners, origin, factors, units_said, zero)
+    return PlateParameters(number, kind, channels, *where, calibration, _polynomial(group, number), told)
+
+
+def _told_columns(channels: Sequence[str | int], labels: tuple[str, ...]) -> Array:
+    """Return the channels that session.toml names as numbers (n,) from 1 among the ``labels`` of the file;
+    TrialRefused where the file has no such channel, or has it twice.
+    """
+    plain = [label.strip().casefold() for label in labels]
+    named = [label for label in labels if label]
+    found = []
+    for channel in channels:
+        if isinstance(channel, int) and channel <= len(labels):
+            found.append(channel)
+        elif isinstance(channel, str) and plain.count(channel.strip().casefold()) == 1:
+            found.append(plain.index(channel.strip().casefold()) + 1)
+        elif isinstance(channel, int) or not named:
+            legal = f"but the file holds {len(labels)} channels (legal: 1 to {len(labels)})."
+            raise TrialRefused(f"session.toml names channel {channel!r}, {legal}")
+        elif plain.count(channel.strip().casefold()) > 1:
+            raise TrialRefused(
+                f"session.toml names channel {channel!r}, which is there more than once: give its number."
+            )
+        else:
+            close = get_close_matches(channel, named, n=1)
+            hint = f" Did you mean {close[0]!r}?" if close else ""
+            legal = f"Legal: {', '.join(named[:24])}{' ...' * (len(named) > 24)}."
+            raise TrialRefused(f"session.toml names channel {channel!r}, which the file does not have.{hint} {legal}")
+    return np.array(found, dtype=float)
 
 
 def _channels(listed: Array, kind: int, available: int) -> tuple[int, ...]:
@@ -215,61 +329,71 @@ def _of_plate(group: Mapping[str, Any], name: str, shape: tuple[int, ...], numbe
     return block.reshape(shape, order="F")
 
 
-POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
-FORCE = {
-    **dict.fromkeys(("n", "newton", "newtons", "nt"), 1.0),
-    "kn": 1000.0,
-    **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), POUND),
-    **dict.fromkeys(("kgf", "kp"), KILOGRAM_FORCE),
-}
-_LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
-MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _LENGTH.items()} | {
-    length + force: f * s for force, f in FORCE.items() for length, s in _LENGTH.items() if force != "n"
-}
-"""N·m per unit, for unit texts without blanks and signs: ``nmm``, ``inlb``, ``lbfft`` ..."""
-CONTENT = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "FFFMMM", 5: "FFFMMM", 6: "F" * 12, 7: "F" * 8}
-"""What each channel (after the calibration matrix) holds: F force, M moment, L length."""
-TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
-_WORDS = {"F": "force", "M": "moment", "L": "length"}
-
-
 def plain_unit(text: str) -> str:
     """Return a unit text in lower case without blanks, dots, dashes and stars: ``N.mm`` and ``N-mm`` become ``nmm``."""
     return re.sub(r"[\s.\-*·⋅/_()]", "", text).lower()
 
 
-def unit_factors(
-    plate: PlateParameters, units: tuple[str, ...], *, metres: float
+def _unit_factors(
+    kind: int, told: ToldPlate, units: Sequence[str], metres: float
 ) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Return the factor to SI of each channel of a plate (after the calibration matrix) and what was decided about the
-    units.
+    """Return the SI unit per unit of each channel (after the calibration matrix), and what was decided about the units.
 
     ``units`` are the texts of the plate's channels, ``metres`` is the length unit of the file in m. The output of a
     calibration matrix is in N and N times the file's length unit, as C3D demands. A unit that is missing or makes no
     sense for the channel is taken as N, N times the file's length unit, or the file's length unit, and said.
     """
-    content = CONTENT[plate.type]
+    content = CONTENT[kind]
+    listed = ", ".join(dict.fromkeys(unit or "(none)" for unit in units))
     assumed = {"F": 1.0, "M": metres, "L": metres}
-    if plate.told.sensitivity is not None:
-        given = f"Units: channels in {_listed(units)} times the sensitivity in session.toml give N and N·m."
+    if told.sensitivity is not None:
+        given = f"Units: channels in {listed} times the sensitivity in session.toml give N and N·m."
         return (1.0,) * len(content), (given,)
-    if plate.type in _MATRIX_OF_TYPE:
-        return tuple(assumed[c] for c in content), (
-            f"Units: channels in {_listed(units)} times CAL_MATRIX give N and N x {metres:g} m.",
-        )
+    if kind in _MATRIX_OF_TYPE:
+        said = f"Units: channels in {listed} times CAL_MATRIX give N and N x {metres:g} m."
+        return tuple(assumed[what] for what in content), (said,)
     factors, strange = [], {}
-    for kind, unit in zip(content, units, strict=True):
-        known = TABLES[kind].get(plain_unit(unit))
-        factors.append(assumed[kind] if known is None else known)
+    for what, unit in zip(content, units, strict=True):
+        known = TABLES[what].get(plain_unit(unit))
+        factors.append(assumed[what] if known is None else known)
         if known is None:
-            strange[kind] = unit
-    said = [f"Units: {_listed(units)}."]
-    for kind, unit in strange.items():
-        taken = {"F": "N", "M": f"N x {metres:g} m", "L": f"{metres:g} m"}[kind]
-        said.append(f"Unit {unit!r} of a {_WORDS[kind]} channel says nothing; it was taken as {taken}.")
-    return tuple(factors), tuple(said)
+            strange[what] = unit
+    taken = {"F": "N", "M": f"N x {metres:g} m", "L": f"{metres:g} m"}
+    doubts = (
+        f"Unit {unit!r} of a {_WORDS[what]} channel says nothing; it was taken as {taken[what]}."
+        for what, unit in strange.items()
+    )
+    return tuple(factors), (f"Units: {listed}.", *doubts)
 
 
-def _listed(units: tuple[str, ...]) -> str:
-    """Return the different unit texts in order, for a sentence."""
-    return ", ".join(dict.fromkeys(unit or "(none)" for unit in units))
+def channel_groups(labels: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+    """Return the columns (from 0) of every set of channels that are those of one plate: three forces and three moments,
+    or the eight forces of a plate with four sensors, with the same text around them (``AMTI_1.FX``, ``Fx1``,
+    ``Force.Fx1`` and ``Moment.Mx1``).
+    """
+    found: list[tuple[int, ...]] = []
+    for parts, pattern in ((_EIGHT, r"(f[xy](?:12|34|14|23)|fz[1-4])"), (_SIX, r"([fm][xyz])")):
+        plates: dict[str, dict[str, int]] = {}
+        for column, label in enumerate(labels):
+            match = re.fullmatch(rf"(.*?){pattern}(\D?\d*)", _AROUND_NAMES.sub("", label).lower())
+            if match and not any(column in group for group in found):
+                plates.setdefault(match[1] + "|" + match[3], {}).setdefault(match[2], column)
+        found += [tuple(columns[part] for part in parts) for columns in plates.values() if set(parts) <= set(columns)]
+    return tuple(sorted(found))
+
+
+def undescribed_plates(raw: RawC3d) -> tuple[str, ...]:
+    """Say that channels of a file without described plates look like some; () if none do."""
+    groups = channel_groups(raw.analog_labels)
+    if not groups:
+        return ()
+    columns = [column for group in groups for column in group]
+    units = ", ".join(dict.fromkeys(raw.analog_units[column] or "no unit" for column in columns))
+    count = _NUMBERS[len(groups)] if len(groups) < len(_NUMBERS) else str(len(groups))
+    names = f"{raw.analog_labels[columns[0]]} ... {raw.analog_labels[columns[-1]]}, in {units}"
+    said = (
+        f"{len(columns)} channels ({names}) look like {count} force plate{'s' * (len(groups) > 1)}, which the file "
+        f"does not describe: no plate was read. Give geometry, channels and sensitivity in session.toml: corners_m, "
+        f"channels and sensitivity in [plates.plate1] (docs/session_folder.md; `biodance init` begins it)."
+    )
+    return (said,)

@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from types import MappingProxyType
 
 import numpy as np
 
-from biodance.errors import TrialRefused
 from biodance.lab.plates.corners import plate_axes
 from biodance.records import Array, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_origin, wrench_about_point
@@ -51,39 +49,8 @@ class ToldPlate:
         """What is taken from session.toml, for the history; "" for nothing."""
         return f"{', '.join(self.keys)} as session.toml says." if self.keys else ""
 
-    def columns(self, labels: tuple[str, ...]) -> Array:
-        """Return the channels as numbers (n,) from 1 among the ``labels`` of a file.
-
-        Raises
-        ------
-        TrialRefused
-            The file has no channel of that name or number.
-        """
-        plain = [label.strip().casefold() for label in labels]
-        found = []
-        for channel in self.channels or ():
-            if isinstance(channel, int) and channel <= len(labels):
-                found.append(channel)
-            elif isinstance(channel, str) and plain.count(channel.strip().casefold()) == 1:
-                found.append(plain.index(channel.strip().casefold()) + 1)
-            else:
-                raise TrialRefused(f"session.toml names channel {channel!r}, {_legal(channel, labels)}")
-        return np.array(found, dtype=float)
-
 
 NOTHING_TOLD = ToldPlate()
-
-
-def _legal(channel: str | int, labels: tuple[str, ...]) -> str:
-    """Say why a file has no such channel, or has it twice, and which are legal."""
-    named = [label for label in labels if label]
-    if isinstance(channel, int) or not named:
-        return f"but the file holds {len(labels)} channels (legal: 1 to {len(labels)})."
-    if sum(label.strip().casefold() == channel.strip().casefold() for label in labels) > 1:
-        return "which is there more than once: give its number."
-    close = get_close_matches(channel, named, n=1)
-    hint = f" Did you mean {close[0]!r}?" if close else ""
-    return f"which the file does not have.{hint} Legal: {', '.join(named[:24])}{' ...' * (len(named) > 24)}."
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict
 
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE, corners_in_lab
+from biodance.lab.plates.decode import DEEPEST
 from biodance.lab.plates.parameters import CHANNELS_OF_TYPE, CONTENT
 from biodance.lab.plates.told import ToldPlate
-from biodance.lab.plates.wrench import DEEPEST
 from biodance.records import Array
 
 _ORDER = "in the order +x+y, -x+y, -x-y, +x-y of the plate's own axes"

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.read import file_frame
-from biodance.lab.plates.parameters import plate_parameters, unit_factors
-from biodance.lab.plates.undescribed import channel_groups
+from biodance.lab.plates.parameters import channel_groups, plate_parameters
 from biodance.records import Plate, Session, Trial
 
 _ORDER = "# m, lab frame, z up; +x+y, -x+y, -x-y, +x-y of the plate's own axes"
@@ -63,13 +62,12 @@ def _channels(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float,
         return [], ()
     raw = read_raw(trial.source.path)
     try:
-        found = plate_parameters(raw, int(plate.name.removeprefix("plate")))
+        found = plate_parameters(raw, int(plate.name.removeprefix("plate")), metres=file_frame(raw)[0])
     except TrialRefused:
         return [], ()
     labels = [raw.analog_labels[column] for column in found.channels]
     told = all(label and raw.analog_labels.count(label) == 1 for label in labels)
-    units = tuple(raw.analog_units[column] for column in found.channels)
-    factors = () if found.calibration is not None else unit_factors(found, units, metres=file_frame(raw)[0])[0]
+    factors = () if found.calibration is not None else found.factors
     return [*labels] if told else [column + 1 for column in found.channels], factors
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.markers.dress import dress
+from biodance.lab.markers.guess import dress
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.still import is_still, movement
 from biodance.lab.plates.one_place import one_place

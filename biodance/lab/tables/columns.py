@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from biodance.lab.plates.undescribed import channel_groups
+from biodance.lab.plates.parameters import channel_groups
 
 _TIME = re.compile(
     r"(?:time|t|time[\s_]?stamps?|stamps?|elapsed(?:[\s_]?time)?|seconds?|secs?)"

@@ -15,9 +15,9 @@ import numpy as np
 
 from biodance.lab.markers.sets import MarkerSet, landmark
 from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.decode import find_baseline
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
 from biodance.lab.plates.told import NOTHING_TOLD, Told, ToldPlate
-from biodance.lab.plates.zero import find_baseline
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Wrench
 from biodance.settings import COP_FORCE, STANDARD_GRAVITY
 from biodance.spatial import wrench_about_origin

@@ -122,7 +122,7 @@ def _markers(cells: Cells, columns: TableColumns, stamps: Array, path: Path) -> 
             f"{path}: the markers of one row span {extent * _METRES[unit]:.2g} m in {unit}. Correct the unit."
         )
     markers = Markers(names, np.arange(len(stamps), dtype=float), raw * _METRES[unit])
-    up = axis_to_head(markers)
+    up = axis_to_head(markers, recognise(names))
     if up is None:
         up = np.eye(3)[2 if body_is_tall_along_z(markers.xyz) else 1]
     turn = turn_to(up)

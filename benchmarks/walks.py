@@ -1,0 +1,194 @@
+"""Faults written into copies of real walking sessions at the level of bytes, and what is named.
+
+    BIODANCE_DATA=folder python -m benchmarks walks [--whole] [--only SESSION ...]
+
+The folder holds the public sessions named below. One fault at a time is in every file of a copy, as in a laboratory.
+What witnesses name needs no inverse kinematics: a session takes two seconds; ``--whole`` runs the whole diagnosis.
+"""
+
+import argparse
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from inject import inject
+
+from biodance.diagnosis.diagnosis import Finding
+from biodance.diagnosis.witness_evidence import WitnessEvidence, collect_evidence
+from biodance.diagnosis.witness_inference import infer_causes
+from biodance.effects import check_quality
+from biodance.errors import BiodanceError
+from biodance.lab.c3d.raw import read_raw
+from biodance.lab.plates.parameters import count_plates
+from biodance.lab.session.read import read_session
+from biodance.pipeline.diagnosis import diagnose_session
+from biodance.pipeline.session import examine
+from biodance.records import Session
+from biodance.virtual_lab.faults.causes import fault_of, parse_cause
+from biodance.witnesses import SeenTrial, observe, recording
+
+CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
+SESSIONS = (*CHILDREN, "adl_gait", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "pycgm",
+            "c3d_parser_Sydney", "c3d_parser_QCMAS")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is written: ``text`` for the virtual lab, ``truths`` the causes that name it, its ``size`` (0: none)."""
+
+    kind: str
+    text: str
+    truths: tuple[tuple[str, str], ...]
+    size: float = 0.0
+
+
+@dataclass(frozen=True)
+class Score:
+    """One session with one fault: whether it was named first, named or in a set, covered (None: no interval), and all
+    that was named; ``verdict`` of the whole diagnosis.
+    """
+
+    session: str
+    fault: Fault
+    first: bool
+    listed: bool
+    covered: bool | None
+    told: str
+    verdict: str = ""
+
+
+def faults_for(session: Session) -> Iterator[Fault]:
+    """Return the faults to write into a session: on the plate with most steps, across the way."""
+    mass = session.subject.mass
+    seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates]
+    steps = [(one, step) for one in seen for step in one.steps]
+    if not steps:
+        return
+    names = [step.plate for _, step in steps]
+    plate = max(sorted(set(names)), key=names.count)
+    ahead = np.mean([np.abs(one.foot(s.side).axes(s.middle)[0]) for one, s in steps if s.plate == plate], axis=0)
+    axis = "x" if ahead[1] > ahead[0] else "y"
+    prefix = "" if all(len(one.trial.plates) == 1 for one in seen) else f"{plate}:"
+    rest = _empty(seen, plate, "Fx")
+    fz = max(float(one.plate(s.plate).wrench.force[:, 2].max()) for one, s in steps if s.plate == plate)
+    at = f"target={plate}"
+    yield Fault(
+        "20 mm across", f"plate_position:{at}:{axis},shift=0.02", (("plate_position", f"{plate}:{axis}"),), 0.02
+    )
+    yield Fault("30 ms late", "time_delay:delay=0.03", (("time_delay", ""),), 0.03)
+    gain = (("plate_gain", f"{prefix}Fz"), ("body_mass", ""))
+    yield Fault("Fz 5 %", f"plate_gain:{at}:Fz,gain=0.05", gain, 0.05)
+    yield Fault("Fx 15 N", f"plate_offset:{at}:Fx,offset=15", (("plate_offset", f"{prefix}Fx"),), 15.0 + rest)
+    yield Fault("yaw 5 degrees", f"plate_rotation:{at}:z,angle=0.0873", (("plate_rotation", f"{plate}:z"),), 0.0873)
+    yield Fault("sign of Fz", f"axis_error:{at}:Fz", (("axis_error", f"{prefix}Fz"),))
+    yield Fault("clipping", f"clipping:{at}:Fz,limit={0.8 * fz:.1f}", (("clipping", f"{prefix}Fz"),))
+
+
+def _empty(seen: list[SeenTrial], plate: str, channel: str) -> float:
+    """Return what a plate reads empty in the recordings as they are, N, mean of the trials: 0 where none shows it."""
+    kept = [
+        o.value for one in seen for o in observe(one, ("empty_plate",)) if o.what == f"{plate} {channel}, taken off"
+    ]
+    return float(np.mean(kept)) if kept else 0.0
+
+
+def copied(files: list[Path], folder: Path, text: str) -> Path:
+    """Write a copy of a session with the fault that ``text`` says in every file with plates; "" for none."""
+    folder.mkdir(parents=True)
+    for number, path in enumerate(files):
+        clock = {path.stem: (number / len(files), (number + 1) / len(files))}
+        if text and count_plates(read_raw(path))[0]:
+            inject(path, folder / path.name, fault_of(parse_cause(text), clock))
+        else:
+            shutil.copy(path, folder / path.name)
+    return folder
+
+
+def named(session: Session, evidence: WitnessEvidence) -> tuple[Finding, ...]:
+    """Return what checks and witnesses name in a session."""
+    checks = [
+        quality for quality in check_quality(session) if not quality.ok and quality.effect in ("clipping", "axis_error")
+    ]
+    failed = tuple(Finding(quality.effect, quality.target, (), (), 1.0) for quality in checks)
+    said = infer_causes(evidence).findings
+    return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
+
+
+def judged(name: str, fault: Fault, found: tuple[Finding, ...]) -> Score:
+    """Return the score of one session; a named truth covers if its 95 % interval holds the size that was written."""
+    own = [one for one in found if (one.effect, one.target) in fault.truths[:1] and one.parameters]
+    low_high = own[0].parameters[0].interval if own and fault.size else None
+    sets = [{(one.effect, one.target), *((a.effect, a.target) for a in one.set)} for one in found]
+    return Score(
+        name,
+        fault,
+        bool(found) and (found[0].effect, found[0].target) in fault.truths,
+        any(truth in some for truth in fault.truths for some in sets),
+        None if low_high is None else low_high[0] <= fault.size <= low_high[1],
+        "; ".join(f"{one.effect} {one.target} {_sizes(one)}" for one in found),
+    )
+
+
+def _sizes(one: Finding) -> str:
+    return ", ".join(f"{p.value:.3g} ± {p.sd:.2g} {p.unit}" for p in one.parameters)
+
+
+def files_of(data: Path, name: str) -> list[Path]:
+    """Return the files of a session: of a folder, or the one file of that name."""
+    place = data / name
+    return sorted(place.glob("*.c3d")) if place.is_dir() else [place.with_suffix(".c3d")]
+
+
+def scored(data: Path, name: str, place: Path, *, whole: bool) -> Iterator[Score]:
+    """Return the scores of one session, clean first, then each fault."""
+    files = files_of(data, name)
+    clean = read_session(copied(files, place / name / "clean", ""))
+    for number, fault in enumerate([Fault("nothing", "", ()), *faults_for(clean)]):
+        try:
+            session = read_session(copied(files, place / name / str(number), fault.text)) if fault.text else clean
+            if whole:
+                found = diagnose_session(examine(session)).diagnosis
+                yield replace(judged(name, fault, found.findings), verdict=f"{found.verdict}: ")
+            else:
+                yield judged(name, fault, named(session, collect_evidence(session)))
+        except BiodanceError as error:
+            yield Score(name, fault, False, False, None, f"refused: {error}")
+
+
+def table(scores: list[Score]) -> list[str]:
+    """Return the summary as a table: one line a fault."""
+    lines = ["| written | sessions | named first | first or in the set | interval covers |", "|---|---|---|---|---|"]
+    every = [one for one in scores if one.fault.text]
+    for kind in (*dict.fromkeys(one.fault.kind for one in every), "all"):
+        some = [one for one in every if kind in (one.fault.kind, "all")]
+        sized = [one.covered for one in some if one.covered is not None]
+        covers = f"{sum(sized)} of {len(sized)}" if sized else "-"
+        first, listed = sum(one.first for one in some), sum(one.listed for one in some)
+        lines.append(f"| {kind} | {len(some)} | {first} | {listed} | {covers} |")
+    clean = [one for one in scores if not one.fault.text]
+    lines.append(f"| nothing | {len(clean)} | names in {sum(bool(one.told) for one in clean)} | | |")
+    return lines
+
+
+def _mark(one: Score) -> str:
+    return "" if not one.fault.text else "first" if one.first else "in the set" if one.listed else "MISSED"
+
+
+def main() -> None:
+    """Print what was named in each session, and the counts."""
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("--whole", action="store_true")
+    ask.add_argument("--only", nargs="*", default=SESSIONS)
+    asked = ask.parse_args()
+    scores = []
+    with tempfile.TemporaryDirectory() as place:
+        for name in asked.only:
+            for one in scored(Path(os.environ["BIODANCE_DATA"]), name, Path(place), whole=asked.whole):
+                scores.append(one)
+                mark = f"{_mark(one)} | {one.covered} | {one.verdict}{one.told}"
+                print(f"{name} | {one.fault.kind} | {mark}", flush=True)
+    print("\n".join(["", *table(scores)]))

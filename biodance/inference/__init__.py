@@ -1,0 +1,1 @@
+"""One posterior over everything that a session may show: body, tolerances, scales, causes, and what nobody knows."""

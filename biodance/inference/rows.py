@@ -1,0 +1,201 @@
+"""All evidence of a session as the rows of one linear model, and all columns that are no fault.
+
+    y = X u + Z b + e,      u ~ N(0, diag(lambda_g^2)),   e ~ N(0, s_q^2) in plates and markers, Student in observations
+
+Rows come from the plates by trial, band and channel, from the markers' mean residuals, from the sizes that markers
+show, and from observations that need no model of the body (feet, clocks, weights). They are whitened with the nominal
+tolerances; the scales ``lambda`` and ``s`` say how far this session is from the sessions they were learned on.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biodance.diagnosis.candidates import Candidate, removed, slopes
+from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
+from biodance.diagnosis.problem import Problem
+from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.effects import Effect
+from biodance.records import Array
+from biodance.uncertainty.bands import BANDS
+from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
+
+BODY, OBSERVED = "body", "observed"
+"""Groups of columns: the parameters of the body, and errors that several observations share."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The evidence of a session.
+
+    Parameters
+    ----------
+    problem : Problem or None
+        Where the simulated rows come from; None where only observations judge.
+    tolerances : Tolerances
+        Nominal sizes under which the rows are whitened.
+    evidence : WitnessEvidence or None
+        Observations that count; None without any.
+    X : (r, K) array
+        Whitened columns of all that is no fault, per nominal standard deviation.
+    y : (r,) array
+        Whitened target.
+    group : (K,) array of int
+        Index in ``groups`` of each column: columns of one group share a scale.
+    block : (r,) array of int
+        Noise group of each row: band times 6 + channel for the plates, then markers; -1 for observations.
+    groups : tuple of str
+        Names of the groups of columns.
+    tolerated : mapping
+        By effect and target where the columns of its tolerance lie, and (p, k) what one unit of each is in its
+        parameters.
+    """
+
+    problem: Problem | None
+    tolerances: Tolerances
+    evidence: WitnessEvidence | None
+    X: Array
+    y: Array
+    group: NDArray[np.intp]
+    block: NDArray[np.intp]
+    groups: tuple[str, ...]
+    tolerated: Mapping[tuple[str, str], tuple[slice, Array]] = field(default_factory=dict)
+
+    @property
+    def plates(self) -> int:
+        """Number of rows that come from the plates, the first ones."""
+        return 0 if self.problem is None else self.problem.wrench_rows
+
+    @property
+    def simulated(self) -> int:
+        """Number of rows that come from plates and markers; observations follow them."""
+        return 0 if self.problem is None else len(self.problem.target)
+
+    def white(self, rows: Array) -> Array:
+        """Return ``rows`` (r', n) of plates and markers in units of their nominal standard deviation."""
+        if self.problem is None:
+            return rows
+        band = self.problem.spectrum.band
+        return whitened(rows, band, marker_keys(self.problem), _mass(self.problem), self.tolerances)
+
+    def possible(self, effect: Effect, theta: Array) -> bool:
+        """Return whether a cause of size ``theta`` (p,) can be in this session."""
+        return effect.possible(theta) if self.problem is None else effect.possible_in(self.problem.cases[0], theta)
+
+    def added(self, effect: Effect, theta: Array) -> Array:
+        """Return (r,): what a cause of size ``theta`` (p,) adds to the whitened rows."""
+        simulated = np.zeros(0)
+        if self.problem is not None:
+            simulated = self.white(removed(self.problem, effect, theta)[:, None])[:, 0]
+        return np.concatenate([simulated, self.observed(effect) @ theta])
+
+    def slopes(self, effect: Effect, theta: Array) -> Array:
+        """Return (r, p): derivative of `added` at ``theta`` (p,)."""
+        simulated = np.zeros((0, theta.size))
+        if self.problem is not None:
+            simulated = self.white(slopes(self.problem, effect, theta, of=effect.removed))
+        return np.concatenate([simulated, self.observed(effect)])
+
+    def observed(self, effect: Effect) -> Array:
+        """Return (n, p): what one unit of each parameter adds to the observations, in units of their own standard
+        deviation.
+        """
+        one, names = self.evidence, [parameter.name for parameter in effect.parameters]
+        if one is None:
+            return np.zeros((0, len(names)))
+        out, key = np.zeros((len(one.observations), len(names))), (effect.name, effect.target)
+        if key in one.traces and one.causes[key].parameter in names:
+            own = np.array([o.sd for o in one.observations])
+            out[:, names.index(one.causes[key].parameter)] = one.in_reach * one.traces[key] / own
+        return out
+
+
+def observed_causes(evidence: WitnessEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
+    """Return the causes that only observations judge, with no simulated rows."""
+    kinds = {name: one for name, one in family.items() if isinstance(one, Effect)}
+    return tuple(
+        Candidate(replace(kinds[name], target=target), np.zeros((0, kinds[name].typical.size), np.float32), (False,) * kinds[name].typical.size)
+        for name, target in evidence.counting.causes
+        if name in kinds
+    )
+
+
+def rows_of(
+    problem: Problem | None, causes: Sequence[Candidate], tolerances: Tolerances, evidence: WitnessEvidence | None
+) -> Rows:
+    """Return the evidence of a session; those of ``causes`` with a learned size are tolerances, too."""
+    seen = None if evidence is None or not evidence.counting.observations else evidence.counting
+    tolerated = tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
+    if problem is None:
+        X, y = np.zeros((0, len(tolerated))), np.zeros(0)
+        names = [one.names[0] for one in tolerated]
+        units = {
+            one.names: (slice(k, k + 1), tolerances.size(key_of(*one.names)) * one.units[:, :1])
+            for k, one in enumerate(tolerated)
+        }
+    else:
+        X, y, names, units = _simulated(problem, tolerated, tolerances)
+    if seen is not None:
+        X, y, names = _with_observations(X, y, names, units, seen)
+    groups = tuple(dict.fromkeys(names))
+    return Rows(problem, tolerances, seen, X, y, np.array([groups.index(name) for name in names], dtype=int), _blocks(problem, len(y)), groups, units)
+
+
+_Units = Mapping[tuple[str, str], tuple[slice, Array]]
+
+
+def _simulated(
+    problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances
+) -> tuple[Array, Array, list[str], _Units]:
+    """Return columns, target and groups of the simulated rows, and `Rows.tolerated`."""
+    known, keys = nuisances(problem, tolerated), marker_keys(problem)
+    columns = np.concatenate(known.parts, axis=1, dtype=float) * known.scale
+    expected = shown_left_out(columns @ np.array([tolerances.mean(key) for key in known.means]), keys)
+    sizes = np.array([tolerances.size(key) for key in known.keys])
+    columns *= sizes
+    both = np.concatenate([problem.sip, columns, (problem.target - expected)[:, None]], axis=1)
+    both = whitened(both, problem.spectrum.band, keys, _mass(problem), tolerances, out=both)
+    first = problem.sip.shape[1]
+    units = {
+        name: (slice(first + at.start, first + at.stop), unit * sizes[at]) for name, (at, unit) in known.causes.items()
+    }
+    return both[:, :-1], both[:, -1], [BODY] * first + [_group(key) for key in known.keys], units
+
+
+def _with_observations(
+    X: Array, y: Array, names: list[str], units: _Units, seen: WitnessEvidence
+) -> tuple[Array, Array, list[str]]:
+    """Return columns, target and groups with the observations below: a plate that lies elsewhere within its tolerance
+    shows in both. A pressure out of reach of its foot is of another foot, and tells no size.
+    """
+    own = np.array([one.sd for one in seen.observations])
+    below = np.zeros((len(own), X.shape[1]))
+    for name, (at, unit) in units.items():
+        if name in seen.traces:
+            below[:, at] = np.outer(seen.traces[name] / own, unit[0])
+    shared = seen.shared / own[:, None]
+    top = np.concatenate([X, np.zeros((len(X), shared.shape[1]))], axis=1)
+    bottom = np.concatenate([below, shared], axis=1) * seen.in_reach[:, None]
+    value = seen.in_reach * np.array([one.value - one.expected for one in seen.observations]) / own
+    return np.concatenate([top, bottom]), np.concatenate([y, value]), [*names, *[OBSERVED] * shared.shape[1]]
+
+
+def _group(key: str) -> str:
+    """Return the group of a key: what is alike in kind is as large, or as small, together."""
+    words = key.removeprefix("habit ").split()
+    return words[0]
+
+
+def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:
+    """Return the noise group of every row."""
+    if problem is None:
+        return np.full(count, -1)
+    plates = (6 * problem.spectrum.band[:, None] + np.arange(6)).ravel()
+    markers = np.full(len(problem.target) - plates.size, 6 * len(BANDS))
+    return np.concatenate([plates, markers, np.full(count - len(problem.target), -1)])
+
+
+def _mass(problem: Problem) -> float:
+    return float(problem.cases[0].body.sip.mass.sum())

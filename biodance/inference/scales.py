@@ -1,0 +1,207 @@
+"""The posterior of all coefficients under the most probable scales of a session.
+
+With rows y = X u + e, u ~ N(0, diag lambda_g^2), e ~ N(0, s^2) in the plates' rows, unit normal in the markers' and
+Student in the observations, the logarithms a of all scales have normal priors, and their posterior mode is found by
+Fisher scoring. With A = 1 + L X' S^-2 X L (L the scales of the columns), C = A^-1 and e what the posterior mean leaves:
+
+    d log p(y) / d log lambda_g = |u_g|^2 + tr C_gg - n_g         information 2 |1 - C_gg|^2
+    d log p(y) / d log s        = |e|^2 / s^2 + t - n             information 2 (n - t)^2 / n,  t = tr X L C L X' / s^2
+
+Observations have Student's errors with four degrees of freedom (about one step in twenty is an outlier): their weights
+are iterated (iteratively reweighted least squares). The log evidence is Laplace's approximation over all coefficients.
+
+One scale holds for the noise of all bands and channels: where one of them is louder than the others, the simulation is
+that far off, and nothing is believed that is smaller.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+
+from biodance.inference.rows import BODY, Rows
+from biodance.records import Array
+
+TAIL = 4.0
+"""Degrees of freedom of an observation's own error."""
+LOUD = 0.5
+"""Standard deviation of the logarithm of the noise, between laboratories and persons."""
+SPREAD, TOLERANCE = 0.6, 0.35
+"""Standard deviation of the logarithm of the size of a group of what is no fault: of body and soft tissue; of what may
+be a cause, whose heavy tail is the cause itself.
+"""
+SOFT = ("slide", "flesh", "sag", "tilt", "wobbling_mass")
+"""Groups of soft tissue."""
+FLOOR = -0.3
+"""Logarithm below which no group is believed to be smaller than where its size was learned."""
+_STEPS, _DONE, _FAR = 12, 0.02, 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """Logarithms of the scales of the ``groups`` (G,) of columns and of the ``noise``; ``weights`` (n,) of the
+    observations.
+    """
+
+    groups: Array
+    noise: float
+    weights: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Inner products of columns and target, all that the posterior needs: ``plates`` and ``markers`` (K + 1, K + 1) with
+    the target last, ``observed`` (n, K + 1) the observations' rows, of which only the columns ``used`` are not zero;
+    ``count`` plates' rows; ``group`` (K,) of each column, -1 for a fixed scale.
+    """
+
+    plates: Array
+    markers: Array
+    observed: Array
+    used: NDArray[np.intp]
+    count: int
+    group: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Curvature:
+    """What the data tell of the scales: ``shares`` (G,) trace of the posterior covariance of each group and ``known``
+    (G,) the information on its scale; ``taken`` how many of the plates' rows the columns take.
+    """
+
+    shares: Array
+    known: Array
+    taken: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Posterior of the coefficients: ``lower`` Cholesky factor of A; ``u`` (K,) posterior mean per scaled column;
+    ``size`` (K,) of the columns; ``scales``; ``log_evidence`` up to a constant of the session; ``square`` of the
+    plates' rows that is left.
+    """
+
+    lower: Array
+    u: Array
+    size: Array
+    scales: Scales
+    log_evidence: float
+    square: float
+    products: Products
+
+    def last(self, count: int) -> tuple[Array, Array]:
+        """Return mean (count,) and covariance (count, count) of the last coefficients."""
+        unit = np.eye(len(self.u))[:, len(self.u) - count :]
+        half = solve_triangular(self.lower, unit, lower=True, check_finite=False)
+        return self.u[len(self.u) - count :], half.T @ half
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(K,) posterior mean per unit of the unscaled columns."""
+        return np.asarray(self.size * self.u)
+
+    def curvature(self, count: int) -> Curvature:
+        """Return what the data tell of the scales of ``count`` groups."""
+        C = cho_solve((self.lower, True), np.eye(len(self.u)), check_finite=False)
+        group = self.products.group
+        known = np.zeros(count)
+        for g in range(count):
+            here = np.flatnonzero(group == g)
+            known[g] = 2 * np.sum((np.eye(here.size) - C[np.ix_(here, here)]) ** 2)
+        plates = self.products.plates[:-1, :-1] * np.exp(-2 * self.scales.noise)
+        taken = float(np.sum(C * (self.size[:, None] * plates * self.size)))
+        return Curvature(np.bincount(group, weights=np.diag(C), minlength=count), known, taken)
+
+
+def nominal(rows: Rows) -> Scales:
+    """Return the scales of a session that is like those that everything was learned on."""
+    return Scales(np.zeros(len(rows.groups)), 0.0, np.ones(len(rows.y) - rows.simulated))
+
+
+def products(rows: Rows, X: Array, y: Array, group: NDArray[np.intp]) -> Products:
+    """Return the inner products of columns ``X`` (r, K) and target ``y`` (r,)."""
+    both = np.concatenate([X, y[:, None]], axis=1)
+    n, r = rows.plates, rows.simulated
+    observed = both[r:]
+    used = np.flatnonzero(observed.any(axis=0))
+    return Products(both[:n].T @ both[:n], both[n:r].T @ both[n:r], observed, used, n, group)
+
+
+def widened(found: Products, rows: Rows, X: Array, Z: Array, y: Array) -> Products:
+    """Return ``found``, the products of columns ``X`` (r, K), with further columns ``Z`` (r, p) of fixed scale between
+    them and the target ``y`` (r,).
+    """
+    n, r, K = rows.plates, rows.simulated, X.shape[1]
+    tail = np.concatenate([Z, y[:, None]], axis=1)
+
+    def put(inner: Array, part: slice) -> Array:
+        out = np.empty((K + tail.shape[1], K + tail.shape[1]))
+        cross = X[part].T @ tail[part]
+        out[:K, :K], out[:K, K:], out[K:, :K] = inner[:K, :K], cross, cross.T
+        out[K:, K:] = tail[part].T @ tail[part]
+        return out
+
+    observed = np.concatenate([X[r:], tail[r:]], axis=1)
+    used = np.flatnonzero(observed.any(axis=0))
+    group = np.concatenate([found.group, np.full(Z.shape[1], -1)])
+    return Products(put(found.plates, slice(n)), put(found.markers, slice(n, r)), observed, used, n, group)
+
+
+def prior_sd(rows: Rows) -> Array:
+    """Return (G,) the standard deviations of the logarithms of the groups' scales."""
+    return np.array([SPREAD if name == BODY or name in SOFT else TOLERANCE for name in rows.groups])
+
+
+def fit(found: Products, sd: Array, start: Scales, *, known: Curvature | None = None, steps: int = _STEPS, least: float = -np.inf) -> Fit:
+    """Return the posterior at the most probable scales, whose logarithms have prior standard deviations ``sd`` (G,),
+    searched for from ``start``; their curvature is computed in every step if it is not ``known``.
+    """
+    at = replace(start, noise=max(start.noise, least))
+    for step in range(steps + 1):
+        one = posterior(found, sd, at)
+        if step == steps:
+            break
+        moved, at = _moved(one, sd, known or one.curvature(sd.size))
+        at = replace(at, noise=max(at.noise, least, 0.0))
+        if moved < _DONE:
+            break
+    return one
+
+
+def posterior(found: Products, sd: Array, at: Scales) -> Fit:
+    """Return the posterior under given scales, with its evidence."""
+    K = found.group.size
+    size = np.where(found.group < 0, 1.0, np.exp(at.groups[found.group]))
+    loud = np.exp(-2 * at.noise)
+    whole = found.plates * loud + found.markers
+    seen = found.observed[:, found.used]
+    whole[np.ix_(found.used, found.used)] += (seen * at.weights[:, None]).T @ seen
+    A = size[:, None] * whole[:K, :K] * size
+    A[np.diag_indices(K)] += 1.0
+    lower = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
+    u = cho_solve((lower, True), size * whole[:K, K], check_finite=False)
+    w = np.append(-size * u, 1.0)
+    square, markers = float(w @ found.plates @ w), float(w @ found.markers @ w)
+    tails = -0.5 * (TAIL + 1) * float(np.log1p((found.observed @ w) ** 2 / TAIL).sum())
+    value = tails - 0.5 * (square * loud + markers + u @ u) - np.log(np.diag(lower)).sum() - found.count * at.noise
+    value -= 0.5 * (np.sum((at.groups / sd) ** 2) + (at.noise / LOUD) ** 2)
+    return Fit(lower, u, size, at, float(value), square, found)
+
+
+def _moved(one: Fit, sd: Array, known: Curvature) -> tuple[float, Scales]:
+    """Return how far the scales move in one step of Fisher scoring, and where to."""
+    at, found, free = one.scales, one.products, one.products.group >= 0
+    own = np.bincount(found.group[free], minlength=sd.size)
+    square = np.bincount(found.group[free], weights=one.u[free] ** 2, minlength=sd.size) + known.shares
+    groups = (square - own - at.groups / sd**2) / (known.known + 1 / sd**2)
+    free_rows = max(found.count - known.taken, 0.0)
+    slope = one.square * np.exp(-2 * at.noise) + known.taken - found.count - at.noise / LOUD**2
+    noise = slope / (2 * free_rows**2 / max(found.count, 1) + 1 / LOUD**2)
+    groups, noise = np.clip(groups, -_FAR, _FAR), float(np.clip(noise, -_FAR, _FAR))
+    w = np.append(-one.coefficients, 1.0)
+    weights = (TAIL + 1) / (TAIL + (found.observed @ w) ** 2)
+    change = max(np.abs(groups).max(initial=0.0), abs(noise), np.abs(weights - at.weights).max(initial=0.0))
+    moved = replace(at, groups=np.maximum(at.groups + groups, FLOOR), noise=at.noise + noise, weights=weights)
+    return float(change), moved

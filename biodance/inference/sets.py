@@ -1,0 +1,313 @@
+"""The posterior over sets of causes: spike and slab, up to three causes, each set fitted with all its curvature.
+
+    log P(S | y) = log p(y | S) + sum over c in S of log odds of c (`Effect.prior` shared by its targets) + const
+
+A cause has size 0 or N(0, (3 typical sizes)^2); of every hypothesis that holds a cause, the covariance holds what this
+cause's model leaves of it (the share `unlike` of what it adds, per band). The unknown is excess noise in one band and
+channel: one more member of every set.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+
+from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
+from biodance.diagnosis.model import NamedCause, unlike
+from biodance.effects import Effect
+from biodance.inference.rows import Rows
+from biodance.inference.scales import Curvature, Fit, Products, Scales, fit, nominal, prior_sd, products, widened
+from biodance.records import Array
+from biodance.uncertainty.bands import BANDS
+
+P_UNKNOWN = 0.1
+"""Probability of an unknown cause in a session, before any data; those of causes stand in their effects
+(`Effect.prior`).
+"""
+MOST, _REFINED, _BRANCHES = 3, 6, 2
+OWN, EXCESS = 0.4, 1.4
+"""Standard deviation of the logarithm of the noise of one band and channel beside that of the session: without fault,
+and with an unknown cause.
+"""
+_ROUNDS, _STEPS, _SETTLED = 4, 2, 0.02
+_AGAIN = 1
+_LEAST, _BEHIND = -3.0, 6.0
+"""Log posterior gain below which a cause is not fitted, and by how much a set may lie behind the best and be widened."""
+_FELT = 0.05
+"""Square of a whitened column below which it changes nothing."""
+
+
+def cause_key(one: NamedCause) -> tuple[str, str]:
+    """Return effect and target of a cause."""
+    return one.effect.name, one.effect.target
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of causes with their sizes: ``log_posterior`` up to a constant of the session, and of the unknown beside
+    it (``log_unknown``).
+    """
+
+    causes: tuple[NamedCause, ...]
+    rows: Rows
+    fit: Fit
+    log_posterior: float
+    Z: Array
+    y: Array
+    log_unknown: float = -np.inf
+    where_unknown: tuple[int, int] = (0, 0)
+
+    @property
+    def names(self) -> frozenset[tuple[str, str]]:
+        """Effect and target of its causes."""
+        return frozenset(cause_key(one) for one in self.causes)
+
+    @property
+    def left(self) -> Array:
+        """(r,) whitened rows that the posterior mean leaves."""
+        K, size = self.rows.X.shape[1], self.fit.coefficients
+        return np.asarray(self.y - self.rows.X @ size[:K] - self.Z @ size[K:])
+
+    @property
+    def phi(self) -> Array:
+        """(10N,) posterior mean of the body's parameters; empty where only observations judge."""
+        found = self.rows.problem
+        return np.empty(0) if found is None else found.prior.phi + found.factor @ self.fit.coefficients[: found.factor.shape[1]]
+
+    def whole(self, one: NamedCause) -> Array:
+        """Return the size (p,) of a cause with what its own tolerance has taken of it: both look alike, and the sum is
+        what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
+        """
+        where, unit = self.rows.tolerated.get(cause_key(one), (slice(0), np.zeros((one.theta.size, 0))))
+        return np.asarray(one.theta + unit @ self.fit.coefficients[where])
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A cause added to a hypothesis by the score test: its log posterior gain, and the size to begin with."""
+
+    effect: Effect
+    gain: float
+    start: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    screened: tuple[Scored, ...]
+    known_unknown: float = 0.0
+
+    @property
+    def unknown(self) -> float:
+        """Probability of an unknown cause."""
+        return max(self.known_unknown, float(self.weights[:, 1].sum()))
+
+    @property
+    def weights(self) -> Array:
+        """(H, 2) probability of every hypothesis, without and with the unknown."""
+        both = np.array([[one.log_posterior, one.log_unknown] for one in self.hypotheses])
+        return np.asarray(np.exp(both - logsumexp(both)))
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable hypothesis."""
+        return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
+
+    def probabilities(self) -> dict[tuple[str, str], float]:
+        """Return the probability of every cause."""
+        out: Counter[tuple[str, str]] = Counter()
+        for one, weight in zip(self.hypotheses, self.weights.sum(axis=1), strict=True):
+            for name in one.names:
+                out[name] += float(weight)
+        return dict(out.most_common())
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What every hypothesis of a session shares: the ``rows``, products ``inner`` of the columns that are no fault, the
+    ``causes`` with whitened columns ``Z`` (r, k) in ``cuts`` and their products with all others; ``prior`` log odds.
+    """
+
+    rows: Rows
+    causes: tuple[Candidate, ...]
+    prior: Mapping[tuple[str, str], float]
+    inner: Products
+    Z: Array
+    cuts: tuple[slice, ...]
+    least: float = -np.inf
+
+    @classmethod
+    def of(cls, rows: Rows, causes: Sequence[Candidate]) -> "Search":
+        """Return the search for ``causes``."""
+        Z, cuts = bases_of(causes)
+        below = np.zeros((len(rows.y) - len(Z), Z.shape[1]))
+        for one, cut in zip(causes, cuts, strict=True):
+            loud = np.flatnonzero(~np.array(one.silent))
+            if len(below) and loud.size:
+                own = rows.observed(one.effect)[:, loud]
+                below[:, cut.start : cut.start + loud.size] = own * SCALE * one.effect.typical[loud]
+        Z = np.concatenate([rows.white(Z), below])
+        return cls(rows, tuple(causes), log_priors(causes), products(rows, rows.X, rows.y, rows.group), Z, cuts)
+
+    @cached_property
+    def crossed(self) -> tuple[Array, Array]:
+        """(K, k) products of columns that are no fault with those of the causes: in the plates, in all markers."""
+        n, r = self.rows.plates, self.rows.simulated
+        return self.rows.X[:n].T @ self.Z[:n], self.rows.X[n:r].T @ self.Z[n:r]
+
+    @cached_property
+    def start(self) -> Fit:
+        """The posterior without any cause."""
+        return fit(self.inner, prior_sd(self.rows), nominal(self.rows), least=self.least)
+
+    @cached_property
+    def curvature(self) -> Curvature:
+        """What the data tell of the scales there."""
+        return self.start.curvature(len(self.rows.groups))
+
+
+def infer(rows: Rows, causes: Sequence[Candidate]) -> Posterior:
+    """Return the posterior over sets of ``causes``. Where an unknown cause is more probable than none, the simulation
+    is as far off everywhere as it is there: names are then sought at that noise.
+    """
+    search = Search.of(rows, causes)
+    found = _searched(search)
+    for _ in range(_AGAIN):
+        best = found.best
+        if found.unknown < 0.5:
+            break
+        square, count = energies(best)
+        louder = best.fit.scales.noise + 0.5 * float(np.log(square[count > 0].max()))
+        search = replace(search, least=louder)
+        found = replace(_searched(search), known_unknown=found.unknown)
+    return found
+
+
+def _searched(search: Search) -> Posterior:
+    """Return the posterior by a search that widens the most probable sets."""
+    bare = hypothesis(search, ())
+    known: dict[frozenset[tuple[str, str]], Hypothesis] = {bare.names: bare}
+    first, front = screen(search, bare), [bare]
+    for depth in range(MOST):
+        new = []
+        for one in front:
+            for scored in (first if depth == 0 else screen(search, one))[:_REFINED]:
+                names = one.names | {(scored.effect.name, scored.effect.target)}
+                if scored.gain >= _LEAST and names not in known:
+                    known[names] = hypothesis(search, (*one.causes, NamedCause(scored.effect, scored.start, np.empty((0, 0)))), one.fit.scales)
+                    new.append(known[names])
+        best = max(one.log_posterior for one in known.values())
+        new.sort(key=lambda one: -one.log_posterior)
+        front = [one for one in new[:_BRANCHES] if one.log_posterior > best - _BEHIND]
+    return Posterior(tuple(with_unknown(one) for one in known.values()), tuple(first))
+
+
+def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
+    """Return the log prior odds of every cause: of its effect, shared by its targets."""
+    targets = Counter(one.names[0] for one in causes)
+    share = {one.names: one.effect.prior / targets[one.names[0]] for one in causes}
+    return {name: float(np.log(p / (1 - p))) for name, p in share.items()}
+
+
+def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | None = None) -> Hypothesis:
+    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes."""
+    rows = search.rows
+    if not causes:
+        return Hypothesis((), rows, search.start, search.start.log_evidence, np.empty((len(rows.y), 0)), rows.y)
+    u0 = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
+    at = start or search.start.scales
+    for _ in range(_ROUNDS):
+        taken = [rows.added(one.effect, one.theta) for one in causes]
+        errors = [_model_errors(rows, one, own) for one, own in zip(causes, taken, strict=True)]
+        Z = np.concatenate([*errors, *(rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes)], axis=1)
+        p = u0.size
+        y = rows.y - np.sum(taken, axis=0) + Z[:, Z.shape[1] - p :] @ u0
+        inner = widened(search.inner, rows, rows.X, Z, y)
+        found = fit(inner, prior_sd(rows), at, known=search.curvature, steps=_STEPS, least=search.least)
+        at = found.scales
+        u, C = found.last(p)
+        causes, moved, u0 = _moved(causes, u, C), np.abs(u - u0).max(initial=0.0), u
+        if moved < _SETTLED:
+            break
+    value = found.log_evidence + sum(search.prior[cause_key(one)] for one in causes)
+    possible = all(rows.possible(one.effect, one.theta) for one in causes)
+    found = replace(found, products=search.inner)  # the largest arrays, which nobody asks for again
+    return Hypothesis(causes, rows, found, value if possible else -np.inf, Z, y)
+
+
+def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCause, ...]:
+    """Return the causes with new coefficients ``u`` and their covariance, in standard deviations of the slab."""
+    out, start = [], 0
+    for one in causes:
+        cut, scale = slice(start, start + one.effect.typical.size), SCALE * one.effect.typical
+        out.append(NamedCause(one.effect, scale * u[cut], C[cut, cut] * np.outer(scale, scale)))
+        start = cut.stop
+    return tuple(out)
+
+
+def _model_errors(rows: Rows, one: NamedCause, taken: Array) -> Array:
+    """Return (r, k) unit columns of how a cause is unlike its model: the share `unlike` of what it adds, in each band
+    and channel by itself.
+    """
+    n = rows.plates
+    out = np.zeros((len(taken), rows.block[:n].max(initial=-1) + 1))
+    out[np.arange(n), rows.block[:n]] = unlike(one.effect) * taken[:n]
+    return out[:, np.sum(out**2, axis=0) > _FELT]
+
+
+def screen(search: Search, one: Hypothesis) -> list[Scored]:
+    """Return every further cause by the score test at the scales of a hypothesis, most probable first."""
+    n, r, found = search.rows.plates, search.rows.simulated, one.fit
+    loud = np.exp(-2 * found.scales.noise)
+    weight = np.concatenate([np.full(n, loud), np.ones(r - n), found.scales.weights])
+    left = one.left
+    cross = loud * search.crossed[0] + search.crossed[1] + search.rows.X[r:].T @ (weight[r:, None] * search.Z[r:])
+    if one.Z.shape[1]:
+        cross = np.concatenate([cross, (one.Z * weight[:, None]).T @ search.Z])
+    half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
+    scored = []
+    for cause, cut in zip(search.causes, search.cuts, strict=True):
+        if cause.names in one.names:
+            continue
+        Z = search.Z[:, cut]
+        weighted = weight[:, None] * Z
+        G, s = Z.T @ weighted - half[:, cut].T @ half[:, cut], weighted.T @ left
+        inner = np.linalg.inv(np.eye(len(s)) + G)
+        mean = inner @ s
+        value = 0.5 * float(s @ mean) + 0.5 * float(np.linalg.slogdet(inner)[1])
+        scored.append(Scored(cause.effect, value + search.prior[cause.names], cause.start(mean)))
+    return sorted(scored, key=lambda suspect: -suspect.gain)
+
+
+def energies(one: Hypothesis) -> tuple[Array, Array]:
+    """Return the mean square (Q,) of what is left of the plates' rows in each band and channel in units of the session's
+    noise, and the number (Q,) of rows.
+    """
+    n = one.rows.plates
+    left = one.left[:n]
+    count = np.bincount(one.rows.block[:n])
+    loud = np.exp(2 * one.fit.scales.noise)
+    return np.bincount(one.rows.block[:n], weights=left**2) / np.maximum(count, 1) / loud, count
+
+
+def with_unknown(one: Hypothesis) -> Hypothesis:
+    """Return a hypothesis with the log posterior of an unknown cause beside it: one band and channel in which more is
+    left than laboratories leave there, log s of each ~ N(0, `EXCESS`^2) in place of N(0, `OWN`^2).
+    """
+    square, count = energies(one)
+    there = count > 0
+    if not there.any():
+        return one
+    away = np.full(square.size, -np.inf)
+    away[there] = np.maximum(0.5 * np.log(np.maximum(square[there], 1e-12)), 0.0)
+    own, wide = OWN**2 + 0.5 / np.maximum(count, 1), EXCESS**2 + 0.5 / np.maximum(count, 1)
+    each = np.where(there, 0.5 * np.where(there, away, 0.0) ** 2 * (1 / own - 1 / wide) - 0.5 * np.log(wide / own), -np.inf)
+    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / there.sum())
+    at = int(np.argmax(each))
+    return replace(one, log_unknown=one.log_posterior + float(logsumexp(each)) + price, where_unknown=divmod(at, 6))

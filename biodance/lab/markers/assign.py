@@ -1,0 +1,300 @@
+"""Which label is which landmark in a marker set that nobody described: ONE assignment, the cheapest by what the labels
+say and by where the markers are on a standing person.
+
+The cost of (label -> landmark) is minus the logarithm of how likely it is, in nats: how usual the spelling is, and half
+the squared distance, in standard deviations, from where this person has the landmark. That place is what a Gaussian of
+all landmarks (means, spreads and correlations in ``anthropometry/standing.toml``) expects beside the other landmarks of
+this person. `scipy.optimize.linear_sum_assignment` takes the cheapest one-to-one assignment; a label without a name is
+believed only if the next best assignment is clearly worse. What is certain places the rest, until nothing changes.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from biodance.lab.markers.names import Meaning, sides_of
+from biodance.lab.markers.set_file import LANDMARKS, other_end, other_side, part_of
+from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.markers.upright import OUTWARDS, Standing, bound, usual_standing
+from biodance.records import SIDES, Array, Mask
+
+_TOES = ("toe", "toe_lateral", "toe_medial")
+NEEDS = {one: (one,) for one in ("asis", "knee_lateral", "ankle_lateral", "heel")} | {"toe": _TOES}
+"""Landmarks that a body needs on each side, and what stands in for them."""
+_USEFUL = ("knee_medial", "ankle_medial", "acromion")
+"""Landmarks that posture tells as well, for labels that say nothing."""
+_GAINS = (*NEEDS, "psis", "mid_psis")
+"""Landmarks by whose marker a body gains: those, and one behind the pelvis."""
+_FREE = (*(f"{side}_{part}" for side in SIDES for part in (*NEEDS, *_TOES[1:], "psis", *_USEFUL)), "mid_psis")
+"""Landmarks that a label may be taken for that does not name them."""
+_AT = {place: j for j, place in enumerate(LANDMARKS)}
+_ENDS = ("lateral", "medial")
+_Said = Mapping[str, tuple[Meaning, ...]]
+
+
+def _nats(name: str) -> float:
+    return float(usual_standing()["nats"][name])
+
+
+def _spelled(rank: int) -> float:
+    """Return the cost of a spelling, nats."""
+    return float(np.log1p(rank / _nats("rank")))
+
+
+def by_names(said: _Said, stand: Standing | None = None) -> dict[str, str]:
+    """Return landmark -> label by the names, and by the heights of a person whose places are not known yet."""
+    cost = np.full((len(said), len(LANDMARKS)), np.inf)
+    for i, (label, ways) in enumerate(said.items()):
+        for one in ways:
+            if one.place in LANDMARKS:
+                cost[i, _AT[one.place]] = _spelled(one.rank) - _nats("named")
+                cost[i, _AT[one.place]] += _high(stand, one.place, label) if stand else 0.0
+    return {LANDMARKS[j]: list(said)[i] for i, j in _cheapest(cost)[0]}
+
+
+def _high(stand: Standing, place: str, label: str) -> float:
+    """Return the cost of a height, nats: 2 at the limit where it is believed, none within half of it."""
+    return 2 * max(stand.misfit(place, label) - 0.5, 0.0)
+
+
+def _cheapest(cost: Array) -> tuple[list[tuple[int, int]], float]:
+    """Return (row, column) of the cheapest one-to-one assignment of ``cost`` (N, P), and its sum: every row may also go
+    nowhere, at no cost; inf where it must not go.
+    """
+    some, places = cost.shape
+    whole = np.full((some, places + some), 1e6)
+    whole[:, :places] = np.minimum(cost, 1e6)
+    np.fill_diagonal(whole[:, places:], 0.0)
+    rows, columns = linear_sum_assignment(whole)
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return [(i, j) for i, j in pairs if j < places and cost[i, j] < 0], float(whole[rows, columns].sum())
+
+
+@cache
+def _template() -> tuple[tuple[str, ...], Array, Array]:
+    """Return the landmarks with a usual place, it (P, 3), and the covariance (3, P, P) along each axis: out, ahead, up;
+    in shares of the stature.
+
+    Ends of one joint, parts of one leg and the two sides stand together: the correlations of pairs are products.
+    """
+    usual = usual_standing()
+    parts = {part: ("",) if part in ("mid_psis", "c7") else SIDES for part in usual["places"]}
+    places = tuple(f"{side}_{part}" if side else part for part, sides in parts.items() for side in sides)
+    part, side = [part_of(place) for place in places], [place.startswith("left") for place in places]
+    joint = [one.partition("_")[0] for one in part]
+    leg = np.array([one in ("knee", "ankle", "heel", "toe") for one in joint])
+    same, ends, across = (np.equal.outer(np.array(one), np.array(one)) for one in (part, joint, side))
+    at, sd = (np.array([usual["places"][one][word] for one in part]) for word in ("at", "sd"))
+    alike = [
+        np.where(same, 1.0, np.where(ends, end, np.where(np.outer(leg, leg), limb, 0.0))) * np.where(across, 1.0, other)
+        for end, limb, other in (usual["together"][axis] for axis in ("out", "ahead", "up"))
+    ]
+    return places, at, np.array([one * np.outer(sd[:, k], sd[:, k]) for k, one in enumerate(alike)])
+
+
+def _squares(shares: Array, known: Mapping[str, int]) -> Array:
+    """Return (N, P) squared distances, in standard deviations, of markers (N, 3) from where a person has the landmarks
+    of `_template`, given the markers ``known`` (landmark -> row); a landmark that is known is expected by the others.
+
+    Gaussian conditioning: mean + C K (x - mean), and leaving one out x - K(x - mean) / diag K, with K the inverse of
+    the covariance of what is known (Rasmussen and Williams 2006, 5.10).
+    """
+    places, at, covariance = _template()
+    sides = np.array([OUTWARDS.get(place.partition("_")[0], 1.0) for place in places])
+    have = [k for k, place in enumerate(places) if place in known]
+    total = np.zeros((len(shares), len(places)))
+    for axis, cov in enumerate(covariance):
+        x = shares[:, axis, None] * (sides if axis == 0 else np.ones(len(places)))
+        mean, variance = at[:, axis].copy(), np.diag(cov).copy()
+        if have:
+            inverse = np.linalg.inv(cov[np.ix_(have, have)] + bound("glued") ** 2 * np.eye(len(have)))
+            off = x[[known[places[k]] for k in have], have] - mean[have]
+            off = np.clip(off, *(sign * 3 * np.sqrt(variance[have]) for sign in (-1, 1)))  # one odd marker moves little
+            left_out = off - inverse @ off / np.diag(inverse)
+            mean += cov[:, have] @ inverse @ off
+            variance -= np.einsum("ij,jk,ik->i", cov[:, have], inverse, cov[:, have])
+            mean[have], variance[have] = at[have, axis] + left_out, 1 / np.diag(inverse)
+        total += (x - mean) ** 2 / np.maximum(variance, bound("glued") ** 2)
+    return total
+
+
+class PersonLabels:
+    """The labels of a standing person, what they may mean (label -> meanings) and what each is (`assignment`).
+
+    ``confirmed`` label -> what it may mean and stands where this person may have it; ``named`` landmark -> label by the
+    names alone. ``words`` (N, P) nats: what the words cost every label for every landmark, inf where they do not name
+    it; ``free`` (N, P): where it may be one that they do not name.
+    """
+
+    def __init__(self, stand: Standing, said: _Said) -> None:
+        self.rows = {label: i for i, label in enumerate(plain_labels(stand.at))}
+        self.said = {label: said.get(label, ()) for label in self.rows}
+        self.named = by_names(self.said, stand)
+        self._stand = stand = replace(stand, named=self.named)
+        self.confirmed = {
+            label: tuple(one for one in ways if stand.believed(one.place, label)) for label, ways in self.said.items()
+        }
+        self._sure = by_names(self.confirmed, stand)
+        self._shares = stand.shares(self.rows)
+        told = sides_of(stand.at)
+        agree = [told[label] == SIDES[int(self._shares[i, 0] < 0)] for label, i in self.rows.items() if label in told]
+        self._sides = told if agree and np.mean(agree) > bound("believed") else {}
+        self.words = np.full((len(self.rows), len(LANDMARKS)), np.inf)
+        self.free = np.zeros(self.words.shape, dtype=bool)
+        for label, i in self.rows.items():
+            for place, cost in self._wordings(label):
+                self.words[i, _AT[place]] = cost
+            self.free[i, [_AT[place] for place in self._open_to(label)]] = True
+        self.free &= ~np.isfinite(self.words)
+        self._unplaced = self._by_height_and_width()
+
+    def _wordings(self, label: str) -> Iterator[tuple[str, float]]:
+        """Yield the landmarks that a label names, and what its words cost, nats; first, if it stands there, the other
+        end of its joint, and the other side where nobody has what it names.
+        """
+        ways = self.said[label]
+        said = ways[0].place if ways else ""
+        misread, end = [], other_end(said)
+        # A forearm turns: names of the two ends of an elbow are believed, unless both have the same.
+        twice = sum(other[0].place == said for other in self.said.values() if other) > 1
+        if end and part_of(end).startswith(("knee", "ankle", *["elbow"] * twice, *["toe"] * (end in self.named))):
+            misread.append((end, _nats("other_end")))
+        if said in LANDMARKS and said.startswith(SIDES) and not self._stand.believed(said, label):
+            misread.append((other_side(said), _nats("other_side")))
+        for place, more in misread:
+            if self._stand.believed(place, label):
+                yield place, _spelled(ways[0].rank) + more
+        for one in reversed(self.confirmed[label]):
+            if one.place in LANDMARKS:
+                yield one.place, _spelled(one.rank)
+
+    def _open_to(self, label: str) -> Iterator[str]:
+        """Yield what a label may mark that does not name it: it says nothing, or no more than the segment."""
+        ways, own = self.confirmed[label], self._sides.get(label)
+        have, middle = {part_of(one) for one in self._sure}, abs(self._shares[self.rows[label], 0]) < bound("same")
+        for place in _FREE:
+            side, part = place.partition("_")[0], part_of(place)
+            named = {"mid_psis"} if part == "psis" else {"mid_psis", "psis"} if part == "mid_psis" else set()
+            there = part.endswith("psis") and middle != (part == "mid_psis")
+            toes = part in _TOES and any(f"{side}_{toe}" in self._sure for toe in _TOES)
+            if own not in (None, side) or named & have or there or toes or (ways and part in _USEFUL):
+                continue
+            if all(one.place not in LANDMARKS and (one.place.startswith(side) or part.endswith("sis")) for one in ways):
+                yield place
+
+    def _by_height_and_width(self) -> Array:
+        """Return the cost (N, P), nats, of where labels are for what has no usual place: by its height; of the ends of
+        an elbow or of toes the lateral one is outside.
+        """
+        cost, labels, usual = np.zeros(self.words.shape), list(self.rows), usual_standing()["places"]
+        for i, j in np.argwhere(np.isfinite(self.words)):
+            if part_of(LANDMARKS[j]) not in usual:
+                cost[i, j] = _high(self._stand, LANDMARKS[j], labels[i])
+        for side, joint in product(SIDES, ("elbow", "toe")):
+            lateral, medial = (_AT[f"{side}_{joint}_{end}"] for end in _ENDS)
+            either = np.isfinite(self.words[:, [lateral, medial]]).any(axis=1)
+            out = OUTWARDS[side] * self._shares[:, 0]
+            middle = out[either].mean() if either.any() else 0.0
+            outside = _nats("outer") * np.clip((out - middle) / bound("same"), -1.0, 1.0)
+            cost[:, [lateral, medial]] += np.stack([-outside, outside], axis=1)
+        return cost
+
+    def assignment(self) -> dict[str, str]:
+        """Return landmark -> label: the cheapest assignment given what is certain, again until nothing more is."""
+        labels, free = list(self.rows), self.free.copy()
+        claims = Counter(ways[0].place for ways in self.confirmed.values() if ways)
+        # Which end of its joint the only marker that names one is, is not known yet.
+        alone = [place for place in self._sure if other_end(place) not in (None, *self._sure)]
+        known = {place: one for place, one in self._sure.items() if claims[place] < 2 and place not in alone}
+        fixed: dict[str, str] = {}
+        while True:
+            cost, rivals = self._costs(known, fixed, free)
+            pairs, least = _cheapest(cost)
+            new = dict(fixed)
+            for i, j in pairs:
+                if not free[i, j] or self._next_best(i, j, cost, rivals) - least >= _nats("margin"):
+                    new[LANDMARKS[j]] = labels[i]
+            away = self._distances(new)
+            for place, label in tuple(new.items()):
+                i, j = self.rows[label], _AT[place]
+                if free[i, j] and part_of(place) not in _TOES and away[i, j] > bound("near") / 2:
+                    free[i, j] = False  # what was taken with it says that it is elsewhere
+                    del new[place]
+            if new == fixed:
+                return new
+            known = fixed = new
+
+    def _costs(self, known: Mapping[str, str], fixed: Mapping[str, str], free: Mask) -> tuple[Array, Array]:
+        """Return the costs (N, P) given the landmarks that are ``known``, and those of labels without the name as far
+        away as they are rivals; what is ``fixed`` stays.
+        """
+        usual, away, labels = self._distances({}), self._distances(known), list(self.rows)
+        gain = np.array([_nats("needed") * (part_of(place) in _GAINS) for place in LANDMARKS])
+        placed = np.where(np.isfinite(away), np.minimum(away, _nats("farthest")), 0.0) + self._unplaced
+        cost = self.words + placed - _nats("named") - gain
+        open_ = free & self._at_ends_of_feet(np.minimum(usual, away), free, set(known.values()))
+        front = [_AT[f"{side}_{toe}"] for side in SIDES for toe in _TOES]
+        away[:, front] = usual[:, front]  # it is not known which toe is there: the foot may turn
+        away += np.array([[_nats("segment") * bool(ways)] for ways in self.confirmed.values()])
+        rivals = np.where(open_ & (away < bound("near") / 2 + _nats("margin")), away - _nats("mute") - gain, np.inf)
+        for i, j in np.argwhere(open_ & (away < bound("near") / 2)):
+            if self._stand.believed(LANDMARKS[j], labels[i]):
+                cost[i, j] = rivals[i, j]
+        for place, label in fixed.items():
+            cost[self.rows[label]] = rivals[self.rows[label]] = np.inf
+            cost[:, _AT[place]] = rivals[:, _AT[place]] = np.inf
+            cost[self.rows[label], _AT[place]] = -_nats("named") - _nats("needed")
+        return cost, rivals
+
+    def is_named(self, place: str, label: str) -> bool:
+        """Return whether the words of a label name a landmark, or name it by mistake."""
+        return bool(np.isfinite(self.words[self.rows[label], _AT[place]]))
+
+    def _next_best(self, row: int, column: int, cost: Array, rivals: Array) -> float:
+        """Return the sum of the next best assignment, in which no marker at this place is the landmark."""
+        beside = np.linalg.norm(self._shares - self._shares[row], axis=1) <= bound("same")
+        other = cost.copy()
+        other[:, column] = np.where(beside, np.inf, np.minimum(cost[:, column], rivals[:, column]))
+        return _cheapest(other)[1]
+
+    def _distances(self, known: Mapping[str, str]) -> Array:
+        """Return (N, P) half the squared distances given landmarks that are known; inf for those without usual place.
+        Any toe is expected at the front of the foot.
+        """
+        away = np.full(self.words.shape, np.inf)
+        rows = {place: self.rows[label] for place, label in known.items()}
+        away[:, [_AT[place] for place in _template()[0]]] = _squares(self._shares, rows) / 2
+        for side, toe in product(SIDES, _TOES[1:]):
+            away[:, _AT[f"{side}_{toe}"]] = away[:, _AT[f"{side}_toe"]]
+        return away
+
+    def _at_ends_of_feet(self, away: Array, free: Mask, taken: Collection[str]) -> Mask:
+        """Return (N, P) whether a label may be a heel or toe by its place: the hindmost and foremost of a foot, or both
+        markers at its ball where both feet have two.
+        """
+        ends, balls = dict[str, int](), dict[str, int]()
+        mute = np.array([not ways for ways in self.confirmed.values()])
+        here = free & (away < bound("near") / 2) & np.array([[label not in taken] for label in self.rows])
+        for side in SIDES:
+            out, ahead = OUTWARDS[side] * self._shares[:, 0], self._shares[:, 1]
+            hind, front = (np.flatnonzero(here[:, _AT[f"{side}_{end}"]]) for end in ("heel", "toe"))
+            front = front[mute[front]] if mute[front].any() else front
+            if hind.size:
+                ends[f"{side}_heel"] = hind[ahead[hind].argmin()]
+            if front.size:
+                ends[f"{side}_toe"] = front[ahead[front].argmax()]
+                outer, inner = front[out[front].argmax()], front[out[front].argmin()]
+                across, along = np.abs(self._shares[outer] - self._shares[inner])[:2]
+                if along < across and np.hypot(across, along) > bound("ball"):
+                    balls |= {f"{side}_toe_lateral": outer, f"{side}_toe_medial": inner}
+        if len(balls) == 2 * len(SIDES):
+            ends = balls | {place: row for place, row in ends.items() if part_of(place) == "heel"}
+        may = np.tile([part_of(place) not in ("heel", *_TOES) for place in LANDMARKS], (len(self.rows), 1))
+        for place, row in ends.items():
+            may[row, _AT[place]] = True
+        return may

@@ -1,0 +1,441 @@
+"""One force plate from its raw channels to the wrench about its sensor, in the order in which it happens: corners,
+origin, gaps, units, zero, wrench. In plate axes and with the recorded sign; `sense` decides the directions.
+
+Sources: C3D user guide, FORCE_PLATFORM (TYPE 1-4, ORIGIN, CAL_MATRIX, ZERO); Visual3D documentation, force platform
+types 5-7; Kistler 9287 manual (moments of an eight-channel plate).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from biodance.errors import TrialRefused
+from biodance.lab.c3d.raw import RawC3d
+from biodance.lab.plates.corners import corners_in_lab, half_sides, plate_axes
+from biodance.lab.plates.parameters import CONTENT, FOUR_SENSORS, PlateParameters
+from biodance.records import Array, Mask, runs
+from biodance.settings import STANDARD_GRAVITY, TOUCH_FORCE
+
+DEEPEST = 0.3  # m, no sensor lies farther below the surface
+EDGE = 0.02  # m by which a sensor or a centre of pressure may lie beyond the edge
+FARTHEST_PRESSURE = 1.5  # m: a centre of pressure farther away has no meaning
+_FARTHEST_ORIGIN, _CLOSEST_SENSORS = 2.0, 0.05  # m
+_VERTICAL = {3: (4, 5, 6, 7), 6: (2, 5, 8, 11), 7: (4, 5, 6, 7)}
+"""Columns (after the calibration matrix) whose sum is the force along the plate's z; column 2 for other TYPEs."""
+_SCALE_OFF = 0.5
+"""Share of the weight (or its inverse) from which on the scale is doubted; a foot beside the plates costs less."""
+_SCALE_RIGHT = 0.15
+"""Share by which what the plates carry without the scale may differ from the weight: shoes, clothes, movement."""
+_SOMEBODY_ON = 0.3  # share of the largest total force from which on somebody stands on the plates
+_LOADED, _CONTACT = 0.05, 0.1  # share of the peak from which on a plate is loaded; s over which it must be
+_BLOCK = 0.04  # s: the force is judged in means over two periods of the mains
+_NEAR = 20.0  # N, readings this close to the unloaded end of the trial belong to it
+_SMALL = 30.0  # N, an offset that needs no further proof
+_FLAT = 5.0  # N, spread of the block means up to which a plate counts as quiet
+LARGEST_SHARE = 1 / 3  # an offset of the sign of a load must stay below this share of the trial's range
+_SHORTEST = 0.12  # s of unloaded signal, after one block was cut off at both ends, where the plate still rings
+_DEAD, _LONG = 1.5, 0.5
+"""N, s: a larger offset is only believed where the signal is as still as its own noise, and for longer."""
+_FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
+
+
+@dataclass(frozen=True)
+class Decisions:
+    """What was decided about a plate, step by step: from session.toml, corners, origin, units, gaps, what the load
+    shows, zero.
+    """
+
+    told: tuple[str, ...] = ()
+    corners: tuple[str, ...] = ()
+    origin: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    gaps: tuple[str, ...] = ()
+    load: tuple[str, ...] = ()
+    zero: tuple[str, ...] = ()
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """Every sentence, in the order of the steps."""
+        return (*self.told, *self.corners, *self.origin, *self.units, *self.gaps, *self.load, *self.zero)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateReading:
+    """A plate whose directions are not yet decided.
+
+    Attributes
+    ----------
+    plate : PlateParameters
+        What the file says.
+    corners, axes, half : Array
+        (4, 3) m in the lab frame; lab_R_plate (3, 3); half the sides (2,) m along the plate's x and y.
+    sensor : Array
+        (S, 6) N, N·m about the sensor, plate axes, sign as recorded, zero taken off.
+    vector : Array
+        (3,) m from the sensor to the centre of the surface, plate axes, as the file says.
+    rate : float
+        Hz of the samples.
+    empty : Array
+        (3,) N that the empty plate read and that was subtracted, plate axes, sign as recorded.
+    known : Array
+        (S,) False where a channel holds no number; ``sensor`` then keeps the nearest known sample, for decisions only.
+    decisions : Decisions
+        What was decided.
+    warnings : tuple of str
+        What a person should look at, beside odd corners, origins and gaps.
+    """
+
+    plate: PlateParameters
+    corners: Array
+    axes: Array
+    half: Array
+    sensor: Array
+    vector: Array
+    rate: float
+    empty: Array
+    known: Mask
+    decisions: Decisions
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def loaded(self) -> Mask:
+        """The samples (S,) at which somebody is on the plate (`loaded_samples`)."""
+        return loaded_samples(self.sensor, self.rate)
+
+
+class _Geometry(NamedTuple):
+    """What of a plate no sample can change: (4, 3) m ``corners`` and lab_R_plate ``axes`` (3, 3) in the lab, ``half``
+    the sides (2,) m, ORIGIN (3,) m; what was decided.
+    """
+
+    corners: Array
+    axes: Array
+    half: Array
+    origin: Array
+    corners_said: tuple[str, ...]
+    origin_said: tuple[str, ...]
+
+
+class DecodedPlates(NamedTuple):
+    """The ``readings`` of the plates of a file, the reason by number why others are ``refused``, and what a person
+    should look at.
+    """
+
+    readings: list[PlateReading]
+    refused: dict[int, str]
+    warnings: tuple[str, ...]
+
+
+def decode_plates(
+    raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
+) -> DecodedPlates:
+    """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
+
+    Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
+    not applied where with it the plates carry less than half or more than twice the weight, and without it, within
+    15 %, all of it.
+
+    Parameters
+    ----------
+    raw : RawC3d
+        The file.
+    plates : sequence of PlateParameters
+        What it says of each plate.
+    metres : float
+        The file's length unit in m.
+    turn : Array
+        (3, 3), from file axes to the lab.
+    mass : float or None
+        kg of the person, None = not known.
+
+    Returns
+    -------
+    DecodedPlates
+        A plate is refused whose corners, ORIGIN or channels make no sense; the sentence says which value and what
+        would be legal.
+    """
+    placed, refused = [], {}
+    for plate in plates:
+        try:
+            placed.append((plate, _geometry(plate, metres, turn)))
+        except TrialRefused as error:
+            refused[plate.number] = str(error)
+    done, lost = _decode_each(raw, placed, refused)
+    used = [column for reading in done for column in reading.plate.channels]
+    if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
+        return DecodedPlates(done, lost, ())
+    gain, share = raw.layout.gain[used], _weight_share(done, mass)
+    if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
+        return DecodedPlates(done, lost, ())
+    scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
+    stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
+    plain, lost_plain = _decode_each(stored, placed, refused)
+    whole = _weight_share(plain, mass)
+    if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
+        return DecodedPlates(done, lost, ())
+    said = (
+        f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
+        f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
+        f"ANALOG:SCALE, or export the file again."
+    )
+    return DecodedPlates(plain, lost_plain, (said,))
+
+
+def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
+    """Return where a plate lies; TrialRefused where corners or ORIGIN make no sense."""
+    corners, said = corners_in_lab(plate.corners, metres=metres, turn=turn)
+    axes, half = plate_axes(corners), half_sides(corners)
+    origin, origin_said = _origin(plate, half, metres)
+    return _Geometry(corners, axes, half, origin, said, origin_said)
+
+
+def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
+    """Return ORIGIN (3,) in m, in the file's unit, or in m or mm where only that makes sense, and what was decided;
+    TrialRefused where nothing does.
+    """
+    four = plate.type in FOUR_SENSORS
+    fits = []
+    for unit in dict.fromkeys((metres, 0.001, 1.0)):
+        x, y, depth = np.abs(plate.origin * unit)
+        beside = np.array([x, y])
+        inside = bool((beside >= _CLOSEST_SENSORS).all() and (beside <= half + EDGE).all())
+        if depth <= DEEPEST and max(x, y) <= _FARTHEST_ORIGIN and (inside or not four):
+            fits.append(unit)
+    if fits and fits[0] == metres:
+        return plate.origin * metres, ()
+    written = ", ".join(f"{c:.4g}" for c in plate.origin)
+    if len(fits) == 1:
+        said = f"ORIGIN ({written}) makes no sense in the file's unit and was taken in units of {fits[0]:g} m."
+        return plate.origin * fits[0], (said,)
+    legal = "half distances of the sensors inside the plate, then the depth" if four else "sensor to surface centre"
+    raise TrialRefused(
+        f"ORIGIN is ({written}) in units of {metres:g} m, which no plate of {2 * half[0]:.2f} x {2 * half[1]:.2f} m "
+        f"has (legal: {legal}, depth up to {DEEPEST:g} m). Enter the values of the maker's sheet."
+    )
+
+
+def _decode_each(
+    raw: RawC3d, placed: Sequence[tuple[PlateParameters, _Geometry]], refused: Mapping[int, str]
+) -> tuple[list[PlateReading], dict[int, str]]:
+    """Return the readings of the plates that make sense, and by number why others are refused, too."""
+    readings, lost = [], dict(refused)
+    for plate, place in placed:
+        try:
+            readings.append(_decode(raw, plate, place))
+        except TrialRefused as error:
+            lost[plate.number] = str(error)
+    return readings, lost
+
+
+def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReading:
+    """Return the reading of one plate; TrialRefused where no sample is known.
+
+    ``sensor = W(k * C (channels - zero))`` with the SI units k, the calibration matrix C and the formula W of the TYPE
+    (`sensor_wrench`).
+    """
+
+    def in_si(samples: Array) -> Array:
+        output = samples if plate.calibration is None else samples @ plate.calibration.T
+        return output * plate.factors
+
+    # TYPE 1 gives a point on the surface, four sensors lie around the axis: only x, y or only z leads to the centre
+    used = [False, False, True] if plate.type in FOUR_SENSORS else [True, True, plate.type != 1]
+    vector = np.where(used, place.origin, 0.0)
+    channels, known, gaps_said = _without_gaps(np.asarray(raw.analog[:, plate.channels], dtype=float), plate)
+    vertical = in_si(channels)[:, _VERTICAL.get(plate.type, (2,))].sum(axis=1)
+    zero = find_baseline(vertical, zero=plate.zero, rate=raw.analog_rate)
+    offsets = np.zeros(channels.shape[1])
+    if zero.stop > zero.start:
+        offsets = channels[zero.start : zero.stop].mean(axis=0)
+        if plate.type == 1:  # where an empty plate is pressed has no zero
+            offsets = np.where([kind == "L" for kind in CONTENT[1]], 0.0, offsets)
+    sensor = sensor_wrench(plate.type, in_si(channels - offsets), place.origin)
+    empty = sensor_wrench(plate.type, in_si(offsets[None]), place.origin)[0, :3]
+    first = f"TYPE {plate.type}, analog channels {', '.join(str(c + 1) for c in plate.channels)}."
+    told = tuple(f"{said[0].upper()}{said[1:]}" for said in (plate.told.sentence,) if said)
+    where = (place.corners_said, place.origin_said)
+    said = Decisions((first, *told), *where, plate.units_said, gaps_said, (), (zero.said,))
+    return PlateReading(plate, *place[:3], sensor, vector, raw.analog_rate, empty, known, said)
+
+
+def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask, tuple[str, ...]]:
+    """Return the channels with the nearest known sample where one is no number, where all are known, and what was
+    masked; TrialRefused where nothing is known.
+    """
+    known = np.asarray(np.isfinite(channels).all(axis=1))
+    if known.all():
+        return channels, known, ()
+    sample, column = np.argwhere(np.logical_not(np.isfinite(channels)))[0]
+    where = f"analog channel {plate.channels[column] + 1} is not a number at sample {sample + 1}"
+    if not known.any():
+        raise TrialRefused(
+            f"{where}, and no sample of the plate is whole. Check the channel in the recording software."
+        )
+    whole = np.flatnonzero(known)
+    nearest = np.searchsorted((whole[1:] + whole[:-1]) / 2, np.arange(known.size))
+    said = f"{int((~known).sum())} of {known.size} samples are unknown, the first: {where}; they are masked."
+    return channels[whole[nearest]], known, (said,)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Samples ``start`` to ``stop`` (exclusive) over which each channel is averaged, both 0 for none; ``said`` is
+    the sentence about it.
+    """
+
+    start: int
+    stop: int
+    said: str
+
+
+def find_baseline(vertical: Array, *, zero: tuple[int, int] | None, rate: float) -> Baseline:
+    """Return the window in which the plate is unloaded: FORCE_PLATFORM:ZERO if it is one, else the longest found, else
+    none.
+
+    ``vertical`` (S,) N is the plate's vertical force as recorded, either sign; ``zero`` the first and last sample (from
+    1) that the file names. Unloaded means: quiet, at the end of the trial's range away from the load, and either small
+    or plainly no load.
+    """
+    written, why = _written(vertical, zero)
+    if written and written.stop - written.start >= _FEW:
+        return written
+    found = _longest_unloaded(vertical, rate)
+    if found is not None:
+        level = vertical[slice(*found)].mean()
+        said = (
+            f"Zero: {why} The plate is unloaded in samples {found[0] + 1}-{found[1]}; their mean was subtracted "
+            f"({level:.3g} N vertical)."
+        )
+        return Baseline(*found, said)
+    if written:
+        return written
+    low, high = _range(vertical)
+    never = f"The plate is never seen unloaded (vertical {low:.0f} to {high:.0f} N): nothing was subtracted."
+    return Baseline(0, 0, f"Zero: {why} {never}")
+
+
+def _written(vertical: Array, zero: tuple[int, int] | None) -> tuple[Baseline | None, str]:
+    """Return the window that the file names if it is legal and unloaded, and the reason why it is not used."""
+    if zero is None:
+        return None, "the file names no window (ZERO is missing)."
+    first, last = zero
+    if not 1 <= first <= last <= vertical.size:
+        return None, f"ZERO is {first} {last}, which names no samples."
+    level = float(vertical[first - 1 : last].mean())
+    if not is_unloaded(level, vertical):
+        return None, f"ZERO names samples {first}-{last}, but the plate is loaded there ({level:.0f} N)."
+    said = (
+        f"Zero: mean of samples {first}-{last} as the file says (ZERO), {level:.3g} N vertical, subtracted from "
+        f"every channel."
+    )
+    return Baseline(first - 1, last, said), f"ZERO names only {last - first + 1} samples."
+
+
+def _longest_unloaded(vertical: Array, rate: float) -> tuple[int, int] | None:
+    """Return the longest quiet stretch (samples) at one end of the range that is unloaded; None if there is none."""
+    means, size = block_means(vertical, rate)
+    found = []
+    for end in (means.min(), means.max()):
+        near = means[np.abs(means - end) <= _NEAR]
+        middle = float(np.median(near))
+        spread = 1.4826 * float(np.median(np.abs(near - middle)))
+        for start, stop in runs(np.abs(means - middle) <= max(_FLAT, 4 * spread)):
+            inner = slice(start + 1, stop - 1)
+            if stop - start < 3:
+                continue
+            level, length = float(means[inner].mean()), (stop - start - 2) * size / rate
+            small = abs(level) <= _SMALL
+            noise = 1.5 * float(vertical[(start + 1) * size : (stop - 1) * size].std()) / np.sqrt(size)
+            quiet = means[inner].std() <= (_FLAT if small else max(_DEAD, noise)) and length >= (
+                _SHORTEST if small else _LONG
+            )
+            if quiet and is_unloaded(level, means):
+                found.append((small, length, (start + 1) * size, (stop - 1) * size))
+    return max(found)[2:] if found else None
+
+
+def is_unloaded(level: float, vertical: Array) -> bool:
+    """Return True if ``level`` N can be the reading of the empty plate in a trial with these readings (S,) N.
+
+    It must be the low or the high end of the trial's range (a load goes one way only). An offset up to 30 N is
+    believed; a larger one only if it is no large part of the load, or has the opposite sign.
+    """
+    low, high = _range(vertical)
+    if abs(level) <= _SMALL:
+        return level <= low + _NEAR or level >= high - _NEAR
+    if high - low < 5 * _NEAR:
+        return False
+    load = level if level <= low + _NEAR else -level
+    at_an_end = level <= low + _NEAR or level >= high - _NEAR
+    return at_an_end and -(high - low) <= load <= LARGEST_SHARE * (high - low)
+
+
+def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:
+    """Return the means of ``values`` (S,) over whole blocks of ``length`` s, and the samples per block (at least one
+    block).
+    """
+    size = min(max(1, round(length * rate)), values.size)
+    count = values.size // size
+    return values[: count * size].reshape(count, size).mean(axis=1), size
+
+
+def _range(values: Array) -> tuple[float, float]:
+    low, high = np.percentile(values, [0.5, 99.5])
+    return float(low), float(high)
+
+
+def sensor_wrench(kind: int, signals: Array, origin: Array) -> Array:
+    """Return force and moment (S, 6) N, N·m about the sensor, plate axes, from the output (S, C) in SI of a plate.
+
+    ==========  =====================================================================================================
+    TYPE        formula
+    ==========  =====================================================================================================
+    1           ``F``, a point ``p`` on the surface and a free moment ``T``: ``M = p x F + T``, about the point of the
+                surface above the sensor. A point farther than 1.5 m away, as an empty plate gives it, counts as 0.
+    3, 7        four vertical sensors at (a, b), (-a, b), (-a, -b), (a, -b), a and b from ORIGIN; x12, x34, y14, y23
+                are sums of two sensors: ``Mx = b (z1 + z2 - z3 - z4)``, ``My = a (-z1 + z2 + z3 - z4)``,
+                ``Mz = b (x34 - x12) + a (y14 - y23)``
+    6           the same of three components x, y, z at each of four corners
+    2, 4, 5     the wrench itself
+    ==========  =====================================================================================================
+
+    ``kind`` is the C3D TYPE; ``origin`` (3,) m is ORIGIN. The sign is that of the channels.
+    """
+    if kind == 1:
+        fx, fy, fz, x, y, free = signals.T
+        x, y = np.where(np.maximum(np.abs(x), np.abs(y)) > FARTHEST_PRESSURE, 0.0, (x, y))
+        return np.column_stack([fx, fy, fz, y * fz, -(x * fz), free + (x * fy - y * fx)])
+    if kind not in FOUR_SENSORS:
+        return signals
+    if kind == 6:
+        x, y, (z1, z2, z3, z4) = signals.T.reshape(4, 3, -1).swapaxes(0, 1)
+        x12, x34, y14, y23 = x[0] + x[1], x[2] + x[3], y[0] + y[3], y[1] + y[2]
+    else:
+        x12, x34, y14, y23, z1, z2, z3, z4 = signals[:, :8].T
+    a, b = np.abs(origin[:2])
+    about_x, about_y = b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4)
+    about_z = b * (x34 - x12) + a * (y14 - y23)
+    return np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4, about_x, about_y, about_z], axis=1)
+
+
+def loaded_samples(wrench: Array, rate: float) -> Mask:
+    """Return (S,) True where the plate carries at least 30 N and 5 % of its peak along its own z, in the mean over 0.1
+    s and at the sample.
+
+    So a plate that only trembles under a neighbour's step does not count as loaded. ``wrench`` (S, 6) N, N·m in plate
+    axes, either sign; ``rate`` Hz.
+    """
+    means, size = block_means(wrench[:, 2], rate, length=_CONTACT)
+    threshold = max(TOUCH_FORCE, _LOADED * float(np.abs(means).max()))
+    lasting = np.repeat(np.abs(means) >= threshold, size)
+    lasting = np.append(lasting, np.full(len(wrench) - lasting.size, lasting[-1]))
+    return lasting & (np.abs(wrench[:, 2]) >= threshold)
+
+
+def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
+    """Return the median of the total vertical force while somebody is on the plates over the weight of ``mass`` kg."""
+    total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
+    loaded = total >= _SOMEBODY_ON * total.max()
+    return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
