@@ -26,7 +26,7 @@ plate's samples returned 40 times to a file that it had left.
 CONTRACTS = {
     "biodance.effects": {"EFFECT"},
     "biodance.dance.limits": {"LIMIT"},
-    "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "sniff", "read"},
+    "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "FOLLOWS_TOLD", "sniff", "read"},
     "biodance.body.export": {"FORMAT", "SUFFIX", "text", "data", "beside"},
     "biodance.witnesses": {"WITNESS"},
 }

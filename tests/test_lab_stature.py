@@ -9,7 +9,7 @@ from lab_sessions import person
 from biodance import read_session
 from biodance.lab.markers.sets import recognise
 from biodance.lab.read import read_trial
-from biodance.lab.session.stature import stature_of_markers
+from biodance.lab.session.stature import stature_of_markers, stature_of_movement
 from biodance.records import Markers, Source, Trial
 
 RUNNERS = {"S001": 1.81, "S003": 1.77, "S005": 1.69, "S009": 1.732, "S012": 1.786, "S016": 1.675, "S017": 1.835,
@@ -71,3 +71,31 @@ def test_fewer_landmarks_are_less_certain_and_none_is_nan() -> None:
     assert abs(part[0] - whole[0]) < 2 * part[1]
     no_ankle = standing(lambda label, xyz: np.full_like(xyz, np.nan) if "ANK" in label else xyz)
     assert np.isnan(stature_of_markers(no_ankle)[0])
+
+
+@pytest.mark.parametrize(
+    ("files", "static"),
+    [
+        (("biomechzoo/HC032A/HC032A18.c3d",), "biomechzoo/HC032A/HC032A01.c3d"),
+        (("laas_human/c3d/march.c3d", "laas_human/c3d/squats.c3d"), "laas_human/c3d/static.c3d"),
+    ],
+)
+def test_who_moves_is_as_tall_as_who_stands(data: Path, files: tuple[str, ...], static: str) -> None:
+    stands = stature_of_markers(read_trial(data / static, role="static"))[0]
+    moves, sd, _ = max(stature_of_movement(read_trial(data / file)) for file in files)
+    assert abs(moves - stands) < 2 * sd
+    assert 0.012 < sd / moves < 0.03
+
+
+def test_a_session_without_a_static_trial_says_how_tall_somebody_is(data: Path, tmp_path: Path) -> None:
+    (tmp_path / "march.c3d").symlink_to(data / "laas_human" / "c3d" / "march.c3d")
+    session = read_session(tmp_path)
+    assert session.subject.stature == pytest.approx(1.81, abs=0.04)
+    assert any("while the person is upright in march: no static trial tells it" in note for note in session.notes)
+
+
+def test_who_never_stands_upright_tells_nothing() -> None:
+    names = ("RANK", "LANK", "RASI", "LASI")
+    markers = Markers(names, np.arange(5) / 100, np.random.default_rng(1).uniform(0.05, 1.0, (5, 4, 3)))
+    trial = Trial("stairs", "fit", markers, (), Source(Path("stairs.c3d"), "", "C3D"), "plug_in_gait")
+    assert np.isnan(stature_of_movement(trial)[0])

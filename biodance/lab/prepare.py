@@ -15,6 +15,7 @@ from biodance.lab.filters import LowPass, force_filter
 from biodance.lab.markers.gaps import Gap, fill_gaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import faulty_markers, without_faults
+from biodance.lab.markers.time_axis import LONGEST_STEP
 from biodance.records import Array, Markers, Plate, Trial, Wrench
 from biodance.settings import GapSettings
 
@@ -41,7 +42,7 @@ def prepare(trial: Trial) -> Trial:
     markers = trial.markers
     try:
         if markers is not None:
-            if markers.time.size > 1:
+            if markers.time.size > 1 and not _postures(markers.time):
                 filters.design_low_pass(low_pass, markers.rate)
             markers, said = _common_time(markers, trial)
             history += said
@@ -57,6 +58,11 @@ def prepare(trial: Trial) -> Trial:
     return replace(
         trial, markers=markers, plates=plates, history=(*trial.history, *history), warnings=(*trial.warnings, *warnings)
     )
+
+
+def _postures(time: Array) -> bool:
+    """Return whether frames lie too far apart to tell a movement between them: there is nothing to filter."""
+    return time.size > 1 and float(np.median(np.diff(time))) > LONGEST_STEP
 
 
 def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
@@ -117,7 +123,9 @@ def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
 def at_marker_times(plate: Plate, markers: Markers | None, low_pass: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
-    if wrench.time.size < 2 or wrench.time.size < low_pass.shortest(wrench.rate):
+    if _postures(wrench.time):
+        how = "not filtered, every row is a posture"
+    elif wrench.time.size < 2 or wrench.time.size < low_pass.shortest(wrench.rate):
         mean = np.broadcast_to(wrench.value.mean(axis=0), wrench.value.shape)
         wrench, how = Wrench(wrench.time, mean), f"mean of {wrench.time.size} samples, too few for the low-pass"
     else:

@@ -16,6 +16,7 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
 from biodance.lab.filters import LowPass, low_pass
+from biodance.lab.markers.time_axis import LONGEST_STEP
 from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.records import Array, Motion
 from biodance.records.arrays import rate_of
@@ -130,6 +131,11 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
     if len(time) < 2:
         return
     steps = np.diff(time)
+    if np.median(steps) > LONGEST_STEP:
+        raise TrialRefused(
+            f"The frames lie {np.median(steps):.2g} s apart: they are postures, and no movement can be told between "
+            f"them. Record at {1 / LONGEST_STEP:g} Hz or more; as a static trial they serve as they are."
+        )
     if np.ptp(steps) > 0.01 * steps.mean():
         frame = int(np.abs(steps - np.median(steps)).argmax())
         raise TrialRefused(

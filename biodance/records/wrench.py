@@ -181,6 +181,9 @@ class Plate:
         The foot that stands on it, where the analyst says so; "" = the one that the markers show.
     columns : str
         What a table calls the plate, by which it is known again there; "" where the file numbers its plates.
+    put : array_like or None
+        (2,) m where the point of its moments was put by the feet that stand on it; None where the file or the analyst
+        says the place.
 
     Examples
     --------
@@ -197,9 +200,11 @@ class Plate:
     placed: bool = True
     foot: str = ""
     columns: str = ""
+    put: Array | None = None
 
     def __post_init__(self) -> None:
-        assign(self, decisions=tuple(self.decisions))
+        put = None if self.put is None else frozen_array(self.put, (2,), f"{self.name}.put")
+        assign(self, decisions=tuple(self.decisions), put=put)
         freeze(self, self.name, corners=(4, 3), zero=(3,))
 
     @property

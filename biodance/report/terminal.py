@@ -30,8 +30,8 @@ def _line(console: Console, text: str) -> None:
 
 
 def _inspected_lines(record: dict[str, Any]) -> list[str]:
-    """Return the lines under the name of one inspected file: markers, plates, masses, warnings."""
-    lines = []
+    """Return the lines under the name of one inspected file: how it was read, markers, plates, masses, warnings."""
+    lines = list(record.get("history") or ())
     if record.get("markers"):
         known = record.get("marker_set") or "no known set"
         worn = f"the map of {Path(known).name}" if known.endswith(".toml") else known

@@ -47,7 +47,7 @@ class EmptyPlate(Witness):
     def _change(self, seen: SeenTrial, plate: Plate) -> list[Observation]:
         wrench = plate.wrench
         loaded = np.flatnonzero(np.abs(wrench.force[:, 2]) > ONSET)
-        margin, least = round(_SETTLES * wrench.rate), round(_SHORTEST * wrench.rate)
+        margin, least = round(_SETTLES * wrench.rate), max(1, round(_SHORTEST * wrench.rate))
         if not loaded.size:
             return []
         before, after = slice(0, max(0, loaded[0] - margin)), slice(loaded[-1] + margin, wrench.time.size)

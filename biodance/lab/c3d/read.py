@@ -15,7 +15,7 @@ from biodance.lab.c3d.length import metres_per_unit
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.markers.sets import MarkerSet, recognise
-from biodance.lab.markers.upright import axis_to_head, clear_axis
+from biodance.lab.markers.upright import axis_to_head, clear_axis, turn_to
 from biodance.lab.plates.corners import is_rectangle
 from biodance.lab.plates.told import Told
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames
@@ -187,7 +187,7 @@ def _turn_to_z_up(
                 f"the person in the report."
             )
             (history if who == "POINT:Y_SCREEN" else warnings).append(line)
-    turn = _turn(chosen)
+    turn = turn_to(chosen)
     if not np.array_equal(turn, np.eye(3)):
         history.append(f"Everything was turned so that z points up: {_name(chosen)} of the file became +Z.")
     return turn, tuple(history), tuple(warnings)
@@ -214,12 +214,6 @@ def _refuse_lying(markers: Markers | None, raw: RawC3d) -> None:
 def _name(axis: Array) -> str:
     i = int(np.argmax(np.abs(axis)))
     return ("+" if axis[i] > 0 else "-") + _AXES[i]
-
-
-def _turn(up: Array) -> Array:
-    """Return the rotation whose third row is ``up``; its first row is x where possible."""
-    first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
-    return np.stack([first, np.cross(up, first), up]) + 0.0
 
 
 def _declared(raw: RawC3d, markers: Markers | None) -> Array | None:

@@ -34,6 +34,8 @@ _UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_a
 _LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
 _HIGH, _DEEP = ("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank")
 """Segments of the upper and of the lowest part of the body, for sets that nobody described."""
+_CLEARLY_TALLER = 1.3
+"""A body stands along an axis along which it is so many times as long: arms spread sideways stay below."""
 
 
 @cache
@@ -298,3 +300,26 @@ def clear_axis(direction: Array) -> Array | None:
     i = int(np.argmax(np.abs(direction)))
     axis: Array = np.eye(3)[i] * np.sign(direction[i])
     return axis
+
+
+def turn_to(up: Array) -> Array:
+    """Return the rotation (3, 3) whose third row is a coordinate axis ``up``; its first row is x where possible."""
+    first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
+    return np.stack([first, np.cross(up, first), up]) + 0.0
+
+
+def body_is_tall_along_z(xyz: Array) -> bool:
+    """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
+
+    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
+    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
+    False.
+    """
+    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
+    if seen.shape[1] < 2:
+        return False
+    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
+    if not len(frames):
+        return False
+    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    return bool(extent[2] > _CLEARLY_TALLER * extent[1])

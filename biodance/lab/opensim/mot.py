@@ -17,7 +17,6 @@ from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text,
 from biodance.records import Array, assign, frozen_array
 
 _LONGEST_HEADER = 200
-_JITTER = 0.2  # how far a time may lie from equal steps, as part of a step: writers round the time column
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +50,6 @@ class TimeTable:
         if column not in self.columns:
             raise UnknownName.of("column of this table", column, self.columns)
         return self.values[:, self.columns.index(column)]
-
-    @property
-    def has_equal_steps(self) -> bool:
-        """True if every time lies within a fifth of a step of equal steps (writers round the time column)."""
-        even = np.linspace(self.time[0], self.time[-1], self.time.size) if self.time.size else self.time
-        return bool(self.time.size < 3 or np.abs(self.time - even).max() <= _JITTER * (even[1] - even[0]))
 
 
 def read_mot(path: str | Path) -> TimeTable:

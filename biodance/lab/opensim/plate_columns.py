@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.lab.markers.time_axis import time_axis
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.opensim.mot import TimeTable
 from biodance.lab.plates.decode import find_baseline
@@ -80,11 +81,12 @@ def plates_of(table: TimeTable, *, where: str) -> tuple[tuple[Plate, ...], tuple
     rows, warnings = _in_newton_metres(rows)
     turn, sign, decided = _upright(np.sum([one.force.mean(axis=0) for one in rows.values()], axis=0))
     rows = {name: _zeroed(one, table.time, turn) for name, one in rows.items()}
-    time, raw, stepped = _equal_steps(table, {name: one.wrench for name, one in rows.items()})
-    history = [*table.history, *stepped, *decided]
+    axis = time_axis(table.time, where=where)
+    raw = {name: axis.at(one.wrench) for name, one in rows.items()}
+    history = [*table.history, *([axis.said] if axis.said else []), *decided]
     plates = []
     for number, (name, value) in enumerate(raw.items(), start=1):
-        wrench = Wrench(time, sign * np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T]))
+        wrench = Wrench(axis.time, sign * np.hstack([value[:, :3] @ turn.T, value[:, 3:] @ turn.T]))
         cop = wrench.cop(height=_height(rows[name], turn), threshold=COP_FORCE)
         if np.isnan(cop).all():
             history.append(
@@ -202,20 +204,6 @@ def _zeroed(rows: _Rows, time: Array, turn: Array) -> _Rows:
     )
     kept = replace(rows, force=rows.force - reads, torque=rows.torque - np.where(steady, torque, 0.0), zero=reads)
     return replace(kept, said=(*rows.said, said))
-
-
-def _equal_steps(table: TimeTable, raw: dict[str, Array]) -> tuple[Array, dict[str, Array], list[str]]:
-    """Return time (T,) with equal steps, the wrenches on it, and what was said: those of a table without equal steps
-    are interpolated linearly at its median time step.
-    """
-    time = table.time
-    if table.has_equal_steps:
-        return np.linspace(time[0], time[-1], time.size) if time.size else time, raw, []
-    step = float(np.median(np.diff(time)))
-    even = time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
-    said = f"The time steps are not equal: the forces were interpolated linearly to {1 / (even[1] - even[0]):.6g} Hz."
-    filled = {name: np.stack([np.interp(even, time, c) for c in value.T], axis=1) for name, value in raw.items()}
-    return even, filled, [said]
 
 
 def _upright(mean_force: Array) -> tuple[Array, float, list[str]]:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from biodance.errors import FileRefused, TrialRefused
 from biodance.lab.markers.gaps import unseen_at_origin
+from biodance.lab.markers.resampled import resampled
 from biodance.lab.markers.sets import recognise
-from biodance.lab.markers.upright import axis_to_head
+from biodance.lab.markers.time_axis import time_axis
+from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.plain_text import (
     COMMAS_READ,
@@ -30,7 +32,6 @@ from biodance.lab.plain_text import (
 from biodance.records import Array, Markers, Role, Source, Trial
 
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-_CLEARLY_TALLER = 1.3
 _HEADER_ROWS = 4
 _WIDEST = 50.0  # m, between the markers of one frame
 _NARROWEST = 0.05  # m, the same of a hand
@@ -41,7 +42,8 @@ _TIME_COLUMN_ROUNDING = 1e-3  # s, some programs write three decimals
 def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     """Return the trial of a .trc file: markers in metres, z up, NaN where a marker was not seen; no plates.
 
-    Frames that are left out in the file are given back as unseen, so that the time steps are equal.
+    Frames that are left out in the file are given back as unseen, so that the time steps are equal; where they change,
+    the markers are resampled on their own stamps (`time_axis`).
 
     Raises
     ------
@@ -65,9 +67,9 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
             f"{path}: the markers of one frame lie {spread:.2g} m apart in the unit {unit!r} of the header. Correct "
             f"the unit."
         )
-    time, xyz, timing = _equal_steps(numbers, raw_time, values * _METRES[unit], _rate(header, path), path)
+    seen, unseen = unseen_at_origin(values * _METRES[unit])
+    (time, xyz), timing = _equal_steps(tuple(names), numbers, raw_time, seen, _rate(header, path), path)
     warnings += timing
-    xyz, unseen = unseen_at_origin(xyz)
     history = [*[COMMAS_READ] * commas, f"Coordinates were read in {unit} and turned into m.", *unseen]
     if _is_z_up(Markers(tuple(names), time, xyz)):
         warnings.append(
@@ -207,16 +209,14 @@ def _spread(values: Array) -> float:
 
 
 def _equal_steps(
-    number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path
-) -> tuple[Array, Array, list[str]]:
-    """Return time (T,) with equal steps, the coordinates on it (NaN in frames left out), and warnings."""
-    if np.isnan(raw).any() or np.any(np.diff(raw) <= 0):
-        frame = int(np.argmax(np.isnan(raw))) if np.isnan(raw).any() else int(np.argmax(np.diff(raw) <= 0)) + 1
-        raise FileRefused(
-            f"{path}: the time column does not increase at frame {frame + 1} ({raw[frame]:g} s). Export the file again."
-        )
+    names: tuple[str, ...], number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path
+) -> tuple[tuple[Array, Array], list[str]]:
+    """Return time (T,) with equal steps and the coordinates on it, and warnings: frames left out by their numbers or
+    the declared rate are NaN, steps that change are resampled.
+    """
+    axis = time_axis(raw, where=str(path), row="frame")
     if raw.size == 1:
-        return raw, xyz, []
+        return (raw, xyz), []
     duration = raw[-1] - raw[0]
     for place in (number_of - number_of[0], np.rint((raw - raw[0]) * declared).astype(int)):
         step = duration / place[-1] if place[-1] > 0 else np.inf
@@ -224,10 +224,8 @@ def _equal_steps(
         if np.all(np.diff(place) > 0) and near.all():
             break
     else:
-        raise FileRefused(
-            f"{path}: the time column has no equal steps and does not fit the DataRate of {declared:g} Hz. Correct the "
-            "rate in the header or export the file again."
-        )
+        markers, unseen = resampled(names, xyz, axis)
+        return (markers.time, markers.xyz), [axis.said, *unseen]
     warnings = []
     rate = declared
     if abs(1 / (step * declared) - 1) > _TIME_COLUMN_ROUNDING / duration + 1e-6:
@@ -237,27 +235,10 @@ def _equal_steps(
     full[place] = xyz
     if len(full) > raw.size:
         warnings.append(f"{len(full) - raw.size} frames are left out in the file; they count as not seen.")
-    return raw[0] + np.arange(len(full)) / rate, full, warnings
+    return (raw[0] + np.arange(len(full)) / rate, full), warnings
 
 
 def _is_z_up(markers: Markers) -> bool:
     """Return whether z is up in the file: by the labels of high and low markers, else by where the cloud is tall."""
     axis = axis_to_head(markers, recognise(markers.names))
     return body_is_tall_along_z(markers.xyz) if axis is None or axis[0] else bool(axis[2])
-
-
-def body_is_tall_along_z(xyz: Array) -> bool:
-    """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
-
-    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
-    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
-    False.
-    """
-    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
-    if seen.shape[1] < 2:
-        return False
-    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
-    if not len(frames):
-        return False
-    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
-    return bool(extent[2] > _CLEARLY_TALLER * extent[1])

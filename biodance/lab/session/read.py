@@ -12,6 +12,7 @@ from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.markers.guess import dress
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.markers.still import is_still, movement
+from biodance.lab.plates.one_place import one_place
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.archive import visit_date
@@ -160,6 +161,8 @@ def read_session(
     trials = _settle_static(each_once(trials, notes), file_says, reasons, notes)
     trials, strangers = of_one_person(trials, file_says.subject)
     refused |= strangers
+    trials, placed = one_place(trials)
+    notes += placed
     if marker_set is None:
         trials, guessed = dress(trials)
         notes += guessed

@@ -60,7 +60,7 @@ def _static_quality(trial: Trial) -> tuple[int, float]:
     return int(trial.markers.seen.any(axis=0).sum()), -movement(trial.markers)
 
 
-TEXT = (".txt", ".csv")
+TEXT = (".txt", ".csv", ".tsv")
 """Extensions that notes and tables for people have, too: there the content decides."""
 RESULTS = ("results.json", "report.html", "results.partial.json")
 """Files by which a folder with results of biodance is known."""

@@ -9,7 +9,7 @@ from typing import Literal
 
 from biodance.lab.markers.still import standing_mass
 from biodance.lab.session.file import SubjectEntry
-from biodance.lab.session.stature import stature_of_markers
+from biodance.lab.session.stature import stature_of_markers, stature_of_movement
 from biodance.records import Subject, Trial
 from biodance.settings import CheckLimits
 
@@ -150,7 +150,9 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
 
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) by the markers of a static trial; NaN if none tells it."""
+    """Return the stature (m) by the markers of a static trial, without one by those of the tallest moving trial; NaN if
+    none tells it.
+    """
     for trial in (t for t in trials if t.role == "static"):
         stature, sd, told_by = stature_of_markers(trial)
         if LEGAL_STATURE[0] <= stature <= LEGAL_STATURE[1]:
@@ -159,11 +161,20 @@ def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
                 f"heights over the ankles of {told_by} in {trial.name}."
             )
             return stature
+    moving = [(*stature_of_movement(t), t.name) for t in trials if t.role != "static"]
+    known = [one for one in moving if LEGAL_STATURE[0] <= one[0] <= LEGAL_STATURE[1]]
+    if not known:
+        notes.append(
+            "The stature is not known: it is not declared and neither a static trial nor anybody upright tells it. Set "
+            "height_m in session.toml."
+        )
+        return math.nan
+    stature, sd, told_by, name = max(known)
     notes.append(
-        "The stature is not known: it is not declared and no upright static trial tells it. Set height_m in "
-        "session.toml."
+        f"The stature was not declared: {stature:.2f} m (standard deviation {sd:.2f} m) were guessed from the heights "
+        f"over the ankles of {told_by} while the person is upright in {name}: no static trial tells it."
     )
-    return math.nan
+    return stature
 
 
 def _declared_sex(sources: Mapping[str, Mapping[str, float]]) -> Literal["F", "M"] | None:

@@ -1,0 +1,142 @@
+"""The time of a recording whose rows carry stamps: equal steps are taken as such, changing ones are resampled on their
+own stamps, and what that costs is said. One place for tables, .trc and .mot; C3D holds a rate and no stamps.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from biodance.errors import FileRefused
+from biodance.records import Array, Index, Mask, runs
+
+ROUNDED = 0.2
+"""Share of a step by which a stamp may lie off equal steps: writers round the time column."""
+_HOLE = 2.5
+"""Steps between two stamps from which on nothing is told between them: one row is missing at two."""
+_DRAWN = 16
+LONGEST_STEP = 0.2
+"""s: rows farther apart are postures. Below 5 Hz a movement of 2 Hz, the fastest that a person repeats with the whole
+body, cannot be told (Nyquist).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class TimeAxis:
+    """``stamps`` (S,) s as recorded; ``time`` (T,) s with equal steps on which the recording is given; ``sampled``
+    whether values must be interpolated for that (``at``); ``said`` what was decided, "" for equal steps.
+    """
+
+    stamps: Array
+    time: Array
+    sampled: bool
+    said: str = ""
+
+    def from_zero(self) -> "TimeAxis":
+        """Return the same axis with its first time at 0."""
+        first = self.time[0] if self.time.size else 0.0
+        return replace(self, stamps=self.stamps - first, time=self.time - first)
+
+    def at(self, values: Array) -> Array:
+        """Return ``values`` (S, ...) on ``time``, by cubic splines between samples that are known; NaN where one of the
+        two neighbours is not, or where they lie more than 2.5 steps apart.
+        """
+        if not self.sampled:
+            return values
+        columns = values.reshape(len(values), -1)
+        out = np.full((self.time.size, columns.shape[1]), np.nan)
+        known = np.isfinite(columns)
+        whole = known.all(axis=0)
+        groups = [np.flatnonzero(whole), *([k] for k in np.flatnonzero(~whole))]
+        for group in map(np.asarray, groups):
+            if group.size:
+                self._interpolate(columns, known[:, group[0]], group, out)
+        return out.reshape(self.time.size, *values.shape[1:])
+
+    def _interpolate(self, columns: Array, known: Mask, group: Index, out: Array) -> None:
+        """Write the ``group`` of ``columns`` (S, C) that share what is ``known`` (S,) into ``out`` (T, C)."""
+        from scipy.interpolate import make_interp_spline
+
+        for start, stop in _pieces(self.stamps, known):
+            stamps = self.stamps[start:stop]
+            inside = (self.time >= stamps[0]) & (self.time <= stamps[-1])
+            if stamps.size > 1 and inside.any():
+                spline = make_interp_spline(stamps, columns[start:stop, group], k=min(3, stamps.size - 1))
+                out[np.ix_(inside, group)] = spline(self.time[inside])
+
+    @property
+    def noise(self) -> float:
+        """Factor on the standard deviation of white noise, as drawn noise (fixed seed, known to 1 %) comes out."""
+        drawn = np.random.default_rng(0).normal(size=(self.stamps.size, _DRAWN))
+        return float(np.nanstd(self.at(drawn)))
+
+    def missed_by(self, values: Array) -> float:
+        """Return by how much (RMS, unit of ``values`` (S, ...)) a sample left out is missed by the cubic through the
+        two before and the two behind it: no less than the error between samples, which are half as far apart; NaN where
+        nothing is told.
+        """
+        if self.stamps.size < 5 or not self.sampled:
+            return float("nan")
+        columns = values.reshape(len(values), -1)
+        around = np.stack([self.stamps[k : self.stamps.size - 4 + k] for k in (0, 1, 3, 4)])
+        at = self.stamps[2:-2]
+        expected = np.zeros_like(columns[2:-2])
+        for k, shift in enumerate((0, 1, 3, 4)):
+            others = np.delete(around, k, axis=0)
+            weight = np.prod((at - others) / (around[k] - others), axis=0)
+            expected += weight[:, None] * columns[shift : len(columns) - 4 + shift]
+        inner = np.ptp(around, axis=0) < 4 * _HOLE * np.median(np.diff(self.stamps))
+        off = (expected - columns[2:-2])[inner]
+        return float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else float("nan")
+
+
+def time_axis(stamps: Array, *, where: str, row: str = "row") -> TimeAxis:
+    """Return the time axis of rows with ``stamps`` (S,) s; ``row`` is what the file calls one.
+
+    Stamps within a fifth of a step of equal steps are equal steps, rounded. Others are resampled at their median step;
+    single rows at an end, before or behind a hole of more than 2.5 steps, are left out. Rows
+    more than 0.2 s apart are single postures: they are kept as they are, on equal steps.
+
+    Raises
+    ------
+    FileRefused
+        ``where``: a stamp is no number, or they do not increase.
+    """
+    bad = np.isnan(stamps)
+    if bad.any() or np.any(np.diff(stamps) <= 0):
+        at = int(np.argmax(bad)) if bad.any() else int(np.argmax(np.diff(stamps) <= 0)) + 1
+        raise FileRefused(
+            f"{where}: the time does not increase at {row} {at + 1} ({stamps[at]:g} s). Export the file again."
+        )
+    if stamps.size < 2:
+        return TimeAxis(stamps, stamps, False)
+    even = np.linspace(stamps[0], stamps[-1], stamps.size)
+    if np.abs(stamps - even).max() <= ROUNDED * (even[1] - even[0]):
+        return TimeAxis(stamps, even, False)
+    step = float(np.median(np.diff(stamps)))
+    if step > LONGEST_STEP:
+        said = f"{_varying(stamps)}: too far apart to tell a movement between rows. Each was kept as a posture."
+        return TimeAxis(stamps, stamps[0] + step * np.arange(stamps.size), False, said)
+    pieces = [(a, b) for a, b in _pieces(stamps, np.ones(stamps.size, dtype=bool)) if b - a > 1]
+    first, last = pieces[0][0], pieces[-1][1] - 1
+    kept = stamps[first : last + 1]
+    time = kept[0] + step * np.arange(int((kept[-1] - kept[0]) / step + 1e-6) + 1)
+    lone = stamps.size - kept.size
+    cut = f" {lone} row{'s' * (lone > 1)} apart from the others at the ends left out." if lone else ""
+    said = f"{_varying(kept)}: the rows were resampled at {1 / step:.4g} Hz by cubic splines on their own stamps.{cut}"
+    return TimeAxis(stamps, time, True, said)
+
+
+def _varying(stamps: Array) -> str:
+    low, middle, high = 1000 * np.percentile(np.diff(stamps), [0, 50, 100])
+    return f"The time steps are not equal ({low:.2g} to {high:.3g} ms, half of them below {middle:.3g})"
+
+
+def _pieces(stamps: Array, known: Mask) -> list[tuple[int, int]]:
+    """Return the runs (start, stop) of ``known`` samples (S,) without a hole between their stamps."""
+    holes = np.flatnonzero(np.diff(stamps) > _HOLE * np.median(np.diff(stamps))) + 1
+    found: list[tuple[int, int]] = []
+    for start, stop in runs(known):
+        cuts = [start, *holes[(holes > start) & (holes < stop)].tolist(), stop]
+        found += pairwise(cuts)
+    return found

@@ -1,0 +1,286 @@
+"""The force plates of a table: units by the labels or by what they weigh, the sign by the weight, the place by
+session.toml, else by the feet on them.
+
+A table says three forces and three moments, and neither about which point nor along which axes. They are taken along
+the axes of the markers. Where the pressures that follow lie under the feet, the moments are about the lab's origin;
+where they lie elsewhere and a single plate carries everything, about its own, which is put where the feet stand.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from biodance.lab.markers.sets import MarkerSet, landmark
+from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.decode import find_baseline
+from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
+from biodance.lab.plates.told import NOTHING_TOLD, Told, ToldPlate
+from biodance.records import SIDES, Array, Markers, Mask, Plate, Wrench
+from biodance.settings import COP_FORCE, STANDARD_GRAVITY
+from biodance.spatial import wrench_about_origin
+
+_PERSON = (50.0, 4000.0)
+"""N that the mean load on plates can be: a child of 5 kg to 400 kg."""
+_FARTHEST = 20.0
+"""m from the point of the moments that a pressure can lie; farther, the moments are in N·mm."""
+_SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
+_UNDER = 0.25
+"""m between pressure and feet up to which they belong together: a foot's length."""
+_MARGIN = 0.15
+"""m that a foot reaches beyond its markers and pressures."""
+_FLAT = 0.03
+"""m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
+_SINKS = 0.02
+"""m by which the mean marker may be lower than when the person stands as high as ever: who squats or bends leans."""
+_PRESSED = 0.58
+"""Share of the way from heel to toe marker at which the pressure of somebody who stands lies: 12 people of 4
+laboratories on plates of known place, 13 mm before the middle, sd 13 mm along the feet and 8 mm across.
+"""
+PLACE_SD = 0.013
+"""m along the feet, the same 12 people: what their way of leaning leaves open."""
+
+
+class Load(NamedTuple):
+    """What a table holds of one plate: ``columns`` as it calls them, ``value`` (S, 6) N and N·m as written."""
+
+    columns: str
+    value: Array
+
+
+@dataclass(frozen=True)
+class TablePlates:
+    """The plates of a table, what was decided, and what a person should look at."""
+
+    plates: tuple[Plate, ...] = ()
+    history: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def loads_of(
+    groups: Sequence[tuple[int, ...]], labels: Sequence[str], units: Sequence[str], values: Array
+) -> tuple[list[Load], str]:
+    """Return the load on every plate in N and N·m, and the sentence that says in which units it was written.
+
+    A unit is that of the labels, else the one in which the load can be a person's and the pressure in a room.
+    """
+    if not groups:
+        return [], ""
+    force = plain_unit(next((units[k] for group in groups for k in group[:3] if units[k]), ""))
+    moment = plain_unit(next((units[k] for group in groups for k in group[3:] if units[k]), ""))
+    by_label = ", as the labels say" if force in FORCE and moment in MOMENT else ""
+    total = np.sum([values[:, list(group[:3])] for group in groups], axis=0)
+    size = float(np.linalg.norm(np.nanmean(total, axis=0)))
+    if force not in FORCE:
+        force = next((unit for unit in ("n", "kn") if _PERSON[0] <= size * FORCE[unit] <= _PERSON[1]), "n")
+    if moment not in MOMENT:
+        moment = "nmm" if _arm(groups, values) > _FARTHEST * FORCE[force] else "nm"
+    factors = [FORCE[force]] * 3 + [MOMENT[moment]] * 3
+    loads = [Load(f"{labels[group[0]]} ... {labels[group[-1]]}", values[:, list(group)] * factors) for group in groups]
+    weight = size * FORCE[force]
+    return loads, (
+        f"Forces were read in {_SPELLED.get(force, force)}, moments in {_SPELLED.get(moment, moment)}{by_label}: the "
+        f"mean force is {weight:.0f} N, the weight of {weight / STANDARD_GRAVITY:.1f} kg."
+    )
+
+
+def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
+    """Return the median horizontal moment over the force, in the units of the table; 0 without load."""
+    moment, force = (
+        np.concatenate([np.linalg.norm(values[:, list(group[part])], axis=1) for group in groups])
+        for part in (slice(3, 5), slice(0, 3))
+    )
+    loaded = force > 0.1 * np.nanmax(force, initial=0.0)
+    return float(np.nanmedian(moment[loaded] / force[loaded])) if loaded.any() else 0.0
+
+
+def table_plates(
+    loads: Sequence[Load], time: Array, turn: Array, markers: Markers, worn: MarkerSet | None, told: Told
+) -> TablePlates:
+    """Return the plates of a table in the lab frame, ground on subject.
+
+    ``loads`` on ``time`` (T,) s, with the wrench in the axes of the file; ``turn`` (3, 3) lab_R_file; ``markers`` (m,
+    z up) of the same table, which may have another time; ``worn`` the marker set; ``told`` what session.toml says of
+    the plates, by ``plate1`` ... in the order of the columns.
+    """
+    said = [told.plates.get(f"plate{number}", NOTHING_TOLD) for number in range(1, len(loads) + 1)]
+    history = [f"plate{n} was left out, as session.toml says." for n, one in enumerate(said, 1) if not one.use]
+    used = [(n, load, one) for n, (load, one) in enumerate(zip(loads, said, strict=True), 1) if one.use]
+    placed = [_at_corners(n, load, one.corners, time) for n, load, one in used if one.corners is not None]
+    free = [(n, load) for n, load, one in used if one.corners is None]
+    if free:
+        feet = _feet(markers, worn)
+        done = _by_feet(free, time, turn, feet)
+        placed += done.plates
+        history += done.history
+        if done.warnings:
+            return TablePlates(tuple(placed), tuple(history), done.warnings)
+    plates = sorted((_told(plate, told.plates.get(plate.name, NOTHING_TOLD)) for plate in placed), key=_number)
+    idle = [f"{n}: {', '.join(keys)}" for n, keys in _idle(told).items()]
+    warnings = [f"{one} of session.toml can be followed in C3D files only." for one in idle]
+    return TablePlates(tuple(plates), tuple(history), tuple(warnings))
+
+
+def _idle(told: Told) -> Mapping[str, list[str]]:
+    found = {name: [key for key in one.keys if key not in ("corners_m", "foot")] for name, one in told.plates.items()}
+    return {name: keys for name, keys in found.items() if keys}
+
+
+def _number(plate: Plate) -> int:
+    return int(plate.name.removeprefix("plate"))
+
+
+def _told(plate: Plate, said: ToldPlate) -> Plate:
+    sentences = (*plate.decisions, *([said.sentence[0].upper() + said.sentence[1:]] if said.sentence else []))
+    return replace(plate, foot=said.foot, decisions=sentences)
+
+
+def _upright(value: Array) -> tuple[Array, str]:
+    """Return the wrench (T, 6) as the ground's action on the subject, and the sentence that says so."""
+    if np.nanmean(value[:, 2]) >= 0:
+        return value, "Sign: the mean force points up, so the table holds the action of the ground; it was kept."
+    return -value, "Sign: the mean force points down, so the table holds the load on the plate; all of it was turned."
+
+
+def _zeroed(value: Array, time: Array) -> tuple[Array, Array, str]:
+    """Return the wrench less what the empty plate reads, that force (3,) N, and the sentence about it."""
+    known = np.isfinite(value).all(axis=1)
+    if time.size < 2 or not known.all():
+        return value, np.zeros(3), "Zero: nothing was subtracted."
+    window = find_baseline(value[:, 2], zero=None, rate=1 / float(np.median(np.diff(time))))
+    said = re.sub(r"the file names no window \(ZERO is missing\)\. ?", "", window.said)
+    if window.stop <= window.start:
+        return value, np.zeros(3), said
+    reads = value[window.start : window.stop].mean(axis=0)
+    return value - reads, reads[:3], said
+
+
+def _at_corners(number: int, load: Load, corners: Array, time: Array) -> Plate:
+    """Return the plate whose ``corners`` (4, 3) m are told: wrench along its own axes, about its centre."""
+    axes, centre = plate_axes(corners), corners.mean(axis=0)
+    turned = np.hstack([load.value[:, :3] @ axes.T, load.value[:, 3:] @ axes.T])
+    turned, zero, zeroed = _zeroed(turned, time)
+    signed, said = _upright(turned)
+    wrench = Wrench(time, wrench_about_origin(signed, centre))
+    about = f"Columns {load.columns}, along the plate's own axes and about the centre of its corners."
+    return Plate(f"plate{number}", 0, corners, wrench, (about, zeroed, said), zero, columns=load.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _Feet:
+    """Where the feet are: ``middle`` (F, 2) m where those on the ground are pressed at ``time`` (F,), NaN while none
+    is; ``standing`` (F,) whether both are and the person stands as high as ever.
+    """
+
+    time: Array
+    middle: Array
+    standing: Mask
+
+
+def _feet(markers: Markers, worn: MarkerSet | None) -> _Feet | None:
+    """Return where the feet are by their heels and toes; None where the labels do not tell these."""
+    if worn is None:
+        return None
+    ends = [[landmark(markers, worn, f"{side}_{end}") for end in ("heel", "toe")] for side in SIDES]
+    if any(end is None for foot in ends for end in foot):
+        return None
+    places = np.array(ends, dtype=float)  # (side, end, T, 3)
+    lowest = np.nanpercentile(places[..., 2], 5, axis=2, keepdims=True)
+    down = (places[..., 2] < lowest + _FLAT).all(axis=1)  # (side, T)
+    pressed = (1 - _PRESSED) * places[:, 0, :, :2] + _PRESSED * places[:, 1, :, :2]
+    foot = np.where(down[..., None], pressed, np.nan)
+    middle = np.where(down.all(axis=0)[:, None], foot.mean(axis=0), np.where(down[0][:, None], foot[0], foot[1]))
+    both = down.all(axis=0)
+    height = np.nanmean(markers.xyz[..., 2], axis=1) if both.any() else np.zeros(both.size)
+    upright = height > np.nanpercentile(height[both], 95) - _SINKS if both.any() else both
+    return _Feet(markers.time, middle, both & upright)
+
+
+def _pressure(value: Array) -> Array:
+    """Return the centre of pressure (T, 2) m about the point of the moments; NaN without load."""
+    vertical = value[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cop = np.stack([-value[:, 4] / vertical, value[:, 3] / vertical], axis=1)
+    return np.where((np.abs(vertical) >= COP_FORCE)[:, None], cop, np.nan)
+
+
+def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> TablePlates:
+    """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
+    turned = [np.hstack([load.value[:, :3] @ turn.T, load.value[:, 3:] @ turn.T]) for _, load in free]
+    zeroed = [_zeroed(value, time) for value in turned]
+    signed = [_upright(value) for value, _, _ in zeroed]
+    total = np.sum([value for value, _ in signed], axis=0)
+    shift = None if feet is None else _shift(total, time, feet)
+    if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
+        return TablePlates(warnings=(_lacking([n for n, _ in free], feet, shift),))
+    own = float(np.linalg.norm(shift)) > _UNDER
+    at, about = (np.array([*shift, 0.0]), _put(shift)) if own else (np.zeros(3), _ABOUT_THE_ORIGIN)
+    plates, history = [], []
+    for (number, load), (value, said), (_, zero, empty) in zip(free, signed, zeroed, strict=True):
+        wrench = Wrench(time, wrench_about_origin(value, at))
+        cop = wrench.cop()[:, :2]
+        if not np.isfinite(cop).any():
+            history.append(f"plate{number} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out.")
+            continue
+        decisions = (f"Columns {load.columns}, along the axes of the markers.", empty, said, about)
+        corners = _around(np.concatenate([cop, feet.middle]) if own and feet is not None else cop)
+        name, put = f"plate{number}", shift if own else None
+        plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
+    return TablePlates(tuple(plates), tuple(history))
+
+
+_ABOUT_THE_ORIGIN = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."
+
+
+def _put(shift: Array) -> str:
+    """Say where a plate was put by the feet, at ``shift`` (2,) m."""
+    return (
+        f"Place: the table does not say it. The moments are not about the lab's origin (the pressure would lie "
+        f"{np.linalg.norm(shift):.2f} m beside the feet), so they are about the plate's own point, which was put at "
+        f"({shift[0]:.3f}, {shift[1]:.3f}, 0) m, where the pressure lies under the feet as people stand: known "
+        f"to {1000 * PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
+    )
+
+
+def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
+    """Return the median (2,) m by which the feet on the ground lie beside the pressure, while the person stands upright
+    on both where that is seen. None where no foot is on the ground under load.
+    """
+    known = np.isfinite(_pressure(total)).all(axis=1)
+    if known.sum() < 1:
+        return None
+    pressure = np.stack([np.interp(feet.time, time[known], axis[known]) for axis in _pressure(total).T], axis=1)
+    beside = feet.middle - pressure
+    told = np.isfinite(beside).all(axis=1)
+    best = told & feet.standing if (told & feet.standing).any() else told
+    return np.asarray(np.median(beside[best], axis=0)) if best.any() else None
+
+
+def _around(points: Array) -> Array:
+    """Return the corners (4, 3) m around points (n, 2) on the floor, counter-clockwise seen from above."""
+    (x0, y0), (x1, y1) = np.nanmin(points, axis=0) - _MARGIN, np.nanmax(points, axis=0) + _MARGIN
+    return np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
+
+
+def _lacking(numbers: Sequence[int], feet: _Feet | None, shift: Array | None) -> str:
+    """Say why plates of a table cannot be placed, and what to write."""
+    names = ", ".join(f"plate{n}" for n in numbers)
+    if feet is None:
+        why = "no heels and toes are known among the markers that could show it"
+    elif shift is None:
+        why = "nobody stands on them with a foot on the ground"
+    else:
+        why = (
+            f"with moments about the lab's origin the pressure lies {np.linalg.norm(shift):.2f} m beside the feet, and "
+            f"of several plates these do not tell which is where"
+        )
+    tables = " ".join(
+        f"[plates.plate{n}] corners_m = [[x, y, 0], [x, y, 0], [x, y, 0], [x, y, 0]]" for n in numbers[:2]
+    )
+    return (
+        f"The table does not say where {names} lie{'s' * (len(numbers) == 1)}, and {why}: no force was read. Write the "
+        f"corners in m in the lab frame, in the order +x+y, -x+y, -x-y, +x-y of the plate's axes, into session.toml: "
+        f"{tables}."
+    )
