@@ -14,14 +14,14 @@ from scipy.special import logsumexp
 from biodance.diagnosis.candidates import changes
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
-from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.reasons import Reason
 from biodance.effects import unit_at
 from biodance.effects.toe_landmark import ToeLandmark
+from biodance.inference.causes import NamedCause, cause_key
 from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, Rows
 from biodance.inference.scales import SOFT, prior_sd
-from biodance.inference.sets import Hypothesis, Posterior, Search, cause_key, hypothesis
+from biodance.inference.sets import UNKNOWN, Hypothesis, Posterior, Search, hypothesis
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
 from biodance.witnesses import LANDMARK, shift_per_sd
@@ -138,7 +138,7 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     resembled = [f for p, f in every if SUGGESTED <= p.probability < NAMED and _told(rows, p.cause)]
     small = [f for p, f in every if p.probability >= SUGGESTED and not _told(rows, p.cause)]
     left = adequacy(best, rows) if rows.problem is not None else ()
-    unknown = posterior.unknown >= 0.5 and any(row.matters and row.z > 0 for row in left)
+    unknown = posterior.unknown >= UNKNOWN and any(row.matters and row.z > 0 for row in left)
     why = dict(bare.why) | dict.fromkeys(_strange(best, rows) if unknown or named else (), ())
     why |= {Reason.FORCES_LEFT: ()} if unknown else {}
     verdict: Verdict = "unexplained" if unknown else "nothing wrong"

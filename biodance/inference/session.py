@@ -13,12 +13,13 @@ from biodance.diagnosis.observability import detection_limits, hidden, visibilit
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import WitnessEvidence
-from biodance.effects import Case, Cause, Effect
+from biodance.effects import Case, Cause, Effect, Transient
+from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
 from biodance.inference.left import adequacy
 from biodance.inference.rows import observed_causes, rows_of
 from biodance.inference.scales import fit, nominal, prior_sd, products
-from biodance.inference.sets import Search, hypothesis, infer, with_unknown
+from biodance.inference.sets import Hypothesis, Search, hypothesis, infer, with_unknown
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
@@ -79,12 +80,18 @@ def judge(
         causes = observed_causes(evidence, asked)
         rows = rows_of(None, causes, known, evidence)
     search = Search.of(rows, causes)
-    found = decide(search, infer(search), bare)
+    found = decide(search, infer(search, _contacts if rows.problem is not None else lambda _search, _base: ()), bare)
     sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
     if sign:  # what all other causes do holds only once the sign is mended
         told = replace(found.diagnosis, findings=sign, verdict="named, incomplete")
         found = replace(found, diagnosis=told, named=())
     return found if rows.problem is not None else replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
+
+
+def _contacts(search: Search, base: Hypothesis) -> tuple[Hypothesis, ...]:
+    """Return the hypotheses that add a contact which comes and goes."""
+    kinds = [one.effect for one in search.causes if isinstance(one.effect, Transient)]
+    return with_contacts(search, base, kinds) if kinds else ()
 
 
 def is_moving(case: Case) -> bool:

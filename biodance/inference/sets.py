@@ -8,7 +8,7 @@ channel: one more member of every set.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,14 +17,14 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
-from biodance.diagnosis.model import NamedCause, unlike
 from biodance.effects import Effect
+from biodance.inference.causes import NamedCause, cause_key, unlike
 from biodance.inference.rows import Rows
 from biodance.inference.scales import Curvature, Fit, Products, Scales, fit, nominal, prior_sd, products, widened
 from biodance.records import Array
 
-P_UNKNOWN = 0.1
-"""Probability of an unknown cause in a session, before any data; those of causes stand in their effects
+P_UNKNOWN, UNKNOWN = 0.1, 0.5
+"""Probability of an unknown cause in a session, before any data, and from which there is one; those of causes stand in their effects
 (`Effect.prior`).
 """
 MOST, _REFINED, _BRANCHES = 3, 6, 2
@@ -38,11 +38,6 @@ _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which a cause is not fitted, and by how much a set may lie behind the best and be widened."""
 _FELT = 0.05
 """Square of a whitened column below which it changes nothing."""
-
-
-def cause_key(one: NamedCause) -> tuple[str, str]:
-    """Return effect and target of a cause."""
-    return one.effect.name, one.effect.target
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,14 +170,24 @@ class Search:
         return self.start.curvature(len(self.rows.groups))
 
 
-def infer(search: Search) -> Posterior:
-    """Return the posterior over sets of causes. Where an unknown cause is more probable than none, the simulation
-    is as far off everywhere as it is there: names are then sought at that noise.
+Further = Callable[[Search, Hypothesis], tuple[Hypothesis, ...]]
+"""What else may be added to a hypothesis where the steady causes leave an unknown one."""
+
+
+def infer(search: Search, further: Further = lambda _search, _base: ()) -> Posterior:
+    """Return the posterior over sets of causes. Where an unknown cause is more probable than none, ``further`` causes
+    are added to the best set and to none; where they do not explain it, the simulation is as far off everywhere as it
+    is there: names are then sought at that noise.
     """
     found = _searched(search)
+    if found.unknown >= UNKNOWN:
+        bare = next(one for one in found.hypotheses if not one.causes)
+        bases = dict.fromkeys((bare, found.best))
+        more = tuple(with_unknown(new) for base in bases for new in further(search, base))
+        found = replace(found, hypotheses=(*found.hypotheses, *more))
     for _ in range(_AGAIN):
         best = found.best
-        if found.unknown < 0.5:
+        if found.unknown < UNKNOWN:
             break
         square, count = energies(best)
         louder = best.fit.scales.noise + 0.5 * float(np.log(square[count > 0].max()))

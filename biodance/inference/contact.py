@@ -1,0 +1,222 @@
+"""Contacts that come and go, such as a touch of a rail or a helping hand: one more kind of cause, with a course of its
+own in every trial, sought where the steady causes leave an unknown one.
+
+Three of the six channels remain unconstrained by a force at one point, so that it cannot explain everything. A touch
+keeps to one side of its main direction, and takes hold and lets go quickly: what swells and creeps back is none.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solve, solve_triangular
+
+from biodance.diagnosis.candidates import local_basis
+from biodance.effects import Transient
+from biodance.inference.causes import NamedCause, cause_key
+from biodance.inference.rows import Rows
+from biodance.inference.scales import posterior, prior_sd, widened
+from biodance.inference.sets import Hypothesis, Search
+from biodance.records import Array
+
+SIZES = (2.0, 8.0, 30.0)
+"""Standard deviations of the course before the data (units of the parameter): the most probable one is taken."""
+OTHER_SIDE = 0.2
+"""Share of its squares that a touch may lie on the other side."""
+_QUICK, _END = 0.2, 2
+"""Share of its squares that the steps between values 0.4 s apart hold at least in a touch, and values at the ends of a
+trial that are not asked. A touch of d seconds has 0.8 s / d where it takes hold at once, half of that where it takes
+0.8 s; what creeps back with a time constant T has (0.4 s / T)². Seen: touches of 1.6 s 0.57 to 0.69, creep 0.04 to
+0.08.
+"""
+_BESIDE = 0.1
+"""m, standard deviation before the data of the place of a touch from the far end of its segment: a hand's length."""
+_STEPS = 2
+"""Gauss-Newton steps of a place and the course of the force together."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Touch:
+    """One contact: whitened unit columns ``Z`` (r, k), their ``score`` (k,) and ``information`` (k, k), its most
+    probable ``size`` and its ``log_bayes_factor`` there.
+    """
+
+    effect: Transient
+    Z: Array
+    score: Array
+    information: Array
+    size: float
+    log_bayes_factor: float
+
+    @property
+    def spread(self) -> Array:
+        """(k, k) posterior covariance of the course, per unit of its size."""
+        return np.asarray(np.linalg.inv(np.eye(len(self.score)) + self.size**2 * self.information))
+
+    @property
+    def course(self) -> Array:
+        """(k,) posterior mean of the course."""
+        return np.asarray(self.size**2 * self.spread @ self.score)
+
+
+def with_contacts(search: Search, base: Hypothesis, kinds: Sequence[Transient]) -> tuple[Hypothesis, ...]:
+    """Return the hypotheses that add a contact to ``base``: of each of the ``kinds`` that is touched as hands and feet
+    touch, the most probable one with its course.
+    """
+    found = [one for kind in kinds if (one := _touch_of(search.rows, base, kind)) is not None]
+    likely = sorted(found, key=lambda one: -one.log_bayes_factor)
+    best = next(((one, values) for one in likely[:2] if (values := _touching(search.rows, one)) is not None), None)
+    if best is None or best[0].log_bayes_factor <= 0:
+        return ()
+    return (_named(search, base, *best, len(kinds)),)
+
+
+def score(rows: Rows, base: Hypothesis, Z: Array) -> tuple[Array, Array]:
+    """Return score (k,) and information (k, k) of further whitened columns ``Z`` (r, k) beside a hypothesis."""
+    found, n = base.fit, rows.plates
+    weight = np.concatenate(
+        [np.full(n, np.exp(-2 * found.scales.noise)), np.ones(rows.simulated - n), found.scales.weights]
+    )
+    weighted = weight[:, None] * Z
+    cross = np.concatenate([rows.X.T @ weighted, base.Z.T @ weighted])
+    half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
+    return weighted.T @ base.left, Z.T @ weighted - half.T @ half
+
+
+def _columns(rows: Rows, effect: Transient) -> Array | None:
+    """Return the whitened columns (r, k) of a contact; None where it does not come and go."""
+    assert rows.problem is not None
+    own = local_basis(rows.problem, effect)
+    if own is None:
+        return None
+    simulated = rows.white(own.whole(rows.simulated))
+    return np.concatenate([simulated, np.zeros((len(rows.y) - rows.simulated, own.width))])
+
+
+def _touch_of(rows: Rows, base: Hypothesis, effect: Transient) -> _Touch | None:
+    """Return a contact with its most probable size."""
+    Z = _columns(rows, effect)
+    if Z is None:
+        return None
+    s, G = score(rows, base, Z)
+
+    def bayes(size: float) -> float:
+        inner = np.eye(len(s)) + size**2 * G
+        return float(0.5 * size**2 * s @ solve(inner, s, assume_a="pos") - 0.5 * np.linalg.slogdet(inner)[1])
+
+    value, size = max((bayes(size), size) for size in SIZES)
+    return _Touch(effect, Z, s, G, size, value)
+
+
+def _touching(rows: Rows, one: _Touch) -> Array | None:
+    """Return the values (n, p) over time of a contact's course, if it is that of something touched: on one side of zero
+    or, as the plate's zero and the body's weight take the mean of a trial from a foot, of where it lies most of the
+    time in its trial, if it is quick. None for one that is neither.
+    """
+    assert rows.problem is not None
+    values, beside, start = one.course.reshape(-1, len(one.effect.parameters)), [], 0
+    if one_sided(values):
+        return values
+    for case in rows.problem.cases:
+        columns = one.effect.local(case)
+        stop = start + (0 if columns is None else columns.shape[2] // values.shape[1])
+        beside.append(values[start:stop] - (np.median(values[start:stop], axis=0) if stop > start else 0.0))
+        start = stop
+    inner = [part[_END:-_END] for part in beside]  # nobody judges the ends of a trial: there the course is open
+    return np.concatenate(beside) if one_sided(np.concatenate(inner)) and quick(inner) else None
+
+
+def quick(courses: Sequence[Array]) -> bool:
+    """Return whether forces (n, 3) over time, one of each trial, take hold and let go as a hand or foot does: what
+    swells or creeps back does not.
+    """
+    steps = sum(float(np.sum(np.diff(course, axis=0) ** 2)) for course in courses)
+    return steps >= _QUICK * sum(float(np.sum(course**2)) for course in courses)
+
+
+def one_sided(course: Array) -> bool:
+    """Return whether a force (n, 3) over time keeps to one side of its main direction, as what is touched does; a
+    slow swell does not.
+    """
+    _, _, directions = np.linalg.svd(course, full_matrices=False)
+    along = course @ directions[0]
+    sides = np.sum(np.maximum(along, 0) ** 2), np.sum(np.minimum(along, 0) ** 2)
+    return bool(min(sides) <= OTHER_SIDE * sum(sides))
+
+
+def _named(search: Search, base: Hypothesis, one: _Touch, values: Array, kinds: int) -> Hypothesis:
+    """Return the hypothesis with the contact at the point of its segment that explains most, and its course there; as
+    its size the force while it acts: half of the squares of its ``values`` (n, p) belong to larger ones.
+    """
+    rows, effect, Z = search.rows, *_placed(search.rows, base, one)
+    wide = SIZES[-1] * Z  # widest: the most probable one would shrink short peaks
+    both = np.concatenate([base.Z, wide], axis=1)
+    found = posterior(widened(search.inner, rows, rows.X, both, base.y), prior_sd(rows), base.fit.scales)
+    course, count = SIZES[-1] * found.last(wide.shape[1])[0], len(effect.parameters)
+    square = np.sum(values**2, axis=1)
+    order = np.argsort(square)
+    k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
+    spread = one.size**2 * np.diag(one.spread).reshape(-1, count)[k]
+    touch = NamedCause(effect, values[k], np.diag(spread), _by_trial(rows, effect, course))
+    prior = effect.prior / kinds / len(SIZES)
+    value = base.log_posterior + one.log_bayes_factor + float(np.log(prior / (1 - prior)))
+    causes = (*(c for c in base.causes if cause_key(c) != cause_key(touch)), touch)
+    return Hypothesis(causes, rows, replace(found, products=search.inner), value, both, base.y)
+
+
+def _by_trial(rows: Rows, effect: Transient, course: Array) -> dict[str, Array]:
+    """Return the ``course`` (k,) cut by trials."""
+    assert rows.problem is not None
+    parts, start = {}, 0
+    for case in rows.problem.cases:
+        columns = effect.local(case)
+        width = 0 if columns is None else columns.shape[2]
+        parts[case.trial.name] = course[start : start + width]
+        start += width
+    return parts
+
+
+def _placed(rows: Rows, base: Hypothesis, one: _Touch) -> tuple[Transient, Array]:
+    """Return the contact at the point of its segment that explains most, with its whitened unit columns, by
+    Gauss-Newton steps of the point and the time course together. An error of a hand's length changes the moment by
+    several newton metres.
+    """
+    effect, Z, place, wide = one.effect, one.Z, np.zeros(3), SIZES[-1]
+    for _ in range(_STEPS):
+        course = wide * _mean(rows, base, wide * Z, np.zeros(Z.shape[1]))
+        both = np.concatenate([wide * Z, _BESIDE * _slopes(rows, effect, place, course)], axis=1)
+        place = _BESIDE * _mean(rows, base, both, np.append(np.zeros(Z.shape[1]), place / _BESIDE))[-3:]
+        there = effect.at_full_rate().beside(place)
+        columns = _columns(rows, there)
+        if columns is not None:
+            effect, Z = there, columns
+    return effect, Z
+
+
+def _mean(rows: Rows, base: Hypothesis, Z: Array, there: Array) -> Array:
+    """Return the posterior mean (k,) of the coefficients of further columns ``Z`` with unit normal priors, linearised
+    about ``there`` (k,).
+    """
+    s, G = score(rows, base, Z)
+    return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
+
+
+def _slopes(rows: Rows, effect: Transient, place: Array, course: Array) -> Array:
+    """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) with respect to its ``place``, per metre
+    and axis (the wrench is linear in it).
+    """
+    here, *there = (_felt(rows, effect.beside(place + step), course) for step in np.eye(4, 3, -1))
+    simulated = rows.white(np.stack([one - here for one in there], axis=1))
+    return np.concatenate([simulated, np.zeros((len(rows.y) - rows.simulated, 3))])
+
+
+def _felt(rows: Rows, effect: Transient, course: Array) -> Array:
+    """Return (r,): the rows of a contact with time course ``course`` (k,), split by trial."""
+    assert rows.problem is not None
+    samples = []
+    for case in rows.problem.cases:
+        columns = effect.local(case)
+        width = 0 if columns is None else columns.shape[2]
+        samples.append(np.zeros((case.motion.time.size, 6, 1)) if columns is None else columns @ course[:width, None])
+        course = course[width:]
+    return rows.problem.padded(rows.problem.spectrum.rows(tuple(samples))[:, :, 0])
