@@ -36,7 +36,7 @@ def load_curves(
     y' C y with y = sum(v Y): the axes of a joint are not independent.
     """
     near = (motion.time >= cycle.start - _BEYOND) & (motion.time <= cycle.end + _BEYOND)
-    fields = ("time", "q", "v", "a", "residual", "determined")
+    fields = ("time", "q", "v", "a", "residual", "determined", "state")
     motion, known = replace(motion, **{name: getattr(motion, name)[near] for name in fields}), known[near]
     ground = {
         f"{side}_foot": Wrench(motion.time, np.where(known[:, foot, None], feet[f"{side}_foot"].value[near], 0.0))

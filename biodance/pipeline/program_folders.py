@@ -33,7 +33,7 @@ from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run
+from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run, runs
 from biodance.version import __version__
 
 _DERIVED = "derivatives/biodance"
@@ -112,23 +112,34 @@ def _found(one: TrialResult, body: Body, place: Path, subject: str) -> None:
     assert one.motion is not None
     task, stem = bids_label(one.name), _stem(subject, one.name)
     about = {"TrackingSystemName": _SYSTEM, "Description": "joint angles and centre of mass of a tracked body"}
+    about["Missing"] = " ".join(state_notes(one.motion)) or "none"
     write_motion(place, f"{stem}_desc-joints", _joints(body, one.motion), task=task, about=about)
     events = [(e.time, f"{e.side}_{'strike' if e.down else 'off'}") for e in movement_of(one, body, None).events]
     write_events(place, f"{stem}_desc-feet", events)
 
 
 def _joints(body: Body, motion: Motion) -> BidsChannels:
-    angles = np.where(motion.determined[:, None], motion.angles, np.nan)
+    known = np.where(motion.determined[:, None], 1.0, np.nan)
     rows = [(joint.name, "n/a", "JNTANG", joint.name, "deg", "joint") for joint in body.joints]
     rows += [(f"centre_of_mass_{axis}", axis, "POS", "centre_of_mass", "m", "lab") for axis in COMPONENTS]
-    return BidsChannels(motion.time, np.hstack([angles, centre_of_mass(body, motion)]), rows)
+    return BidsChannels(motion.time, np.hstack([motion.known_angles, known * centre_of_mass(body, motion)]), rows)
 
 
 def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
-    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as
-    in ``body``.
+    """Return the coordinates of ``motion`` by name: rad and m, root in OpenSim's ground (y up), joints as in ``body``.
+
+    Frames whose posture the markers do not determine are left out: the format has no word for a missing number.
+    `state_notes` says which, and what is filled.
+
+    Raises
+    ------
+    TrialRefused
+        No frame is determined.
     """
-    names = [joint.name for joint in body.joints]
+    names, known = [joint.name for joint in body.joints], motion.determined
+    if not known.any():
+        raise TrialRefused(f"{body.name}: no frame's markers determine the posture, so there are no coordinates.")
+    motion = motion.at(known) if not known.all() else motion
     angles = motion.q[:, body.nq - len(names) :]
     if not body.n_root:
         return TimeTable(body.name, tuple(names), motion.time, angles)
@@ -136,6 +147,18 @@ def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
     turns = np.unwrap(Rotation.from_matrix(turned).as_euler("ZXY"), axis=0)
     root = [f"{body.segments[0]}_{word}" for word in (*ROOT_ROTATIONS, *ROOT_TRANSLATIONS)]
     return TimeTable(body.name, (*root, *names), motion.time, np.hstack([turns, motion.q[:, :3] @ UPRIGHT, angles]))
+
+
+def state_notes(motion: Motion) -> tuple[str, ...]:
+    """Return in sentences which frames of a motion are left out, and which angles are filled or held when."""
+    out = ", ".join(f"{motion.time[a]:.3f} to {motion.time[b - 1]:.3f} s" for a, b in runs(~motion.determined))
+    said = [f"Left out, because the markers do not determine the posture: {out}."] if out else []
+    where: dict[str, list[str]] = {}
+    for span in motion.spans():
+        inside = (motion.time >= span.start) & (motion.time <= span.end)
+        if motion.determined[inside].any():
+            where.setdefault(f"{span.start:.3f} to {span.end:.3f} s {span.state.words}", []).append(span.joint)
+    return (*said, *(f"From {when}: {', '.join(joints)}." for when, joints in where.items()))
 
 
 MODEL = "model.osim"
@@ -192,7 +215,8 @@ def write_opensim_folder(
 def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     motion, name = one.motion, one.name
     assert motion is not None
-    files = [write_mot(folder / f"{name}.mot", opensim_coordinates(body, motion)).name]
+    table, notes = opensim_coordinates(body, motion), state_notes(motion)
+    files = [write_mot(folder / f"{name}.mot", table, notes=notes).name]
     if one.trial.markers is not None:
         files.insert(0, write_trc(folder / f"{name}.trc", one.trial.markers).name)
     contact = contact_of(one.trial, one, body)

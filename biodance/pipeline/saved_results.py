@@ -29,7 +29,7 @@ SCALED = "scaled_body.json"
 """The same where nothing was identified: scaled, with the table's parameters; nobody's earlier body (``--body``)."""
 MOTIONS = "motions.npz"
 """File in which they keep the motions, and where the recordings lie."""
-_ARRAYS = ("time", "q", "v", "a", "residual", "determined")
+_ARRAYS = ("time", "q", "v", "a", "residual", "determined", "state")
 _TEXTS = ("marker_names", "notes", "joint_names")
 
 

@@ -22,7 +22,7 @@ def replay_data(found: SessionReplay) -> str:
     the arrows m per N; ``trials`` with ``name``, ``frames``, ``start_s``, ``step_s``, ``worst_s``, ``origin`` m and
     ``unit`` m of a step, and int16 arrays, little-endian in base64, frame by frame: ``places`` of segments, markers,
     centre of mass and the two centres of pressure, ``turns`` (x y z w in 1/32767), ``forces`` measured, simulated and
-    left in 0.1 N.
+    left in 0.1 N; ``state`` one digit a frame, `AngleState`.
     """
     scene = {
         "boxes": [
@@ -60,6 +60,7 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
         "places": _packed((places - origin.round(4)) / unit),
         "turns": _packed(32767 * one.rotations),
         "forces": _packed(10 * forces),
+        "state": "".join(str(int(one)) for one in one.state),
     }
 
 
