@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter, Token
 
+from biodance.errors import without_codes
 from biodance.version import __version__
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ app = App(
 
 
 def say(sentence: str) -> None:
-    """Write one line to stderr, also where a name holds a line's end."""
-    sys.stderr.write(sentence.rstrip().replace("\n", "\\n") + "\n")
+    """Write one line to stderr, also where a name holds a line's end or codes that a terminal would obey."""
+    sys.stderr.write(without_codes(sentence.rstrip().replace("\n", "\\n")) + "\n")
 
 
 def print_json(document: object) -> None:
@@ -43,13 +44,18 @@ def print_json(document: object) -> None:
     sys.stdout.write(to_text(document))
 
 
+def show_place(path: Path) -> None:
+    """Write where something was written to stdout, in a line."""
+    sys.stdout.write(without_codes(str(path)) + "\n")
+
+
 def show(document: Any, printed: "Callable[[Any, Console], None]", *, json: bool, path: Path | None = None) -> None:
     """Write results to stdout: one JSON document, or the output of ``printed`` and the ``path`` of the report."""
-    from rich.console import Console
+    from biodance.report.terminal import SafeConsole
 
-    print_json(document) if json else printed(document, Console())
+    print_json(document) if json else printed(document, SafeConsole())
     if path is not None and not json:
-        sys.stdout.write(f"{path}\n")
+        show_place(path)
 
 
 _COUNTED = re.compile(r"(?P<done>\d+) of (?P<all>\d+)")
@@ -99,7 +105,7 @@ def progress() -> Iterator[Callable[[str], None]]:
     from rich.markup import escape
 
     with Console(stderr=True).status("") as status:
-        yield lambda text: status.update(escape(left.said(text)))
+        yield lambda text: status.update(escape(without_codes(left.said(text))))
 
 
 def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Callable[[str], None]:
@@ -110,7 +116,7 @@ def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Calla
         line = left.said(text)
         if clock() - last >= _EVERY:
             last = clock()
-            sys.stderr.write(f"{line}\n")
+            sys.stderr.write(f"{without_codes(line)}\n")
 
     return tell
 

@@ -1,6 +1,5 @@
 """Commands of the virtual lab: simulate, demo."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -16,6 +15,7 @@ from biodance.cli.app import (
     app,
     not_negative,
     progress,
+    show_place,
     whole,
 )
 from biodance.cli.place import put_session_results
@@ -92,7 +92,7 @@ def simulate_command(
             who, protocol, out, seed=drawn.seed, effects=drawn.effect, dance=shown, performer=drawn.performer,
             lab_seed=drawn.lab_seed,
         )  # fmt: skip
-    sys.stdout.write(f"{folder}\n")
+    show_place(folder)
     return DONE
 
 

@@ -59,6 +59,13 @@ def write_new(path: Path, content: bytes) -> Path:
     return path
 
 
+def for_spreadsheet(cell: object) -> object:
+    """Return a cell or heading of a CSV file that no spreadsheet takes for a formula: a text that begins with =, +, -,
+    @ or a tab, as labels in files may, begins with an apostrophe instead (CWE-1236); numbers stay as they are.
+    """
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell
+
+
 def refuse_huge(path: Path) -> None:
     """Raise FileRefused for a file larger than any recording, which would fill the memory."""
     if path.is_file() and path.stat().st_size > _LARGEST:
