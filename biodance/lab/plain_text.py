@@ -5,7 +5,9 @@ ends, decimal points or commas; and write files where none are yet.
 import codecs
 import hashlib
 import math
+import os
 import re
+import uuid
 from pathlib import Path
 
 from biodance.errors import FileRefused
@@ -45,18 +47,41 @@ def write_new(path: Path, content: bytes) -> Path:
     FileRefused
         The file exists (nothing is overwritten), or cannot be written.
     """
+    part = path.with_name(f".part-{uuid.uuid4().hex}")
+    refuse_present(path)
     try:
-        with open(path, "xb") as stream:
+        with open(part, "wb") as stream:
             stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        take_name(part, path)
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
-        if path.is_file():
-            path.unlink()  # ours, cut off: the disk is full
         raise FileRefused(
             f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
         ) from error
+    finally:
+        part.unlink(missing_ok=True)
     return path
+
+
+def refuse_present(path: Path) -> None:
+    """Raise FileRefused where there is anything of this name."""
+    if os.path.lexists(path):
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+
+
+def take_name(part: Path, path: Path) -> None:
+    """Give a finished file its name in one step; FileExistsError where another file has it."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without second names
+        if os.path.lexists(path):
+            raise FileExistsError from None
+        part.rename(path)
 
 
 def for_spreadsheet(cell: object) -> object:

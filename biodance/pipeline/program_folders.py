@@ -1,6 +1,6 @@
 """A session as a folder that other programs open: an OpenSim model with its motions and forces, or BIDS motion."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from biodance.body.export import write_model
 from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
 from biodance.body.parts import UPRIGHT
 from biodance.body.solids import SegmentSolids, segment_solids
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import BiodanceError, SessionRefused, TrialRefused
 from biodance.lab.bids import (
     COMPONENTS,
     BidsChannels,
@@ -26,7 +26,7 @@ from biodance.lab.opensim.ground_forces import external_loads, ground_table, inv
 from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.plain_text import write_new
-from biodance.lab.session.results_folder import made_folder, new_folder
+from biodance.lab.session.results_folder import made_folder, whole_folder
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
@@ -49,15 +49,36 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     Raises
     ------
     SessionRefused
-        The folder holds files already.
+        The folder holds files already, or two trials would have one name.
     TrialRefused
         No trial has markers.
     """
     raw = [trial for trial in session.trials if trial.markers is not None]
     if not raw:
         raise TrialRefused(f"{session.folder}: no trial has markers, so there is nothing to share as motion.")
+    _refuse_alike({trial.name: bids_label(trial.name) for trial in raw}, folder)
     subject = bids_label(session.subject.name or session.folder.name)
-    new_folder(folder)
+    with whole_folder(folder) as part:
+        _write_bids(session, raw, [found for found in trials if found.motion is not None], body, part, subject)
+    return tuple(found.name for found in trials if found.motion is not None)
+
+
+def _refuse_alike(names: Mapping[str, str], folder: Path) -> None:
+    """Raise SessionRefused where two trials (name -> what it is called there) would be written to one file, also on a
+    disk that takes no notice of capitals.
+    """
+    seen: dict[str, str] = {}
+    for trial, name in names.items():
+        if (other := seen.setdefault(name.lower(), trial)) != trial:
+            raise SessionRefused(
+                f"{folder}: the trials {other} and {trial} would both be called {name} there; nothing was written. "
+                f"Rename one, or choose with --trial."
+            )
+
+
+def _write_bids(
+    session: Session, raw: Sequence[Trial], moved: Sequence[TrialResult], body: Body, folder: Path, subject: str
+) -> None:
     place, derived = (made_folder(folder / part / f"sub-{subject}" / "motion") for part in (".", _DERIVED))
     write_description(folder, session.folder.name)
     write_description(folder / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
@@ -68,10 +89,8 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     write_participants(folder, [{"participant_id": f"sub-{subject}", **said, **unknown}])
     for trial in raw:
         _recorded(trial, place, subject)
-    moved = [found for found in trials if found.motion is not None]
     for found in moved:
         _found(found, body, derived, subject)
-    return tuple(found.name for found in moved)
 
 
 def _stem(subject: str, trial: str, system: str = _SYSTEM) -> str:
@@ -162,6 +181,8 @@ def state_notes(motion: Motion) -> tuple[str, ...]:
 
 
 MODEL = "model.osim"
+_ENDS = (".trc", ".mot", "_forces.mot", "_ExternalLoads.xml", "_InverseDynamics.xml", "_torques.sto")
+"""Of the names of a trial's files."""
 _SHORTEST = 10
 """Frames without which no inverse dynamics is set up."""
 
@@ -194,7 +215,7 @@ def write_opensim_folder(
     Raises
     ------
     SessionRefused
-        The folder holds files already.
+        The folder holds files already, or files of two trials would have one name.
     TrialRefused
         No trial gives a motion.
     BiodanceError
@@ -206,10 +227,11 @@ def write_opensim_folder(
         raise TrialRefused(
             f"{folder}: no trial gives a motion, so there is nothing for OpenSim to move. {said}".strip()
         )
-    new_folder(folder)
+    _refuse_alike({f"{one.name} ({end})": f"{one.name}{end}" for one in moving for end in _ENDS}, folder)
     solids = segment_solids(body) if solids is None else solids
-    write_model(body, folder / MODEL, format="osim", source=source, solids=solids)
-    return tuple(_trial(one, body, folder) for one in moving)
+    with whole_folder(folder) as part:
+        write_model(body, part / MODEL, format="osim", source=source, solids=solids)
+        return tuple(_trial(one, body, part) for one in moving)
 
 
 def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
