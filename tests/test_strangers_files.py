@@ -120,12 +120,12 @@ def test_an_array_that_claims_gigabytes_is_refused(dance_parts, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ('[corrections.plate_gain."plate1:Fz"]\ngain = 50', r"gain = 50; legal are -0\.5 to 1"),
-        ('[corrections.plate_gain."plate1:Fz"]\ngain = nan', "legal are"),
-        ('[corrections.plate_gain."plate1:Fz"]\ngain = 0.1\nsd = []', r"sd = \[\]; legal are 0 to"),
-        ('[corrections.plate_gain."plate1:Fz"]\ngain = 0.1\nsd = -1', "sd = -1; legal are 0 to"),
-        ('[corrections.plate_position."plate1:x"]\nshift = 1e6', "legal are -10 to 10 m"),
-        ("[corrections.time_delay]\ndelay = inf", "legal are -10 to 10 s"),
+        ('[corrections.plate_gain."plate1:Fz"]\ngain = 50', r"gain = 50; expected a number in 1, -0\.5 to 1"),
+        ('[corrections.plate_gain."plate1:Fz"]\ngain = nan', "gain = nan; expected"),
+        ('[corrections.plate_gain."plate1:Fz"]\ngain = 0.1\nsd = []', r"sd = \[\]; expected a number"),
+        ('[corrections.plate_gain."plate1:Fz"]\ngain = 0.1\nsd = -1', "sd = -1; expected a number"),
+        ('[corrections.plate_position."plate1:x"]\nshift = 1e6', "expected a number in m, -10 to 10"),
+        ("[corrections.time_delay]\ndelay = inf", "expected a number in s, -10 to 10"),
     ],
 )
 def test_a_correction_that_no_plate_needs_is_refused(tmp_path: Path, line: str, why: str) -> None:
