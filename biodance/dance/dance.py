@@ -271,7 +271,7 @@ class Dance(Sendable):
         refuse_special(path)
         try:
             refuse_large(path, LARGEST)
-            with np.load(path, allow_pickle=False) as found:
+            with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as found:
                 words = read_words(str(found["words"]))
                 arrays: dict[str, Any] = {
                     name: possible_array(name, found[name]) for name in ("postures", "hold", "via", "move")

@@ -15,6 +15,8 @@ from biodance.library import refuse_special
 
 _LARGEST = 2**31
 """Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
+LARGEST_NUMBER = 1e12
+"""In any unit: of what cameras and plates record nothing comes near, and squares of it can still be computed with."""
 _TEXT_LOOKS_BINARY = b"\x00"
 
 
@@ -160,10 +162,25 @@ def cells(line: str) -> list[str]:
 
 
 def parse_number(cell: str, where: str) -> float:
-    """Return the number in a cell; an empty cell is NaN. FileRefused says ``where`` if it is no number."""
+    """Return the number in a cell; an empty cell, nan and inf are NaN: not known.
+
+    Raises
+    ------
+    FileRefused
+        It is no number, or larger than any that is recorded: says ``where``. Python's own 1_0 and digits of other
+        scripts are none.
+    """
     if not cell:
         return math.nan
     try:
-        return float(cell)
+        value = float(cell) if cell.isascii() and "_" not in cell else None
     except ValueError:
-        raise FileRefused(f"{where}: {cell!r} is not a number. Correct that cell or export the file again.") from None
+        value = None
+    if value is None:
+        raise FileRefused(f"{where}: {cell[:40]!r} is not a number. Correct that cell or export the file again.")
+    if abs(value) > LARGEST_NUMBER and not cell.strip("+-")[:1].isalpha():
+        raise FileRefused(
+            f"{where}: {cell[:40]!r} is larger than anything that is recorded ({LARGEST_NUMBER:g}). Export the file "
+            f"again."
+        )
+    return value if math.isfinite(value) else math.nan
