@@ -202,3 +202,17 @@ def test_a_closed_tab_leaves_no_traceback(capfd) -> None:
             tab.close()
         assert urllib.request.urlopen(page.address, timeout=10).status == 200
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("mass", [float("inf"), float("-inf"), 1e30])
+def test_a_mass_that_nobody_has_is_said(tmp_path: Path, mass: float) -> None:
+    from lab_sessions import person
+
+    from biodance.lab.c3d.read import read_c3d
+    from biodance.lab.c3d.write import write_c3d
+
+    said = {"PROCESSING": {"Bodymass": mass, "Height": 1750.0}}
+    write_c3d(tmp_path / "walk.c3d", markers=person(frames=10), plates=[], analog_rate=1000.0, parameters=said)
+    trial = read_c3d(tmp_path / "walk.c3d")
+    assert "Bodymass" not in trial.measurements
+    assert any("Bodymass" in line and "left out" in line for line in trial.warnings)
