@@ -98,7 +98,8 @@ class Motion:
     joint_names : tuple of str
         (n) names of the joint angles, the last n columns of q; () = not known.
     state : array_like of int
-        (T, n) `AngleState` of every joint angle; by default measured where ``determined``, else not determined.
+        (T, n) `AngleState` of every joint angle; by default measured. In a frame that is not ``determined`` and does
+        not say which angle is open, none is.
 
     Examples
     --------
@@ -136,10 +137,11 @@ class Motion:
                 f"Motion.joint_names has {names} names for {columns} columns of q, {self._root} of them the root's."
             )
         joints = self.q.shape[1] - self._root
-        of_frame = np.where(determined, AngleState.MEASURED, AngleState.NOT_DETERMINED)
-        state = np.array(self.state if np.size(self.state) else np.tile(of_frame[:, None], joints), dtype=np.int8)
+        state = np.array(self.state if np.size(self.state) else np.zeros((frames, joints)), dtype=np.int8)
         if state.shape != (frames, joints):
             raise BiodanceError(f"Motion.state has shape {state.shape}, expected ({frames}, {joints}).")
+        unsaid = ~determined & (state != AngleState.NOT_DETERMINED).all(axis=1)
+        state[unsaid] = AngleState.NOT_DETERMINED
         state.setflags(write=False)
         assign(self, state=state)
 
