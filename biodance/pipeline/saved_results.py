@@ -23,6 +23,7 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
 from biodance.pipeline.trial_result import Step, TrialResult
 from biodance.records import Array, Motion, Session, Trial
+from biodance.records.motion import BY_FRAME
 from biodance.settings import Value
 
 BODY = "body.json"
@@ -33,7 +34,6 @@ MOTIONS = "motions.npz"
 """File in which they keep the motions, and where the recordings lie."""
 _LARGEST = 2**33
 """Bytes of it, unpacked: some eight hours of movement at 200 Hz."""
-_ARRAYS = ("time", "q", "v", "a", "residual", "determined", "state")
 _TEXTS = ("marker_names", "notes", "joint_names")
 
 
@@ -64,7 +64,7 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
     held["loads"] = np.array([_load(one.trial) for one in moved])
     held["settings"] = np.array(json.dumps(result.settings.as_dict()))
     for k, one in enumerate(moved):
-        held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in _ARRAYS}
+        held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in BY_FRAME}
         held |= {f"{k}.{name}": np.array(getattr(one.motion, name), dtype=str) for name in _TEXTS}
     part = folder / f".{MOTIONS}.part"
     try:
@@ -147,7 +147,7 @@ def _load(trial: Trial) -> Array:
 
 
 def _motion(held: "np.lib.npyio.NpzFile", k: int) -> Motion:
-    arrays: dict[str, Any] = {name: held[f"{k}.{name}"] for name in _ARRAYS}
+    arrays: dict[str, Any] = {name: held[f"{k}.{name}"] for name in BY_FRAME}
     texts: dict[str, Any] = {name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS}
     return Motion(**arrays, **texts)
 

@@ -48,6 +48,10 @@ class Encoders:
         return rate_of(self.time)
 
 
+BY_FRAME = ("time", "q", "v", "a", "residual", "determined", "state")
+"""Fields of a `Motion` that have one row a frame."""
+
+
 class AngleState(IntEnum):
     """How a joint angle of one frame was found."""
 
