@@ -116,19 +116,6 @@ def read_corrections(path: str | Path) -> tuple[PlateCorrection, ...]:
     )
 
 
-_LEGAL = {
-    "plate_position": (-10.0, 10.0),
-    "plate_rotation": (-np.pi, np.pi),
-    "plate_gain": (-0.5, 1.0),
-    "plate_crosstalk": (-1.0, 1.0),
-    "plate_offset": (-2e4, 2e4),
-    "time_delay": (-10.0, 10.0),
-}
-"""What is still an error of a plate, in the unit of its parameter: beyond it the plate reads another unit, or is
-another plate, which no correction mends.
-"""
-
-
 def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
@@ -140,7 +127,7 @@ def _correction(path: str | Path, effect: str, target: str, said: Any) -> PlateC
     fault = PLATE_FAULTS[effect]
     name = fault.parameter
     value = said.get(name) if isinstance(said, dict) else None
-    low, high = _LEGAL[effect]
+    low, high = fault.legal
     if not _is_number(value) or not low <= value <= high:
         raise FileRefused(f"{where} {name} = {value!r}; expected a number in {fault.unit}, {low:g} to {high:g}.")
     sd = said.get("sd", np.nan)
