@@ -20,8 +20,8 @@ _AXES = ("x", "y", "z")
 @dataclass(frozen=True)
 class PlateFault:
     """One fault of a plate: ``name`` of its effect, ``parameter`` and ``unit`` of its size, and whether it is
-    ``lasting``: stays with a laboratory from one session to the next; ``legal`` sizes: beyond them the plate reads another
-    unit, or is another plate, which no correction mends.
+    ``lasting``: stays with a laboratory from one session to the next; ``legal`` sizes: beyond them the plate
+    reads another unit, or is another plate, which no correction mends.
 
     With a fault of some size at a place (a channel ``Fz``, a pair ``Fz->My``, an axis ``x``) a plate reads ``mixing`` @
     wrench + size ``zero``, about its centre (N, N·m).
