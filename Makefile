@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 BUNDLE := biodance/report/feedback/bundle
 ROOM   ?= yes
 
-.PHONY: demo test hidden lint docs tutorials bundle bundle-if-possible clean
+.PHONY: demo test hidden lint docs tutorials bundle bundle-if-possible sbom lock clean
 demo: $(STAMP) bundle-if-possible
 	$(BIN)/biodance demo --out demo --force || [ $$? -eq 1 ] # 1: done, and something needs a person
 
@@ -39,14 +39,24 @@ bundle-if-possible: $(STAMP)
 	@$(MAKE) --no-print-directory bundle || echo "Without npm the page that leads does not follow the person; all else works."
 
 TOO_OLD := biodance needs Python 3.11 to 3.13. Name one: make PYTHON=python3.12 ... (see README.md). $(PYTHON) is
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml locked.txt
 	@$(PYTHON) -c 'import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit("$(TOO_OLD) " + sys.version.split()[0])'
 	@[ $(ROOM) = no ] || $(PYTHON) .ci/room.py $(VENV)=$(if $(wildcard $(VENV)),1,3) "$${TMPDIR:-/tmp}=1" # of 2.8 and 0.8 GB
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e ".[test,lint,peers,docs]"
+	$(BIN)/python -m pip install --quiet --require-hashes --no-deps -r locked.txt # nothing but what was locked
+	$(BIN)/python -m pip install --quiet --no-deps -e .
 	$(BIN)/python -m compileall -q biodance # pip leaves an editable package as text
 	touch $(STAMP)
+
+sbom: # what is installed, as a bill of materials: CycloneDX JSON
+	@$(PYTHON) .ci/sbom.py > sbom.cdx.json && echo sbom.cdx.json
+
+lock: # after a change of pyproject.toml or constraints.txt; needs uv
+	head -1 locked.txt > locked.new
+	uv pip compile -q pyproject.toml $(addprefix --extra ,test lint peers docs pictures) -c constraints.txt --universal \
+	  --python-version 3.11 --generate-hashes --no-annotate --no-header >> locked.new
+	mv locked.new locked.txt
 
 clean:
 	rm -rf $(VENV) demo build/site web/node_modules $(BUNDLE)

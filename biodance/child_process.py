@@ -3,8 +3,10 @@ of strangers may lie (CWE-427).
 """
 
 import os
+import signal
 import subprocess
 import sys
+import threading
 from multiprocessing import forkserver
 from pathlib import Path
 
@@ -40,11 +42,14 @@ def start_forkserver() -> None:
     """Start the process from which workers are forked: it leaves out the working folder, too. What this process starts
     otherwise is as before.
     """
-    before = os.environ.get(_SAFE)
+    before, alone = os.environ.get(_SAFE), threading.current_thread() is threading.main_thread()
     os.environ[_SAFE] = "1"
+    interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN) if alone else None  # Ctrl-C is for us to answer
     try:
         forkserver.ensure_running()
     finally:
+        if interrupt is not None:
+            signal.signal(signal.SIGINT, interrupt)
         if before is None:
             del os.environ[_SAFE]
         else:

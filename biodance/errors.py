@@ -4,6 +4,8 @@ Only wrong input raises. A computation that fails on correct input (a solver tha
 known) is a status in its result, not an exception.
 """
 
+import re
+
 
 class BiodanceError(ValueError):
     """Root of all errors that biodance raises on purpose; its text is one plain sentence for the analyst.
@@ -118,3 +120,12 @@ class MissingLibrary(BiodanceError):
     >>> issubclass(biodance.MissingLibrary, biodance.BiodanceError)
     True
     """
+
+
+_CODES = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""Control characters but tab and line end, and those that turn the direction of writing."""
+
+
+def without_codes(text: str) -> str:
+    """Return a text that no terminal obeys: names in files may hold control characters, which become their codes."""
+    return _CODES.sub(lambda one: one[0].encode("unicode_escape").decode("ascii"), text)

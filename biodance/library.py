@@ -4,14 +4,20 @@ The two folders lie at the top of a checkout and inside the package in an instal
 knows that.
 """
 
+import json
 import re
 import tomllib
+import zipfile
 from pathlib import Path
 from typing import Any
 
 from biodance.errors import BiodanceError, FileRefused, UnknownName
 
 PACKAGE = Path(__file__).resolve().parent
+_LARGEST_TEXT = 2**26
+"""Bytes of a TOML or JSON file: hundreds of times what biodance writes."""
+_DEEPEST = 20
+"""Tables and lists in each other; biodance writes five."""
 _COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 """A number with a decimal comma."""
 
@@ -60,11 +66,16 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     FileRefused
-        The file is missing, no ordinary file, or not TOML.
+        The file is missing, no ordinary file, too large, nested without end, or not TOML.
     """
     refuse_special(path)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        refuse_large(path, _LARGEST_TEXT)
+        found = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        _refuse_deep(found)
+        return found
+    except RecursionError as error:
+        raise FileRefused(f"{path}: tables or lists lie in each other too deeply. Write them flat.") from error
     except OSError as error:
         raise FileRefused(f"{path}: cannot be opened ({error.strerror}). Check the path.") from error
     except UnicodeDecodeError as error:
@@ -72,6 +83,48 @@ def read_toml(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         advice = "Write decimals with a point: 60.3." if _COMMA.search(_line(path, error)) else "Correct that line."
         raise FileRefused(f"{path}: is not valid TOML: {error}. {advice}") from error
+
+
+def _refuse_deep(found: Any) -> None:
+    """Raise RecursionError where tables and lists lie in each other more than `_DEEPEST` times."""
+    here = [found]
+    for _ in range(_DEEPEST):
+        inner = (one.values() if isinstance(one, dict) else one for one in here)
+        here = [one for some in inner for one in some if isinstance(one, dict | list)]
+        if not here:
+            return
+    raise RecursionError
+
+
+def parse_json(text: str) -> Any:
+    """Return what a JSON text says.
+
+    Raises
+    ------
+    ValueError
+        It is no JSON, too long, or nested without end.
+    """
+    if len(text) > _LARGEST_TEXT:
+        raise ValueError(f"{len(text) / 1e6:.0f} MB of text, legal are up to {_LARGEST_TEXT / 1e6:.0f}")
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("lists lie in each other too deeply") from error
+
+
+def refuse_large(path: Path, largest: int) -> None:
+    """Raise FileRefused for a file of more than ``largest`` bytes, unpacked where it is a zip archive (.npz): it would
+    fill the memory.
+    """
+    size = path.stat().st_size if path.is_file() else 0
+    if path.is_file() and zipfile.is_zipfile(path):
+        try:
+            with zipfile.ZipFile(path) as packed:
+                size = sum(one.file_size for one in packed.infolist())
+        except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+            raise FileRefused(f"{path}: is a damaged archive ({error}). Make it again.") from error
+    if size > largest:
+        raise FileRefused(f"{path}: holds {size / 1e6:,.0f} MB, legal are up to {largest / 1e6:,.0f}. Check the file.")
 
 
 def _line(path: Path, error: tomllib.TOMLDecodeError) -> str:

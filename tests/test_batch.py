@@ -133,6 +133,32 @@ def test_the_client_is_killed_and_its_processes_with_it(tmp_path: Path) -> None:
     assert sum(found.counts.values()) == 6
 
 
+def test_ctrl_c_ends_the_workers_without_a_word_and_a_restart_goes_on(tmp_path: Path) -> None:
+    archive, out = archive_of(tmp_path / "a", 6), tmp_path / "a" / "out"
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
+        "if __name__ == '__main__':\n    import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "    run_batch(sys.argv[1], sys.argv[2], workers=2, work=batch_work.slow)"
+    )
+    script = tmp_path / "client.py"
+    script.write_text(program)
+    client = subprocess.Popen(
+        [sys.executable, str(script), str(archive), str(out), str(Path(__file__).parent)],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    give_up = time.monotonic() + 120
+    while not (out / "sessions" / "s5" / "outcome.json").exists() and time.monotonic() < give_up:
+        time.sleep(0.05)
+    (out / "sessions" / ".part-xyz").mkdir()
+    os.killpg(client.pid, signal.SIGINT)
+    said = client.communicate(timeout=60)[1]
+    assert said.count("Traceback") == 1, "that of the client alone, which is no command"
+    assert "KeyboardInterrupt" in said
+    found = run_batch(archive, out, workers=2, work=batch_work.count)
+    assert sum(found.counts.values()) == 6
+    assert not list((out / "sessions").glob(".part-*"))
+
+
 def _alive(script: Path) -> bool:
     """Return whether a process of the client that was killed is left (they carry its name in their environment)."""
     mine = str(script).encode()

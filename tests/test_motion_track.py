@@ -76,7 +76,7 @@ def test_absent_markers_and_leaning_frames_are_named(markers):
         note.startswith("5 of 120 frames lean on their neighbours") and "first: frame 50" in note
         for note in motion.notes
     )
-    assert np.array_equal(np.flatnonzero(~motion.determined), np.arange(50, 55))
+    assert np.array_equal(np.flatnonzero(~motion.determined), np.arange(45, 60)), "and half a period of 10 Hz"
     assert np.isfinite(np.hstack([motion.q, motion.v, motion.a])).all()
     whole = track(WOMAN, trial_of(markers))
     assert np.abs(points(WOMAN, motion.q) - points(WOMAN, whole.q)).max() < 0.05

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -93,7 +94,9 @@ def _process() -> ProcessPoolExecutor:
 
 
 def end_with_parent() -> None:
-    """End this process as soon as the one that asked for it is gone."""
+    """End this process as soon as the one that asked for it is gone, and at once by Ctrl-C."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
     if parent is not None:
 

@@ -1,7 +1,6 @@
 """What became of one session of an archive, kept in its folder: done, refused or failed, and whether that is final."""
 
 import hashlib
-import json
 import math
 import os
 from dataclasses import dataclass
@@ -9,6 +8,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from biodance.errors import FileRefused
+from biodance.lab.session.manifest import refuse_mixture
+from biodance.library import parse_json
 from biodance.version import __version__
 
 OUTCOME = "outcome.json"
@@ -133,10 +135,11 @@ def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
 def outcome_of(task: SessionTask) -> Outcome | None:
     """Return what became of a session as it is now, in this or an earlier run; None where that is not known."""
     try:
-        found = json.loads((Path(task.out) / OUTCOME).read_text(encoding="utf-8"))
+        found = parse_json((Path(task.out) / OUTCOME).read_text(encoding="utf-8"))
         told = {"status": SessionStatus(found["status"]), "rows": tuple(found["rows"]), "why": Why(found["why"])}
         outcome = Outcome(**{**found, **told})
-    except (OSError, ValueError, TypeError, KeyError):
+        refuse_mixture(Path(task.out), ("results.json",))
+    except (OSError, ValueError, TypeError, KeyError, FileRefused):
         return None
     return outcome if outcome.fingerprint == task.fingerprint else None
 

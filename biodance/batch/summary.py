@@ -1,6 +1,5 @@
 """All sessions of an archive in one table and on one page."""
 
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -13,7 +12,9 @@ from biodance.batch.outcome import Outcome
 from biodance.batch.work import ROW_TYPES
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
+from biodance.library import parse_json
 from biodance.report.files import write_files
+from biodance.report.tables import for_spreadsheets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,7 +65,7 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     (folder / ".summary.parquet.part").replace(folder / "summary.parquet")
     alike = [one.text for one in likenesses(left_in_archive(folder, [one.name for one in outcomes]))]
     page = _page(name, outcomes, table, left_out, _links(folder, outcomes), alike)
-    write_files(folder, {"summary.csv": table.to_csv(index=False, lineterminator="\n"), _PAGE: page})
+    write_files(folder, {"summary.csv": for_spreadsheets(table).to_csv(index=False, lineterminator="\n"), _PAGE: page})
 
 
 def outliers(table: "pd.DataFrame") -> "list[dict[str, Any]]":
@@ -101,7 +102,10 @@ def left_in_archive(folder: Path, names: Iterable[str]) -> tuple[SessionLeft, ..
     found = []
     for name in names:
         path = folder / SESSIONS / folder_name(name) / "results.json"
-        document = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        try:
+            document = parse_json(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue  # without results, or damaged since: `biodance verify` says it, and the next run does it again
         one = document.get("diagnosis") or {}
         left = {(row["channel"], tuple(row["band_hz"])): float(row["z"]) for row in one.get("adequacy") or ()}
         if left:

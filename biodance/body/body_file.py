@@ -10,7 +10,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.parts import Foot, Joint, JointError, JointLimits, Part, SegmentMarkers
 from biodance.errors import BiodanceError, FileRefused
-from biodance.library import refuse_special
+from biodance.library import parse_json, refuse_special
 from biodance.records import Sip
 
 _VERSION = 1
@@ -50,7 +50,7 @@ def parse_body(text: str, where: str) -> tuple[Body, str]:
         The text is of another version or is not such a body.
     """
     try:
-        raw: dict[str, Any] = json.loads(text)
+        raw: dict[str, Any] = parse_json(text)
         if raw.get("biodance_body") != _VERSION:
             raise FileRefused(f"{where}: is no body of version {_VERSION}. Run biodance identify again.")
         return _possible(_body(raw)), str(raw["source"])

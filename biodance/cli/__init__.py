@@ -40,11 +40,16 @@ def run(tokens: Sequence[str] | None = None) -> int:
     from biodance.errors import BiodanceError
 
     try:
-        return app(tokens, exit_on_error=False, print_error=False, result_action="return_value") or DONE
+        code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value") or DONE
+        sys.stdout.flush()
+        return code
     except CycloptsError as error:
         say(f"{_misused(error)} See {' '.join(('biodance', *(error.command_chain or ())))} --help.")
     except BiodanceError as error:
         say(str(error))
+    except BrokenPipeError:
+        _onto_nothing(1)
+        say("The output was closed before all was written to it. What went into files is complete.")
     except OSError as error:
         why = error.strerror or f"cannot be written ({error}). Is the disk full?"
         say(f"{error.filename or _out(tokens)}: {why.rstrip('.')}.")
@@ -77,12 +82,28 @@ def _out(tokens: Sequence[str] | None) -> str:
     return given[at] if at < len(given) else "biodance"
 
 
+def _onto_nothing(number: int) -> None:
+    """Let input, output or errors (0, 1, 2) go to nowhere, so that nothing is raised of it any more."""
+    nothing = os.open(os.devnull, os.O_RDWR)
+    if nothing != number:
+        os.dup2(nothing, number)
+        os.close(nothing)
+    for name in ("stdin", "stdout", "stderr")[number : number + 1]:
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8", closefd=False))
+
+
 def main() -> None:
     """Run the command line and leave with its exit code.
 
     At the end the interpreter would look five times for circles among some 250,000 objects that go with the process
     anyway (0.4 s); frozen ones it passes over.
     """
+    for number in (0, 1, 2):  # a closed one would be taken by the next file that is opened
+        try:
+            os.fstat(number)
+        except OSError:
+            _onto_nothing(number)
     gc.set_threshold(_NEW_OBJECTS)
     code = run()
     gc.freeze()

@@ -1,18 +1,15 @@
-"""Shared by all commands: the application, exit codes, common options, terminal output and progress (one updated line
-with the remaining time on a terminal, otherwise a plain line every few seconds).
-"""
+"""Shared by all commands: the application, exit codes, common options and terminal output."""
 
-import re
 import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter, Token
 
+from biodance.cli.progress import progress as progress
+from biodance.errors import without_codes
 from biodance.version import __version__
 
 if TYPE_CHECKING:
@@ -32,8 +29,8 @@ app = App(
 
 
 def say(sentence: str) -> None:
-    """Write one line to stderr, also where a name holds a line's end."""
-    sys.stderr.write(sentence.rstrip().replace("\n", "\\n") + "\n")
+    """Write one line to stderr, also where a name holds a line's end or codes that a terminal would obey."""
+    sys.stderr.write(without_codes(sentence.rstrip().replace("\n", "\\n")) + "\n")
 
 
 def print_json(document: object) -> None:
@@ -43,76 +40,19 @@ def print_json(document: object) -> None:
     sys.stdout.write(to_text(document))
 
 
+def show_place(path: Path) -> None:
+    """Write where something was written to stdout, in a line."""
+    sys.stdout.write(without_codes(str(path)) + "\n")
+
+
 def show(document: Any, printed: "Callable[[Any, Console], None]", *, json: bool, path: Path | None = None) -> None:
     """Write results to stdout: one JSON document, or the output of ``printed`` and the ``path`` of the report."""
-    from rich.console import Console
+    from biodance.report.terminal import SafeConsole
 
-    print_json(document) if json else printed(document, Console())
-    if path is not None and not json:
-        sys.stdout.write(f"{path}\n")
-
-
-_COUNTED = re.compile(r"(?P<done>\d+) of (?P<all>\d+)")
-_EVERY = 5.0
-"""s between two lines where stderr is no terminal: a short run says nothing, a log of a long one stays short."""
-
-
-class TimeLeft:
-    """Estimate of the time left in a stage from its progress messages ("3 of 11"); ``clock`` in s."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._stage = ("", 0)
-        self._began = 0.0
-        self._first = 0
-
-    def said(self, text: str) -> str:
-        """Return the words with the time left in this stage, where they count its items."""
-        counted = _COUNTED.search(text)
-        if counted is None:
-            return text
-        done, total = int(counted["done"]), int(counted["all"])
-        stage = (text.split(" ", 1)[0], total)
-        if stage != self._stage or done < self._first:
-            self._stage, self._began, self._first = stage, self._clock(), done
-        if done <= self._first:
-            return text
-        each = (self._clock() - self._began) / (done - self._first)
-        return f"{text}, about {seconds_in_words(each * (total - done + 1))} left"
-
-
-def seconds_in_words(seconds: float) -> str:
-    """Return a duration in words: "8 s", "3 min", "2.5 h"."""
-    if seconds < 90:
-        return f"{max(1, round(seconds))} s"
-    return f"{round(seconds / 60)} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
-
-
-@contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows on stderr what is being done."""
-    left = TimeLeft()
-    if not sys.stderr.isatty():
-        yield _plain(left)
-        return
-    from rich.console import Console
-    from rich.markup import escape
-
-    with Console(stderr=True).status("") as status:
-        yield lambda text: status.update(escape(left.said(text)))
-
-
-def _plain(left: TimeLeft, clock: Callable[[], float] = time.monotonic) -> Callable[[str], None]:
-    last = clock()
-
-    def tell(text: str) -> None:
-        nonlocal last
-        line = left.said(text)
-        if clock() - last >= _EVERY:
-            last = clock()
-            sys.stderr.write(f"{line}\n")
-
-    return tell
+    if json:
+        return print_json(document)
+    printed(document, SafeConsole())
+    return None if path is None else show_place(path)
 
 
 JsonOption = Annotated[

@@ -21,6 +21,7 @@ from biodance.cli.app import (
     whole,
 )
 from biodance.cli.place import put_results
+from biodance.errors import without_codes
 
 
 @app.command(name="batch")
@@ -142,5 +143,5 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
     for one in () if json else found:
         wrong = {"missing": one.missing, "changed": one.changed, "recordings changed or not there": one.inputs_changed}
         said = "; ".join(f"{what}: {', '.join(names)}" for what, names in wrong.items() if names)
-        sys.stdout.write(f"{one.folder}: {said or 'whole'}, biodance {one.manifest.version}\n")
+        sys.stdout.write(without_codes(f"{one.folder}: {said or 'whole'}, biodance {one.manifest.version}") + "\n")
     return DONE if all(one.whole and not one.inputs_changed for one in found) else NEEDS_A_PERSON

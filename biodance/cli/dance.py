@@ -25,6 +25,7 @@ from biodance.cli.app import (
     not_negative,
     print_json,
     say,
+    show_place,
     whole,
 )
 from biodance.errors import BiodanceError
@@ -120,7 +121,7 @@ def dance_command(
         print_json(found)
     else:
         print_dance(found)
-        sys.stdout.write(f"{folder}\n")
+        show_place(folder)
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
     return DONE if result.feasible and result.complete else NEEDS_A_PERSON
@@ -144,7 +145,7 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
 
     if not write_feedback(Dance.load(dance), out, force=force):
         say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
-    sys.stdout.write(f"{out}\n")
+    show_place(out)
     return DONE
 
 

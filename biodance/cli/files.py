@@ -20,6 +20,7 @@ from biodance.cli.app import (
     progress,
     say,
     show,
+    show_place,
 )
 
 
@@ -62,7 +63,7 @@ def register_command(
         say(found.reason)
         return NOT_DONE if found.pose is None else NEEDS_A_PERSON
     if not json:
-        sys.stdout.write(f"{out}\n")
+        show_place(out)
     if found.status == "rough":
         say(found.reason)
         return NEEDS_A_PERSON
@@ -188,5 +189,5 @@ def export_command(
             source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell
         )
     say(sentence)
-    sys.stdout.write(f"{out}\n")
+    show_place(out)
     return DONE

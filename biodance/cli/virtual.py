@@ -1,6 +1,7 @@
 """Commands of the virtual lab: simulate, demo."""
 
-import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -16,6 +17,7 @@ from biodance.cli.app import (
     app,
     not_negative,
     progress,
+    show_place,
     whole,
 )
 from biodance.cli.place import put_session_results
@@ -84,15 +86,13 @@ def simulate_command(
 
     shown = None if dance is None else Dance.load(dance)
     who = front_dance.virtual_subject(shown, sex=person.sex, height=person.height, mass=person.mass, age=person.age)
-    if force:
-        _forget_simulated(out)
-    with progress() as tell:
+    with progress() as tell, _simulated_anew(out, force=force) as place:
         tell(f"simulating {protocol or dance}")
-        folder = front_dance.simulate(
-            who, protocol, out, seed=drawn.seed, effects=drawn.effect, dance=shown, performer=drawn.performer,
+        front_dance.simulate(
+            who, protocol, place, seed=drawn.seed, effects=drawn.effect, dance=shown, performer=drawn.performer,
             lab_seed=drawn.lab_seed,
         )  # fmt: skip
-    sys.stdout.write(f"{folder}\n")
+    show_place(out)
     return DONE
 
 
@@ -105,21 +105,31 @@ def demo_command(*, out: OutOption = Path("demo"), force: ForceOption = False) -
     from biodance.records import Subject
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
-    if force:
-        _forget_simulated(out / "simulated_session")
+    session = out / "simulated_session"
     with progress() as tell:
         tell("simulating a session")
-        session = write_session(Subject(62.0, 1.70, "F", 31.0), "short", out / "simulated_session", seed=1)
+        with _simulated_anew(session, force=force) as fresh:
+            write_session(Subject(62.0, 1.70, "F", 31.0), "short", fresh, seed=1)
         place = results_folder(out / "report", session, force=force)
         result, found = report_session(examine(read_session(session, tell=tell), tell=tell), place.part, tell)
         folder = put_session_results(place, result.session)
     return print_reported(result, folder, found, False)
 
 
-def _forget_simulated(folder: Path) -> None:
-    """Remove a folder that holds a simulated session and nothing else; leave every other one alone."""
-    import shutil
+@contextmanager
+def _simulated_anew(folder: Path, *, force: bool) -> Iterator[Path]:
+    """Yield where to simulate: ``folder``, or with ``force`` a folder that takes its place, whole, where that holds a
+    simulated session and nothing else.
+    """
+    from biodance.lab.session.results_folder import whole_folder
 
     simulated = (folder / "truth" / "truth.json").is_file() and (folder / "session.toml").is_file()
-    if simulated and all(path.suffix == ".c3d" or path.name in ("session.toml", "truth") for path in folder.iterdir()):
-        shutil.rmtree(folder)
+    ours = all(path.suffix == ".c3d" or path.name in ("session.toml", "truth") for path in folder.glob("*"))
+    if not (force and simulated and ours):
+        yield folder
+        return
+    with whole_folder(folder, over=True) as part:
+        yield part / "session"
+        for path in (part / "session").iterdir():
+            path.replace(part / path.name)
+        (part / "session").rmdir()

@@ -95,7 +95,7 @@ def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurv
     docs/guide/movement.md says each sign. In a gait cycle bending and rotation of the trunk are seen from the cycle's
     side, as those of the pelvis: its own side down, its own side forwards are positive.
     """
-    angle = np.where(motion.determined[:, None], motion.angles, np.nan)
+    angle = motion.known_angles
     for j, joint in enumerate(body.joints):
         if (seen := seen_from(cycle, joint.name)) is not None:
             side, quantity, sign = seen

@@ -12,6 +12,7 @@ from biodance.cycles.cut import Cycle
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import chains
 from biodance.records import SIDES, Array, Motion, Sip, Wrench
+from biodance.records.motion import BY_FRAME
 
 _ENOUGH = 0.8
 """Share of a cycle in which a moment or a power must be known."""
@@ -36,8 +37,7 @@ def load_curves(
     y' C y with y = sum(v Y): the axes of a joint are not independent.
     """
     near = (motion.time >= cycle.start - _BEYOND) & (motion.time <= cycle.end + _BEYOND)
-    fields = ("time", "q", "v", "a", "residual", "determined")
-    motion, known = replace(motion, **{name: getattr(motion, name)[near] for name in fields}), known[near]
+    motion, known = replace(motion, **{name: getattr(motion, name)[near] for name in BY_FRAME}), known[near]
     ground = {
         f"{side}_foot": Wrench(motion.time, np.where(known[:, foot, None], feet[f"{side}_foot"].value[near], 0.0))
         for foot, side in enumerate(SIDES)

@@ -5,6 +5,7 @@ planted feet stay where they are at every instant, not only at samples.
 """
 
 import json
+import zlib
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -17,12 +18,13 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
+from biodance.dance.dance_words import LARGEST, possible_array, read_words
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
-from biodance.library import refuse_special
+from biodance.library import refuse_large, refuse_special
 from biodance.records import SIDES, Array, Motion, Subject, freeze
 from biodance.threads import Sendable
 
@@ -268,20 +270,24 @@ class Dance(Sendable):
         path = Path(path) / "dance.npz" if Path(path).is_dir() else Path(path)
         refuse_special(path)
         try:
-            with np.load(path, allow_pickle=False) as found:
-                words: dict[str, Any] = json.loads(str(found["words"]))
-                if words.get("biodance_dance") != _VERSION:
-                    raise FileRefused(f"{path}: is no dance of version {_VERSION}. Run biodance dance again.")
-                arrays = {name: found[name] for name in ("postures", "hold", "via", "move")}
+            refuse_large(path, LARGEST)
+            with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as found:
+                words = read_words(str(found["words"]))
+                arrays: dict[str, Any] = {
+                    name: possible_array(name, found[name]) for name in ("postures", "hold", "via", "move")
+                }
                 body, _ = parse_body(str(found["body"]), str(path))
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
-            who = Subject(**words["subject"]) if "subject" in words else None
+            who = Subject(**words["subject"]) if words.get("subject") else None
             more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored")}
-            more["plate"] = tuple(words["plate"]) if words.get("plate") else None
+            more["plate"] = words.get("plate")
             return cls(words["protocol"], body, seed=words["seed"], subject=who, **more, **feet, **arrays)
         except OSError as error:
             raise FileRefused(f"{path}: cannot be read ({error.strerror or error}). {_GIVE}") from error
         except FileRefused:
             raise
-        except (BadZipFile, EOFError, ValueError, KeyError, TypeError) as error:
-            raise FileRefused(f"{path}: is not a dance that biodance wrote. Run biodance dance again.") from error
+        except (BadZipFile, EOFError, ValueError, KeyError, TypeError, MemoryError, zlib.error) as error:
+            why = " ".join(str(error).split())[:300]
+            raise FileRefused(
+                f"{path}: is not a dance that biodance wrote ({why}). Run biodance dance again."
+            ) from error

@@ -97,7 +97,8 @@ def thinned(case: Case, use: NDArray[np.bool_]) -> tuple[Case, NDArray[np.bool_]
         return case, use
     old = case.motion
     time, q, v, a, residual = (array[::step] for array in (old.time, old.q, old.v, old.a, old.residual))
-    motion = Motion(time, q, v, a, residual, old.marker_names, old.determined[::step], old.notes)
+    known, state = old.determined[::step], old.state[::step]
+    motion = Motion(time, q, v, a, residual, old.marker_names, known, old.notes, state=state)
     plates = tuple(replace(p, wrench=Wrench(p.wrench.time[::step], p.wrench.value[::step])) for p in case.trial.plates)
     markers = case.trial.markers
     seen = None if markers is None else Markers(markers.names, markers.time[::step], markers.xyz[::step])

@@ -39,7 +39,7 @@ from biodance.threads import one_thread
 class TorqueBands:
     """Torques of the ``joints`` (n) of ``trial`` at ``time`` (T,) s: ``torque`` with ``sd`` and ``table`` (T, n) N·m
     along the positive sense of each joint, with the identified and with the table's parameters; ``use`` (T,) True where
-    the ground is fully measured.
+    the ground is fully measured; NaN in frames whose posture is not determined, as ``state`` (T,) `AngleState` says.
     """
 
     trial: str
@@ -49,6 +49,7 @@ class TorqueBands:
     sd: Array
     table: Array
     use: NDArray[np.bool_]
+    state: NDArray[np.int8]
 
     @property
     def half_width(self) -> Array:
@@ -78,9 +79,10 @@ def torque_bands(
         for j, (beyond, Y) in enumerate(_beyond_joints(body, frames)):
             needed[part, j] = Y @ phi[beyond]
             variance[part, j] = ((Y @ covariance[np.ix_(beyond, beyond)]) * Y).sum(axis=1)
+    known = np.where(motion.determined, 1.0, np.nan)[:, None]
     torque, table = np.moveaxis(needed - ground_torques(body, motion, ground)[..., None], 2, 0)
-    joints = tuple(joint.name for joint in body.joints)
-    return TorqueBands(trial, joints, motion.time, torque, np.sqrt(np.maximum(variance, 0.0)), table, use)
+    joints, sd = tuple(joint.name for joint in body.joints), np.sqrt(np.maximum(variance, 0.0))
+    return TorqueBands(trial, joints, motion.time, known * torque, known * sd, known * table, use, motion.frame_state)
 
 
 def _beyond_joints(body: Body, motion: Motion) -> Iterator[tuple[NDArray[np.intp], Array]]:

@@ -14,7 +14,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -116,6 +116,10 @@ def read_corrections(path: str | Path) -> tuple[PlateCorrection, ...]:
     )
 
 
+def _is_number(value: object) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _correction(path: str | Path, effect: str, target: str, said: Any) -> PlateCorrection:
     where = f"{path}: [corrections.{effect}.{target!r}]"
     if effect not in PLATE_FAULTS:
@@ -123,12 +127,16 @@ def _correction(path: str | Path, effect: str, target: str, said: Any) -> PlateC
     fault = PLATE_FAULTS[effect]
     name = fault.parameter
     value = said.get(name) if isinstance(said, dict) else None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value) or value == -1.0:
-        raise FileRefused(f"{where} {name} = {value!r}; expected a number in {fault.unit}.")
+    low, high = fault.legal
+    if not _is_number(value) or not low <= value <= high:
+        raise FileRefused(f"{where} {name} = {value!r}; expected a number in {fault.unit}, {low:g} to {high:g}.")
+    sd = said.get("sd", np.nan)
+    if not (_is_number(sd) and (np.isnan(sd) or 0 <= sd <= high - low)):
+        raise FileRefused(f"{where} sd = {sd!r}; expected a number in {fault.unit}, 0 to {high - low:g}.")
     if not fault.is_target(target):
         legal = "plate1:x" if fault in (POSITION, ROTATION) else "Fz, plate1:Fz or Fz->My"
         raise FileRefused(f"{where} has no such target. Expected for example {legal}.")
-    return PlateCorrection(effect, target, float(value), float(said.get("sd", np.nan)), str(said.get("source", "")))
+    return PlateCorrection(effect, target, float(value), float(sd), str(said.get("source", "")))
 
 
 def corrections_text(corrections: Iterable[PlateCorrection]) -> str:

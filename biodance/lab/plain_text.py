@@ -5,7 +5,9 @@ ends, decimal points or commas; and write files where none are yet.
 import codecs
 import hashlib
 import math
+import os
 import re
+import uuid
 from pathlib import Path
 
 from biodance.errors import FileRefused
@@ -13,6 +15,8 @@ from biodance.library import refuse_special
 
 _LARGEST = 2**31
 """Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
+LARGEST_NUMBER = 1e12
+"""In any unit: of what cameras and plates record nothing comes near, and squares of it can still be computed with."""
 _TEXT_LOOKS_BINARY = b"\x00"
 
 
@@ -45,18 +49,48 @@ def write_new(path: Path, content: bytes) -> Path:
     FileRefused
         The file exists (nothing is overwritten), or cannot be written.
     """
+    part = path.with_name(f".part-{uuid.uuid4().hex}")
+    refuse_present(path)
     try:
-        with open(path, "xb") as stream:
+        with open(part, "wb") as stream:
             stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        take_name(part, path)
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
-        if path.is_file():
-            path.unlink()  # ours, cut off: the disk is full
         raise FileRefused(
             f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
         ) from error
+    finally:
+        part.unlink(missing_ok=True)
     return path
+
+
+def refuse_present(path: Path) -> None:
+    """Raise FileRefused where there is anything of this name."""
+    if os.path.lexists(path):
+        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+
+
+def take_name(part: Path, path: Path) -> None:
+    """Give a finished file its name in one step; FileExistsError where another file has it."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without second names
+        if os.path.lexists(path):
+            raise FileExistsError from None
+        part.rename(path)
+
+
+def for_spreadsheet(cell: object) -> object:
+    """Return a cell or heading of a CSV file that no spreadsheet takes for a formula: a text that begins with =, +, -,
+    @ or a tab, as labels in files may, begins with an apostrophe instead (CWE-1236); numbers stay as they are.
+    """
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell
 
 
 def refuse_huge(path: Path) -> None:
@@ -128,10 +162,25 @@ def cells(line: str) -> list[str]:
 
 
 def parse_number(cell: str, where: str) -> float:
-    """Return the number in a cell; an empty cell is NaN. FileRefused says ``where`` if it is no number."""
+    """Return the number in a cell; an empty cell, nan and inf are NaN: not known.
+
+    Raises
+    ------
+    FileRefused
+        It is no number, or larger than any that is recorded: says ``where``. Python's own 1_0 and digits of other
+        scripts are none.
+    """
     if not cell:
         return math.nan
     try:
-        return float(cell)
+        value = float(cell) if cell.isascii() and "_" not in cell else None
     except ValueError:
-        raise FileRefused(f"{where}: {cell!r} is not a number. Correct that cell or export the file again.") from None
+        value = None
+    if value is None:
+        raise FileRefused(f"{where}: {cell[:40]!r} is not a number. Correct that cell or export the file again.")
+    if abs(value) > LARGEST_NUMBER and not cell.strip("+-")[:1].isalpha():
+        raise FileRefused(
+            f"{where}: {cell[:40]!r} is larger than anything that is recorded ({LARGEST_NUMBER:g}). Export the file "
+            f"again."
+        )
+    return value if math.isfinite(value) else math.nan

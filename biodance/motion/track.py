@@ -9,6 +9,7 @@ from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
 from biodance.errors import TrialRefused
 from biodance.lab.filters import motion_filter
+from biodance.motion.angle_state import angle_states
 from biodance.motion.ik.determination import determination
 from biodance.motion.ik.inverse_kinematics import FrameStatus, InverseKinematics, solve_ik
 from biodance.motion.kinematics import poses
@@ -59,7 +60,8 @@ def track(body: Body, trial: Trial) -> Motion:
     -------
     Motion
         ``residual`` (T, K) m are the distances before smoothing, of the markers that both share; ``determined`` (T,) is
-        False where a frame's own markers leave its posture open or do not let it settle; ``notes`` say so.
+        False where a frame's own markers leave its posture open or do not let it settle; ``state`` (T, n) says it of
+        every angle; ``notes`` say so.
 
     Raises
     ------
@@ -85,14 +87,17 @@ def track(body: Body, trial: Trial) -> Motion:
         found = solve_ik(followed, trial.markers)
         rate = trial.markers.rate if trial.markers.time.size > 1 else 1.0
         postures = upright_trunk(followed, found.q, rate)
-        motion = smooth(followed, trial.markers.time, postures, settings=motion_filter(trial.settings))
+        low_pass = motion_filter(trial.settings)
+        motion = smooth(followed, trial.markers.time, postures, settings=low_pass)
     except TrialRefused as error:
         raise TrialRefused(f"Trial {trial.name}: {error}") from error
+    determined, state = angle_states(followed, trial.markers, found.status, low_pass)
     return replace(
         motion,
         residual=found.residual,
         marker_names=found.marker_names,
-        determined=found.status == FrameStatus.SOLVED,
+        determined=determined,
+        state=state,
         notes=(*_notes(body, found), *held),
     )
 

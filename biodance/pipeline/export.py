@@ -13,7 +13,7 @@ from biodance.errors import BiodanceError, SessionRefused, TrialRefused, Unknown
 from biodance.lab.opensim.mot import write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.session.read import read_session
-from biodance.pipeline.program_folders import opensim_coordinates, write_bids_folder, write_opensim_folder
+from biodance.pipeline.program_folders import opensim_coordinates, state_notes, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import kept_body, kept_trials, read_kept, read_kept_body
 from biodance.pipeline.session import examine
@@ -150,7 +150,7 @@ class _Target:
 
     def coordinates(self, body: Body, motion: Motion, name: str) -> tuple[Path, str]:
         """Write the joint coordinates of a trial."""
-        written = write_mot(self.out, opensim_coordinates(body, motion))
+        written = write_mot(self.out, opensim_coordinates(body, motion), notes=state_notes(motion))
         return written, f"Joint coordinates of trial {name}, rad and m, y up; the model is exported with --format osim."
 
     def trials(self, session: Session, found: tuple[TrialResult, ...], body: Body, words: str) -> tuple[Path, str]:

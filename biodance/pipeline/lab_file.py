@@ -13,6 +13,7 @@ from biodance.lab.corrections import (
     read_corrections,
 )
 from biodance.library import read_toml
+from biodance.pipeline.lab_schema import lab_fault
 from biodance.records import Session
 from biodance.uncertainty.tolerances import Tolerances, tolerances_of
 
@@ -50,6 +51,8 @@ def read_lab(path: str | Path | None) -> LabFile:
         return NO_LAB
     corrections = read_corrections(path)
     whole = read_toml(Path(path))
+    if fault := lab_fault(whole):
+        raise FileRefused(f"{path}: {fault}. Give a lab.toml that biodance learn or diagnose --accept wrote.")
     raw, where = whole.get("tolerances"), "norms"
     try:
         norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}

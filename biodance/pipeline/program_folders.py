@@ -1,6 +1,6 @@
 """A session as a folder that other programs open: an OpenSim model with its motions and forces, or BIDS motion."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from biodance.body.export import write_model
 from biodance.body.export.osim import ROOT_ROTATIONS, ROOT_TRANSLATIONS
 from biodance.body.parts import UPRIGHT
 from biodance.body.solids import SegmentSolids, segment_solids
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import BiodanceError, SessionRefused, TrialRefused
 from biodance.lab.bids import (
     COMPONENTS,
     BidsChannels,
@@ -26,14 +26,14 @@ from biodance.lab.opensim.ground_forces import external_loads, ground_table, inv
 from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.plain_text import write_new
-from biodance.lab.session.results_folder import made_folder, new_folder
+from biodance.lab.session.results_folder import made_folder, whole_folder
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run
+from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run, runs
 from biodance.version import __version__
 
 _DERIVED = "derivatives/biodance"
@@ -49,15 +49,36 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     Raises
     ------
     SessionRefused
-        The folder holds files already.
+        The folder holds files already, or two trials would have one name.
     TrialRefused
         No trial has markers.
     """
     raw = [trial for trial in session.trials if trial.markers is not None]
     if not raw:
         raise TrialRefused(f"{session.folder}: no trial has markers, so there is nothing to share as motion.")
+    _refuse_alike({trial.name: bids_label(trial.name) for trial in raw}, folder)
     subject = bids_label(session.subject.name or session.folder.name)
-    new_folder(folder)
+    with whole_folder(folder) as part:
+        _write_bids(session, raw, [found for found in trials if found.motion is not None], body, part, subject)
+    return tuple(found.name for found in trials if found.motion is not None)
+
+
+def _refuse_alike(names: Mapping[str, str], folder: Path) -> None:
+    """Raise SessionRefused where two trials (name -> what it is called there) would be written to one file, also on a
+    disk that takes no notice of capitals.
+    """
+    seen: dict[str, str] = {}
+    for trial, name in names.items():
+        if (other := seen.setdefault(name.lower(), trial)) != trial:
+            raise SessionRefused(
+                f"{folder}: the trials {other} and {trial} would both be called {name} there; nothing was written. "
+                f"Rename one, or choose with --trial."
+            )
+
+
+def _write_bids(
+    session: Session, raw: Sequence[Trial], moved: Sequence[TrialResult], body: Body, folder: Path, subject: str
+) -> None:
     place, derived = (made_folder(folder / part / f"sub-{subject}" / "motion") for part in (".", _DERIVED))
     write_description(folder, session.folder.name)
     write_description(folder / _DERIVED, "biodance", derived_by={"Name": "biodance", "Version": __version__})
@@ -68,10 +89,8 @@ def write_bids_folder(session: Session, trials: Sequence[TrialResult], body: Bod
     write_participants(folder, [{"participant_id": f"sub-{subject}", **said, **unknown}])
     for trial in raw:
         _recorded(trial, place, subject)
-    moved = [found for found in trials if found.motion is not None]
     for found in moved:
         _found(found, body, derived, subject)
-    return tuple(found.name for found in moved)
 
 
 def _stem(subject: str, trial: str, system: str = _SYSTEM) -> str:
@@ -112,23 +131,34 @@ def _found(one: TrialResult, body: Body, place: Path, subject: str) -> None:
     assert one.motion is not None
     task, stem = bids_label(one.name), _stem(subject, one.name)
     about = {"TrackingSystemName": _SYSTEM, "Description": "joint angles and centre of mass of a tracked body"}
+    about["Missing"] = " ".join(state_notes(one.motion)) or "none"
     write_motion(place, f"{stem}_desc-joints", _joints(body, one.motion), task=task, about=about)
     events = [(e.time, f"{e.side}_{'strike' if e.down else 'off'}") for e in movement_of(one, body, None).events]
     write_events(place, f"{stem}_desc-feet", events)
 
 
 def _joints(body: Body, motion: Motion) -> BidsChannels:
-    angles = np.where(motion.determined[:, None], motion.angles, np.nan)
+    known = np.where(motion.determined[:, None], 1.0, np.nan)
     rows = [(joint.name, "n/a", "JNTANG", joint.name, "deg", "joint") for joint in body.joints]
     rows += [(f"centre_of_mass_{axis}", axis, "POS", "centre_of_mass", "m", "lab") for axis in COMPONENTS]
-    return BidsChannels(motion.time, np.hstack([angles, centre_of_mass(body, motion)]), rows)
+    return BidsChannels(motion.time, np.hstack([motion.known_angles, known * centre_of_mass(body, motion)]), rows)
 
 
 def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
-    """Return the coordinates of ``motion`` (T frames) by name: rad and m, root in OpenSim's ground (y up), joints as
-    in ``body``.
+    """Return the coordinates of ``motion`` by name: rad and m, root in OpenSim's ground (y up), joints as in ``body``.
+
+    Frames whose posture the markers do not determine are left out: the format has no word for a missing number.
+    `state_notes` says which, and what is filled.
+
+    Raises
+    ------
+    TrialRefused
+        No frame is determined.
     """
-    names = [joint.name for joint in body.joints]
+    names, known = [joint.name for joint in body.joints], motion.determined
+    if not known.any():
+        raise TrialRefused(f"{body.name}: no frame's markers determine the posture, so there are no coordinates.")
+    motion = motion.at(known) if not known.all() else motion
     angles = motion.q[:, body.nq - len(names) :]
     if not body.n_root:
         return TimeTable(body.name, tuple(names), motion.time, angles)
@@ -138,7 +168,21 @@ def opensim_coordinates(body: Body, motion: Motion) -> TimeTable:
     return TimeTable(body.name, (*root, *names), motion.time, np.hstack([turns, motion.q[:, :3] @ UPRIGHT, angles]))
 
 
+def state_notes(motion: Motion) -> tuple[str, ...]:
+    """Return in sentences which frames of a motion are left out, and which angles are filled or held when."""
+    out = ", ".join(f"{motion.time[a]:.3f} to {motion.time[b - 1]:.3f} s" for a, b in runs(~motion.determined))
+    said = [f"Left out, because the markers do not determine the posture: {out}."] if out else []
+    where: dict[str, list[str]] = {}
+    for span in motion.spans():
+        inside = (motion.time >= span.start) & (motion.time <= span.end)
+        if motion.determined[inside].any():
+            where.setdefault(f"{span.start:.3f} to {span.end:.3f} s {span.state.words}", []).append(span.joint)
+    return (*said, *(f"From {when}: {', '.join(joints)}." for when, joints in where.items()))
+
+
 MODEL = "model.osim"
+_ENDS = (".trc", ".mot", "_forces.mot", "_ExternalLoads.xml", "_InverseDynamics.xml", "_torques.sto")
+"""Of the names of a trial's files."""
 _SHORTEST = 10
 """Frames without which no inverse dynamics is set up."""
 
@@ -171,7 +215,7 @@ def write_opensim_folder(
     Raises
     ------
     SessionRefused
-        The folder holds files already.
+        The folder holds files already, or files of two trials would have one name.
     TrialRefused
         No trial gives a motion.
     BiodanceError
@@ -183,16 +227,18 @@ def write_opensim_folder(
         raise TrialRefused(
             f"{folder}: no trial gives a motion, so there is nothing for OpenSim to move. {said}".strip()
         )
-    new_folder(folder)
+    _refuse_alike({f"{one.name} ({end})": f"{one.name}{end}" for one in moving for end in _ENDS}, folder)
     solids = segment_solids(body) if solids is None else solids
-    write_model(body, folder / MODEL, format="osim", source=source, solids=solids)
-    return tuple(_trial(one, body, folder) for one in moving)
+    with whole_folder(folder) as part:
+        write_model(body, part / MODEL, format="osim", source=source, solids=solids)
+        return tuple(_trial(one, body, part) for one in moving)
 
 
 def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     motion, name = one.motion, one.name
     assert motion is not None
-    files = [write_mot(folder / f"{name}.mot", opensim_coordinates(body, motion)).name]
+    table, notes = opensim_coordinates(body, motion), state_notes(motion)
+    files = [write_mot(folder / f"{name}.mot", table, notes=notes).name]
     if one.trial.markers is not None:
         files.insert(0, write_trc(folder / f"{name}.trc", one.trial.markers).name)
     contact = contact_of(one.trial, one, body)

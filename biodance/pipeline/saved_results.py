@@ -2,6 +2,7 @@
 
 import json
 import os
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,12 +16,14 @@ from biodance.body.body_file import read_body
 from biodance.errors import FileRefused, SessionRefused, TrialRefused
 from biodance.lab.session.manifest import refuse_mixture
 from biodance.lab.session.read import read_session
+from biodance.library import refuse_large
 from biodance.motion.contact.contact import ground_contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
 from biodance.pipeline.trial_result import Step, TrialResult
 from biodance.records import Array, Motion, Session, Trial
+from biodance.records.motion import BY_FRAME
 from biodance.settings import Value
 
 BODY = "body.json"
@@ -29,7 +32,8 @@ SCALED = "scaled_body.json"
 """The same where nothing was identified: scaled, with the table's parameters; nobody's earlier body (``--body``)."""
 MOTIONS = "motions.npz"
 """File in which they keep the motions, and where the recordings lie."""
-_ARRAYS = ("time", "q", "v", "a", "residual", "determined")
+_LARGEST = 2**33
+"""Bytes of it, unpacked: some eight hours of movement at 200 Hz."""
 _TEXTS = ("marker_names", "notes", "joint_names")
 
 
@@ -60,7 +64,7 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
     held["loads"] = np.array([_load(one.trial) for one in moved])
     held["settings"] = np.array(json.dumps(result.settings.as_dict()))
     for k, one in enumerate(moved):
-        held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in _ARRAYS}
+        held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in BY_FRAME}
         held |= {f"{k}.{name}": np.array(getattr(one.motion, name), dtype=str) for name in _TEXTS}
     part = folder / f".{MOTIONS}.part"
     try:
@@ -123,13 +127,16 @@ def read_kept(folder: Path) -> KeptResults:
         raise SessionRefused(f"{folder}: holds a body and no trial. Give the session folder instead.")
     refuse_mixture(folder, (MOTIONS,))
     try:
-        with np.load(folder / MOTIONS, allow_pickle=False) as held:
+        refuse_large(folder / MOTIONS, _LARGEST)
+        with open(folder / MOTIONS, "rb") as stream, np.load(stream, allow_pickle=False) as held:
             motions = {str(name): _motion(held, k) for k, name in enumerate(held["trials"])}
             hashes = dict(zip(motions, (str(one) for one in held["hashes"]), strict=True))
             loads = dict(zip(motions, held["loads"], strict=True))
             session = Path(os.path.normpath(folder / str(held["session"])))
             settings = json.loads(str(held["settings"]))
-    except (BadZipFile, EOFError, OSError, ValueError, KeyError) as error:
+    except FileRefused:
+        raise
+    except (BadZipFile, EOFError, OSError, ValueError, KeyError, MemoryError, zlib.error) as error:
         raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
     return KeptResults(body, source, motions, hashes, loads, session, settings)
 
@@ -140,7 +147,7 @@ def _load(trial: Trial) -> Array:
 
 
 def _motion(held: "np.lib.npyio.NpzFile", k: int) -> Motion:
-    arrays: dict[str, Any] = {name: held[f"{k}.{name}"] for name in _ARRAYS}
+    arrays: dict[str, Any] = {name: held[f"{k}.{name}"] for name in BY_FRAME}
     texts: dict[str, Any] = {name: tuple(str(one) for one in held[f"{k}.{name}"]) for name in _TEXTS}
     return Motion(**arrays, **texts)
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
@@ -28,7 +29,8 @@ class TrialReplay:
     ``time`` (F,) s; ``positions`` (F, N, 3) and ``rotations`` (F, N, 4), quaternions x y z w, of the segments;
     ``markers`` (F, K, 3); ``com`` (F, 3); ``measured`` and ``simulated`` (F, 2, 3) force and centre of pressure, with
     ``parameters`` "identified" or "table"; ``residual`` (F, 3) N measured less simulated, of fully measured frames;
-    ``plates`` (P, 4, 3) corners; ``worst`` s at which the residual is largest (NaN: nowhere measured).
+    ``plates`` (P, 4, 3) corners; ``worst`` s at which the residual is largest (NaN: nowhere measured);
+    ``state`` (F,) `AngleState` of each frame.
     """
 
     name: str
@@ -43,6 +45,7 @@ class TrialReplay:
     residual: Array
     plates: Array
     worst: float
+    state: NDArray[np.int8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +116,7 @@ def _trial(
         residual[chosen],
         np.reshape([plate.corners for plate in trial.plates], (-1, 4, 3)),
         float("nan") if worst is None else float(motion.time[worst]),
+        motion.frame_state[chosen],
     )
 
 

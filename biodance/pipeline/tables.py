@@ -18,7 +18,7 @@ from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import CHANNELS, Array
+from biodance.records import CHANNELS, AngleState, Array
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -81,6 +81,7 @@ _TENSOR = ("xx", "xy", "yy", "xz", "yz", "zz")
 TRIALS = ("trial", "role", "status", "reason", "marker_rms_m", "marker_max_m", "gaps_percent", "frames_used")
 CHECKS = ("what", "where", "value", "limit", "inside", "advice")
 _MARKERS = ("trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s")
+_STATES = ("trial", "joint", "state", "start_s", "end_s")
 FINDINGS = (
     "effect", "target", "parameter", "value", "sd", "unit", "visible_fraction", "log_bayes_factor", "gain_low",
     "gain_high", "advice",
@@ -95,9 +96,10 @@ def session_tables(
     """Return all tables of a session by name.
 
     Always ``trials``, ``checks``, ``markers`` (distance to the model), ``marker_residuals`` (m by frame), ``angles``
-    (deg by frame), ``wrench`` (N, N·m by frame: measured, of the table's body, of the identified one, about the lab
-    origin); with an identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known) and
-    ``validation``; with a diagnosis ``findings``, ``unobservable`` and ``adequacy``; with a
+    (deg by frame; empty where not determined), ``angle_states`` (when an angle is filled or not determined), ``wrench``
+    (N, N·m by frame: measured, of the table's body, of the identified one, about the lab origin); with an
+    identification ``segments``, ``moments`` (N·m by frame, of the trial whose feet are known; empty where the posture
+    is not determined) and ``validation``; with a diagnosis ``findings``, ``unobservable`` and ``adequacy``; with a
     movement those of `movement_tables`. A table without rows has its columns all the same.
     """
     found = result.identification
@@ -107,6 +109,7 @@ def session_tables(
         "markers": _frame((row for one in result.trials for row in _markers(one)), _MARKERS),
         "marker_residuals": _joined(map(_residuals, result.trials)),
         "angles": _joined(_angles(result, one) for one in result.trials),
+        "angle_states": _frame((row for one in result.trials for row in _states(one)), _STATES),
         "wrench": _joined(_wrench(result, one) for one in result.trials),
     }
     if found is not None:
@@ -167,11 +170,15 @@ def _angles(result: SessionResult, one: TrialResult) -> "DataFrame | None":
     if one.motion is None or result.body is None:
         return None
     names, motion = [joint.name for joint in result.body.joints], one.motion
-    angle = np.degrees(motion.q[:, motion.q.shape[1] - len(names) :])
-    columns: dict[str, Any] = {"determined": motion.determined} | {
-        f"{name}_deg": angle[:, j] for j, name in enumerate(names)
-    }
+    state = [AngleState(one).words for one in motion.frame_state]
+    columns: dict[str, Any] = {"determined": motion.determined, "state": state}
+    columns |= {f"{name}_deg": motion.known_angles[:, j] for j, name in enumerate(names)}
     return _by_frame(one.trial.name, motion.time, columns)
+
+
+def _states(one: TrialResult) -> Iterator[Row]:
+    for span in one.motion.spans() if one.motion is not None else ():
+        yield one.name, span.joint, span.state.words, span.start, span.end
 
 
 def _wrench(result: SessionResult, one: TrialResult) -> "DataFrame | None":
@@ -202,7 +209,7 @@ def _moments(found: SessionIdentification) -> "DataFrame":
     bands = found.torques
     if bands is None:
         return _joined(())
-    columns: dict[str, Any] = {"used": bands.use}
+    columns: dict[str, Any] = {"used": bands.use, "state": [AngleState(one).words for one in bands.state]}
     for j, name in enumerate(bands.joints):
         columns |= {
             f"{name}_Nm": bands.torque[:, j],

@@ -21,7 +21,7 @@ from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import SIDES, Array, Wrench
+from biodance.records import SIDES, AngleSpan, Array, Wrench
 from biodance.settings import COP_FORCE
 from biodance.version import __version__
 
@@ -62,7 +62,7 @@ def write_rerun(one: TrialResult, body: Body, path: Path, *, solids: SegmentSoli
     _markers(rerun, stream, one)
     _forces(rerun, stream, one, body)
     for j, joint in enumerate(body.joints):
-        angle = np.where(one.motion.determined, one.motion.angles[:, j], np.nan)
+        angle = one.motion.known_angles[:, j]
         _send(rerun, stream, f"angles/{joint.name}", one.motion.time, rerun.Scalars.columns(scalars=angle))
     stream.flush()
     return path
@@ -152,7 +152,8 @@ def results_into_c3d(
 
     Joint angles (deg), moments (N·m, what the muscles do) and powers (W), positive as the joints of the body; measured
     and predicted wrench about the lab origin (of the prepared, filtered trial); the centre of mass; foot strikes and
-    offs, of the plates where they saw one, else of the markers; in the group BIODANCE the masses of all segments.
+    offs, of the plates where they saw one, else of the markers; in the group BIODANCE the masses of all segments, and
+    when which angle is filled or not determined (NOT_MEASURED).
     Wrenches only where the plates measure all that the ground does, a leg's moments and powers where they measure what
     it does to its foot.
 
@@ -172,7 +173,8 @@ def results_into_c3d(
             f"one."
         )
     outputs = [*_angles(body, one)]
-    outputs.append(Output("BodyCentreOfMass", "MODELED_MARKERS", centre_of_mass(body, one.motion), "x, y, z"))
+    centre = np.where(one.motion.determined[:, None], centre_of_mass(body, one.motion), np.nan)
+    outputs.append(Output("BodyCentreOfMass", "MODELED_MARKERS", centre, "x, y, z"))
     contact = contact_of(one.trial, one, body)
     if one.comparison is not None:
         outputs += _wrenches(body, one)
@@ -186,9 +188,14 @@ def results_into_c3d(
         "SOURCE": [source[:255]],
         "SEGMENTS": list(body.segments),
         "MASS": body.sip.mass,
+        "NOT_MEASURED": [_when(span)[:255] for span in one.motion.spans()][:255] or ["none"],
     }
     write_results_c3d(path, one.trial.source.path, outputs=outputs, events=events, parameters=said, subject=subject)
     return path, f"The recording of trial {trial} with {len(outputs)} results and {len(events)} events. {source}"
+
+
+def _when(span: AngleSpan) -> str:
+    return f"{span.joint} {span.state.words} {span.start:.3f} {span.end:.3f} s"
 
 
 def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:
@@ -216,7 +223,7 @@ def _three(values: Array) -> Array:
 
 def _angles(body: Body, one: TrialResult) -> Iterator[Output]:
     assert one.motion is not None
-    angle = np.where(one.motion.determined[:, None], one.motion.q[:, -len(body.joints) :], np.nan)
+    angle = np.radians(one.motion.known_angles)
     for name, columns, axes in _groups(body):
         yield Output(f"{name}Angles", "ANGLES", _three(angle[:, columns]), axes, turns=False)
 

@@ -22,7 +22,7 @@ from biodance.records.arrays import (
 )
 from biodance.records.left_out import LeftOut
 from biodance.records.markers import Markers
-from biodance.records.motion import Motion
+from biodance.records.motion import AngleSpan, AngleState, Motion
 from biodance.records.session import ROLES, Defect, Role, Session, Source, Trial
 from biodance.records.sip import Sip
 from biodance.records.subject import SIDES, FootSizes, Subject, side_in_name
@@ -33,6 +33,8 @@ __all__ = [
     "CHANNEL_TITLES",
     "ROLES",
     "SIDES",
+    "AngleSpan",
+    "AngleState",
     "Array",
     "Defect",
     "FootSizes",

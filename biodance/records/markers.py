@@ -1,7 +1,7 @@
 """Where the markers were."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,8 @@ class Markers:
         (T,) s, increasing.
     xyz : array_like
         (T, K, 3) m, lab frame, z up; NaN where a marker was not seen.
+    filled : array_like of bool
+        (T, K) True where a place was put into a gap (`fill_gaps`); by default nowhere.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Markers:
     names: tuple[str, ...]
     time: Array
     xyz: Array
+    filled: NDArray[np.bool_] = field(default_factory=lambda: np.empty((0, 0), dtype=bool))
 
     def __post_init__(self) -> None:
         names = tuple(self.names)
@@ -55,6 +58,11 @@ class Markers:
         if len(set(names)) != len(names):
             twice = sorted({n for n in names if names.count(n) > 1})
             raise BiodanceError(f"Marker names occur twice: {', '.join(twice)}.")
+        filled = np.array(self.filled, dtype=bool)
+        if filled.size and filled.shape != (time.size, len(names)):
+            raise BiodanceError(f"Markers.filled has shape {filled.shape}, expected ({time.size}, {len(names)}).")
+        filled.setflags(write=False)
+        assign(self, filled=filled)
 
     def __repr__(self) -> str:
         return f"Markers({len(self.names)} markers, {span(self.time)})"
@@ -73,6 +81,11 @@ class Markers:
         seen = np.logical_not(any_coordinate(np.isnan(self.xyz)))
         seen.setflags(write=False)
         return seen
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Where a marker was seen by the cameras and not put into a gap, (T, K) bool."""
+        return self.seen & ~self.filled if self.filled.size else self.seen
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
@@ -110,7 +123,7 @@ class Markers:
         chosen = [known_index("marker of this trial", name, self.names) for name in names]
         xyz = self.xyz.take(chosen, axis=1)
         xyz.setflags(write=False)  # the record keeps it without a copy
-        return Markers(names, self.time, xyz)
+        return Markers(names, self.time, xyz, self.filled[:, chosen] if self.filled.size else self.filled)
 
     def table(self) -> "pd.DataFrame":
         """Return the trajectories as a table.

@@ -1,6 +1,7 @@
 """How a body moved."""
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.errors import BiodanceError, known_index
-from biodance.records.arrays import Array, assign, check_time, freeze, frozen_array, in_time, rate_of, span
+from biodance.records.arrays import Array, assign, check_time, freeze, frozen_array, in_time, rate_of, runs, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +48,36 @@ class Encoders:
         return rate_of(self.time)
 
 
+BY_FRAME = ("time", "q", "v", "a", "residual", "determined", "state")
+"""Fields of a `Motion` that have one row a frame."""
+
+
+class AngleState(IntEnum):
+    """How a joint angle of one frame was found."""
+
+    MEASURED = 0
+    """From markers that were seen in this frame."""
+    FILLED = 1
+    """Only with markers that were put into a gap of the recording."""
+    NOT_DETERMINED = 2
+    """The frame's markers leave it open: a guess from the frames before and after, which no export shows."""
+
+    @property
+    def words(self) -> str:
+        """Return the state as tables write it."""
+        return self.name.lower().replace("_", " ")
+
+
+@dataclass(frozen=True)
+class AngleSpan:
+    """A run of frames in which the angle of a ``joint`` is not measured: ``start`` to ``end`` s, both included."""
+
+    joint: str
+    state: AngleState
+    start: float
+    end: float
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Generalised motion of a body, in Pinocchio's order.
@@ -70,6 +101,9 @@ class Motion:
         How the motion was found, in sentences.
     joint_names : tuple of str
         (n) names of the joint angles, the last n columns of q; () = not known.
+    state : array_like of int
+        (T, n) `AngleState` of every joint angle; by default measured. In a frame that is not ``determined`` and does
+        not say which angle is open, none is.
 
     Examples
     --------
@@ -87,6 +121,7 @@ class Motion:
     determined: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
     notes: tuple[str, ...] = ()
     joint_names: tuple[str, ...] = ()
+    state: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, dtype=np.int8))
 
     def __post_init__(self) -> None:
         time = check_time(self.time, "Motion")
@@ -105,6 +140,14 @@ class Motion:
             raise BiodanceError(
                 f"Motion.joint_names has {names} names for {columns} columns of q, {self._root} of them the root's."
             )
+        joints = self.q.shape[1] - self._root
+        state = np.array(self.state if np.size(self.state) else np.zeros((frames, joints)), dtype=np.int8)
+        if state.shape != (frames, joints):
+            raise BiodanceError(f"Motion.state has shape {state.shape}, expected ({frames}, {joints}).")
+        unsaid = ~determined & (state != AngleState.NOT_DETERMINED).all(axis=1)
+        state[unsaid] = AngleState.NOT_DETERMINED
+        state.setflags(write=False)
+        assign(self, state=state)
 
     def __repr__(self) -> str:
         left = int(np.sum(~self.determined))
@@ -150,6 +193,41 @@ class Motion:
         return np.degrees(self.q[:, self._root :])
 
     @property
+    def known_angles(self) -> Array:
+        """Joint angles as `angles`, (T, n) degrees; NaN where they are not determined."""
+        return np.where(self.state == AngleState.NOT_DETERMINED, np.nan, self.angles)
+
+    @property
+    def frame_state(self) -> NDArray[np.int8]:
+        """(T,) `AngleState` of every frame: filled where any angle is, not determined where its posture is not."""
+        filled = (self.state == AngleState.FILLED).any(axis=1)
+        worst = np.where(filled, AngleState.FILLED, AngleState.MEASURED)
+        return np.where(self.determined, worst, AngleState.NOT_DETERMINED).astype(np.int8)
+
+    def spans(self) -> tuple[AngleSpan, ...]:
+        """Return where every joint angle is filled or not determined, joint by joint, in the order of time.
+
+        Returns
+        -------
+        tuple of AngleSpan
+            () where all angles were measured.
+
+        Examples
+        --------
+        >>> result["squat_1"].motion.spans()
+        ()
+        """
+        return tuple(
+            AngleSpan(joint, kind, float(self.time[start]), float(self.time[stop - 1]))
+            for k, joint in enumerate(self._titles)
+            for start, stop, kind in sorted(
+                (*run, kind)
+                for kind in (AngleState.FILLED, AngleState.NOT_DETERMINED)
+                for run in runs(self.state[:, k] == kind)
+            )
+        )
+
+    @property
     def _titles(self) -> tuple[str, ...]:
         return self.joint_names or tuple(f"joint_{k + 1}" for k in range(self.q.shape[1] - self._root))
 
@@ -160,7 +238,7 @@ class Motion:
         -------
         pandas.DataFrame
             Index time (s); ``root x (m)`` ..., ``root qx`` ... (quaternion), then joint angles, ``left_knee_flexion
-            (deg)`` and so on.
+            (deg)`` and so on; NaN where they are not determined.
 
         Examples
         --------
@@ -168,7 +246,8 @@ class Motion:
         True
         """
         root = (*(f"root {axis} (m)" for axis in "xyz"), *(f"root q{axis}" for axis in "xyzw"))[: self._root]
-        values = np.concatenate([self.q[:, : self._root], self.angles], axis=1)
+        placed = np.where(self.determined[:, None], self.q[:, : self._root], np.nan)
+        values = np.concatenate([placed, self.known_angles], axis=1)
         return in_time(self.time, values, (*root, *(f"{name} (deg)" for name in self._titles)))
 
     def plot_angles(self, *joints: str, axes: "Axes | None" = None) -> "Axes":
@@ -198,4 +277,5 @@ class Motion:
         """
         names = self._titles
         columns = [known_index("joint angle of this motion", joint, names) for joint in joints or names]
-        return display.curves(self.time, self.angles[:, columns], [names[k] for k in columns], "angle (deg)", axes=axes)
+        shown, chosen = self.known_angles[:, columns], [names[k] for k in columns]
+        return display.curves(self.time, shown, chosen, "angle (deg)", axes=axes)

@@ -8,6 +8,7 @@ import numpy as np
 from biodance.errors import TrialRefused
 from biodance.lab.filters import force_filter, low_pass
 from biodance.records import Array, Markers, Mask, Motion, Plate, Trial, Wrench, freeze
+from biodance.records.motion import BY_FRAME
 from biodance.settings import Settings
 from biodance.spatial import axis_rotation, wrench_about_origin
 
@@ -141,8 +142,7 @@ def with_forces_at(trial: Trial, motion: Motion, forces: Forces, pose: FramePose
     kept = slice(known[0], known[-1] + 1)
     recorded = zip(forces.plates, forces.during(own[kept]), strict=True)
     plates = tuple(pose.in_room(plate, motion.time[kept], value) for plate, value in recorded)
-    by_frame = ("time", "q", "v", "a", "residual", "determined")
-    cut = replace(motion, **{name: getattr(motion, name)[kept] for name in by_frame})
+    cut = replace(motion, **{name: getattr(motion, name)[kept] for name in BY_FRAME})
     markers = trial.markers
     seen = None if markers is None else Markers(markers.names, markers.time[kept], markers.xyz[kept])
     return replace(trial, plates=plates, markers=seen), cut

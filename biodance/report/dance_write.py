@@ -14,6 +14,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.dance.verify import Margin
 from biodance.lab.c3d.write import FileValue, write_c3d
+from biodance.lab.plain_text import for_spreadsheet
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.still import posture_still
@@ -162,10 +163,11 @@ def _plain(name: str) -> str:
 
 def print_dance(found: dict[str, Any]) -> None:
     """Print what was designed on the terminal: its size, its criteria, the margins and what will be known."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    from biodance.report.terminal import SafeConsole
+
+    console = SafeConsole()
     if found["feasible"]:
         criterion = found["criterion"]
         console.print(
@@ -208,7 +210,7 @@ def write_angles(dance: Dance, path: Path) -> None:
     """
     motion = dance.motion(SETPOINT_RATE)
     names = ["time_s", *(f"root_{axis}_m" for axis in "xyz"), *(f"root_q{axis}" for axis in "xyzw")]
-    names += [f"{joint.name}_rad" for joint in dance.body.joints]
+    names += [str(for_spreadsheet(f"{joint.name}_rad")) for joint in dance.body.joints]
     table = np.column_stack([motion.time, motion.q])
     lines = [",".join(names), *(",".join(f"{value:.9g}" for value in row) for row in table)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -3,6 +3,7 @@ printed, and the document for programs.
 """
 
 import json
+import sys
 from collections.abc import Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
@@ -90,8 +91,21 @@ def print_live(found: LiveResult, document: dict[str, Any], console: Console) ->
 
 _LOOPBACK = "127.0.0.1"
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'"
+_PATIENCE = 10.0
+"""s for which a connection may say nothing."""
 _LAST = 2.0
 """s that the end waits for the page to fetch it."""
+
+
+class _Server(ThreadingHTTPServer):
+    """Serves the page; says nothing of a browser that went away in the middle of an answer."""
+
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Leave the terminal to the stream where a tab was closed; what else goes wrong is told as usual."""
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
 
 
 class LivePage:
@@ -112,12 +126,11 @@ class LivePage:
         self._lock, self._fetched, self._watched = Lock(), Event(), False
         self._said: dict[str, Any] = {"time_s": 0.0, "known": {}, "suspect": [], "next": "", "warnings": [], "end": ""}
         try:
-            self._server = ThreadingHTTPServer((_LOOPBACK, port), self._handler())
+            self._server = _Server((_LOOPBACK, port), self._handler())
         except (OSError, OverflowError) as error:
             raise BiodanceError(
                 f"--page {port}: this port of the loopback cannot be had ({error}). Give another one, or 0 for any."
             ) from error
-        self._server.daemon_threads = True
         self.address = f"http://{_LOOPBACK}:{self._server.server_address[1]}/"
         Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
 
@@ -169,6 +182,8 @@ class LivePage:
         page = self
 
         class Handler(BaseHTTPRequestHandler):
+            timeout = _PATIENCE
+
             def do_GET(self) -> None:
                 host = self.headers.get("Host", "").rpartition(":")[0]
                 found = page._answer(self.path) if host in (_LOOPBACK, "localhost") else None

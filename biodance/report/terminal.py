@@ -7,10 +7,12 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from biodance.diagnosis.adequacy import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
+from biodance.errors import without_codes
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, told_together, without_path
 from biodance.report.wording import (
@@ -22,6 +24,14 @@ from biodance.report.wording import (
     sizes_in_words,
     trial_and_subject,
 )
+
+
+class SafeConsole(Console):
+    """A terminal that shows what stands in files as text, whatever codes it holds."""
+
+    def render_str(self, text: str, **how: Any) -> Text:  # type: ignore[override]
+        """Return a text with control characters as their codes; what we mark up is none of them."""
+        return super().render_str(without_codes(text), **how)
 
 
 def _line(console: Console, text: str) -> None:

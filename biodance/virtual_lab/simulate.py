@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import BiodanceError
+from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Subject
 from biodance.threads import one_thread
 from biodance.virtual_lab.faults.forces import wobbling_mass
@@ -98,7 +99,20 @@ def write_visit(
         population=visit.laboratory.population,
     )
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
-    out.mkdir(parents=True, exist_ok=True)
+    with whole_folder(out) as part:
+        _write(plan, person, instruments, visit, performed, part)
+    return out
+
+
+def _write(
+    plan: Protocol,
+    person: Person,
+    instruments: Instruments,
+    visit: LabVisit,
+    performed: Callable[[Instruments, Person, TrialPlan], Performance],
+    out: Path,
+) -> None:
+    """Write the recordings, session.toml and the truth into the folder ``out``."""
     performances = []
     declared = scale_reading(person, visit.number, visit.tolerances)
     for trial in plan.trials:
@@ -113,7 +127,6 @@ def write_visit(
     (out / TRUTH).mkdir()
     document = truth(person, plan.name, instruments, performances)
     (out / TRUTH / "truth.json").write_text(json.dumps(document, indent=1) + "\n")
-    return out
 
 
 def _swinging_flesh(person: Person, laboratory: Laboratory) -> tuple[AppliedForce, ...]:

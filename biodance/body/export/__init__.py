@@ -18,7 +18,7 @@ from biodance.body.inertia import pseudo_inertia
 from biodance.body.solids import SegmentSolids
 from biodance.discovery import Family, missing_of
 from biodance.errors import BiodanceError
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import refuse_present, write_new
 
 _OF_SEGMENTS = ("csv",)
 """Formats that say what is known of the segments as wholes; all others show the parts as bodies of their own."""
@@ -100,14 +100,16 @@ def write_model(
     if kind.FORMAT not in _OF_SEGMENTS:
         body = parts_as_segments(body)
         refuse_impossible(body)
-    write_new(path, _content(kind, body, source, solids))
+    content = _content(kind, body, source, solids)
     beside = kind.beside(body, solids) if solids is not None and hasattr(kind, "beside") else {}
-    for name, content in beside.items():
-        file = path.parent / name
-        if not (file.is_file() and file.read_bytes() == content):
-            file.parent.mkdir(exist_ok=True)
-            write_new(file, content)
-    return path
+    new = {path.parent / name: data for name, data in beside.items()}
+    new = {file: data for file, data in new.items() if not (file.is_file() and file.read_bytes() == data)}
+    for file in (path, *new):
+        refuse_present(file)
+    for file, data in new.items():
+        file.parent.mkdir(exist_ok=True)
+        write_new(file, data)
+    return write_new(path, content)  # last: a model that is there has all that it names
 
 
 def _content(member: ModelFormat, body: Body, source: str, solids: SegmentSolids | None) -> bytes:

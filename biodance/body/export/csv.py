@@ -12,6 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.inertia import rigid_inertia
+from biodance.lab.plain_text import for_spreadsheet
 from biodance.records import Array
 
 FORMAT = "csv"
@@ -38,7 +39,8 @@ def text(body: Body, source: str) -> str:
         numbers = (*phi, *_derived(phi)), (*sd[i], *spread)
         for quantity, unit, value, deviation in zip((*STANDARD, *DERIVED), _UNITS, *numbers, strict=True):
             frame = COM_FRAME if quantity.startswith("central") else "" if quantity == "mass" else JOINT_FRAME
-            write.writerow([name, quantity, repr(float(value)), unit, repr(float(deviation)), frame, source])
+            row = [name, quantity, repr(float(value)), unit, repr(float(deviation)), frame, source]
+            write.writerow([for_spreadsheet(row[0]), *row[1:]])
     return stream.getvalue()
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
+from biodance.lab.plain_text import LARGEST_NUMBER
 from biodance.lab.plates.parameters import INCH, POUND
 from biodance.records import Array
 
@@ -158,11 +159,10 @@ def _data(content: bytes, samples: int, channels: int, kind: Any, start: int, he
             f"{need}. The file is cut off or damaged: copy or export it again."
         )
     data = np.frombuffer(content, kind, samples * channels, offset=start).reshape(samples, channels)
-    if not np.isfinite(data).all():
-        raise FileRefused(
-            f"{path}: sample {int(np.argwhere(np.logical_not(np.isfinite(data)))[0][0]) + 1} is not a number. Export "
-            f"it again."
-        )
+    wrong = np.logical_not(np.abs(data) <= LARGEST_NUMBER)
+    if wrong.any():
+        at = int(np.argwhere(wrong)[0][0]) + 1
+        raise FileRefused(f"{path}: sample {at} is not a number that a plate records. Export it again.")
     return data
 
 
@@ -171,10 +171,10 @@ def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
     product = np.prod(
         [header[name][:6].astype(float) for name in ("sensitivity", "gain", "excitation", "counts_per_volt")], axis=0
     )
-    if not np.isfinite(product).all() or (product == 0).any():
+    if not (np.abs(product) <= LARGEST_NUMBER**2).all() or (np.abs(product) < 1 / LARGEST_NUMBER).any():
         raise FileRefused(
-            f"{path}: plate {number} holds ADC counts but a calibration value is 0. Enter the calibration in NetForce "
-            f"and save again."
+            f"{path}: plate {number} holds ADC counts but a calibration value is 0 or no number. Enter the "
+            f"calibration in NetForce and save again."
         )
     return _MICROVOLT / product
 

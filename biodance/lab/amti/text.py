@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.plain_text import COMMAS_READ, read_text, with_points
+from biodance.lab.plain_text import COMMAS_READ, parse_number, read_text, with_points
 from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE
 from biodance.lab.plates.decode import DEEPEST
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
@@ -18,6 +18,7 @@ from biodance.library import read_toml
 from biodance.records import CHANNELS, Array
 
 _KEYS = ("columns", "force_unit", "moment_unit", "rate_hz", "plate_size_m", "sensor_depth_m", "acts_on")
+_CHANNELS = 6  # a line with all numbers of a row but one is a damaged row and no header
 _EVEN = 0.02  # share by which a time step may differ from the others (times are often rounded to ms)
 
 
@@ -62,6 +63,7 @@ def parse_amti_text(path: Path) -> AmtiText:
         todo = f"Write the file {beside.name} beside it and correct what is not so:\n{_example(values, found)}"
         raise FileRefused(f"{path}: does not say {', '.join(lacking)}. {todo}")
     _refuse_nonsense(found, given, values, beside if given else path)
+    _refuse_other_clock(values, columns, float(rate or 0), path)
     order = [columns.index(channel) for channel in CHANNELS]
     force, moment = plain_unit(str(force_unit)), plain_unit(str(moment_unit))
     load, rate = values[:, order] * ([FORCE[force]] * 3 + [MOMENT[moment]] * 3), float(rate or 0)
@@ -82,7 +84,7 @@ def _table(text: str, path: Path) -> tuple[list[str], Array]:
         if not cells:
             continue
         row = _numbers(cells)
-        if row is None and not rows:
+        if row is None and not rows and sum(_numbers([cell]) is not None for cell in cells) < _CHANNELS - 1:
             header = cells
         elif row is None or (rows and len(row) != len(rows[0])):
             expected = f"{len(rows[0])} numbers" if rows else "numbers"
@@ -101,10 +103,10 @@ def _table(text: str, path: Path) -> tuple[list[str], Array]:
 
 
 def _numbers(cells: list[str]) -> list[float] | None:
-    """Return the cells as finite numbers, None if one is none."""
+    """Return the cells as numbers that can be recorded, None if one is none."""
     try:
-        row = [float(cell) for cell in cells]
-    except ValueError:
+        row = [parse_number(cell, "") for cell in cells]
+    except FileRefused:
         return None
     return row if np.isfinite(row).all() else None
 
@@ -130,6 +132,18 @@ def _rate(values: Array, columns: list[str]) -> float | None:
     step = (time[-1] - time[0]) / (time.size - 1)
     even = step > 0 and np.abs(time - time[0] - step * np.arange(time.size)).max() <= max(_EVEN * step, 0.0005)
     return round(1 / step, 3) if even else None
+
+
+def _refuse_other_clock(values: Array, columns: list[str], rate: float, path: Path) -> None:
+    """Refuse a table whose own time column goes in other steps than ``rate`` Hz: rows are lost, doubled or exchanged,
+    or the rate is wrong.
+    """
+    if "time_s" not in columns or columns.index("time_s") >= values.shape[1]:
+        return
+    own = _rate(values, columns)
+    if own is None or abs(own - rate) > _EVEN * rate:
+        has = "goes in unequal steps" if own is None else f"goes at {own:g} Hz"
+        raise FileRefused(f"{path}: the time column {has}, {rate:g} Hz are declared. Export it again, or correct that.")
 
 
 def _given(beside: Path) -> dict[str, Any]:

@@ -242,7 +242,7 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     have.
     """
     known = {_NAMES[name]: value for name, value in _written(raw).items() if name in _NAMES}
-    written = {name: value for name, value in known.items() if math.isfinite(value) and value != 0}
+    written = {name: value for name, value in known.items() if value != 0 and not math.isnan(value)}
     scale = _scale(written)
     warnings: list[str] = []
     measures: dict[str, float] = {}

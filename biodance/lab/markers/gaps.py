@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.records import Array, Markers, longest_run, runs
 from biodance.spatial import rigid_fit
@@ -96,7 +97,7 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
                 xyz[start:stop, column] = bridge
                 gaps.append(Gap(label, start, stop, "bridged by a spline"))
     xyz.setflags(write=False)  # the record keeps it without a copy
-    bridged = Markers(markers.names, markers.time, xyz)
+    bridged = Markers(markers.names, markers.time, xyz, _filled(markers, xyz))
     if not later:
         return bridged, tuple(gaps)
     xyz = xyz.copy()
@@ -106,7 +107,12 @@ def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0
             xyz[gap.start : gap.stop, markers.names.index(gap.label)] = carried
         gaps.append(Gap(gap.label, gap.start, gap.stop, how))
     xyz.setflags(write=False)
-    return Markers(markers.names, markers.time, xyz), tuple(gaps)
+    return Markers(markers.names, markers.time, xyz, _filled(markers, xyz)), tuple(gaps)
+
+
+def _filled(markers: Markers, xyz: Array) -> NDArray[np.bool_]:
+    """Return (T, K) where places ``xyz`` are known that the ``markers`` as recorded do not show."""
+    return np.asarray(~markers.seen & np.isfinite(xyz).all(axis=2))
 
 
 def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:

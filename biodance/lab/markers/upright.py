@@ -3,7 +3,7 @@ alone, and where such a person has landmarks (``anthropometry/standing.toml``).
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -253,7 +253,7 @@ def axis_to_head(markers: Markers, known: MarkerSet | None) -> Array | None:
     high and low markers; where they say nothing, the only way up in which somebody stands. None if neither tells it.
     ``known`` is the set of the labels (`recognise`).
     """
-    few = replace(markers, time=spread_frames(markers.time), xyz=spread_frames(markers.xyz))
+    few = Markers(markers.names, spread_frames(markers.time), spread_frames(markers.xyz))
     ends = [
         [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (_UPPER, _LOWER)
     ]

@@ -87,8 +87,9 @@ def columns_of(path: str | Path) -> tuple[str, ...]:
     return _parts(Path(path)).labels[1:]
 
 
-def write_mot(path: str | Path, table: TimeTable) -> Path:
-    """Write a table as .mot or .sto (version 1, tabs, nine significant digits); return the path.
+def write_mot(path: str | Path, table: TimeTable, *, notes: tuple[str, ...] = ()) -> Path:
+    """Write a table as .mot or .sto (version 1, tabs, nine significant digits), ``notes`` in its header; return the
+    path.
 
     Raises
     ------
@@ -107,7 +108,7 @@ def write_mot(path: str | Path, table: TimeTable) -> Path:
     counts = (f"nRows={table.time.size}", f"nColumns={len(table.columns) + 1}")
     degrees = f"inDegrees={'yes' if table.in_degrees else 'no'}"
     labels = "\t".join(["time", *table.columns])
-    header = [table.name or path.stem, "version=1", *counts, degrees, "endheader", labels]
+    header = [table.name or path.stem, "version=1", *counts, degrees, *notes, "endheader", labels]
     rows = ("\t".join(f"{v:.10g}" for v in (t, *values)) for t, values in zip(table.time, table.values, strict=True))
     return write_new(path, ("\n".join([*header, *rows]) + "\n").encode())
 

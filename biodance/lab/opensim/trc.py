@@ -57,7 +57,7 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     rows = text.splitlines()
     header = _header(rows, path)
     names, warnings = _labels(rows, path)
-    numbers, raw_time, values = _table(rows, len(names), path)
+    numbers, raw_time, values, short = _table(rows, len(names), path)
     unit = _unit(header, path)
     if (announced := header.get("NumFrames", "")).isdigit() and int(announced) != numbers.size:
         warnings.append(f"The header announces {announced} frames, the file holds {numbers.size}.")
@@ -70,7 +70,7 @@ def read_trc(path: str | Path, *, role: Role = "fit") -> Trial:
     seen, unseen = unseen_at_origin(values * _METRES[unit])
     (time, xyz), timing = _equal_steps(tuple(names), numbers, raw_time, seen, _rate(header, path), path)
     warnings += timing
-    history = [*[COMMAS_READ] * commas, f"Coordinates were read in {unit} and turned into m.", *unseen]
+    history = [*[COMMAS_READ] * commas, *short, f"Coordinates were read in {unit} and turned into m.", *unseen]
     if _is_z_up(Markers(tuple(names), time, xyz)):
         warnings.append(
             "The markers are tallest along z: the file was taken as z up, although .trc files are y up by convention."
@@ -174,9 +174,12 @@ def _labels(rows: list[str], path: Path) -> tuple[list[str], list[str]]:
     return names, warnings
 
 
-def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return frame numbers (T,), times (T,) s and coordinates (T, K, 3) in file units."""
-    width = 2 + 3 * count
+def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], Array, Array, list[str]]:
+    """Return frame numbers (T,), times (T,) s, coordinates (T, K, 3) in file units, and which rows are short.
+
+    Some programs leave out the empty cells at a row's end: whole markers, never a part of one.
+    """
+    width, short = 2 + 3 * count, list[int]()
     table: list[list[float]] = []
     for line_number, line in enumerate(rows[_HEADER_ROWS:], start=_HEADER_ROWS + 1):
         found = cells(line)
@@ -189,23 +192,30 @@ def _table(rows: list[str], count: int, path: Path) -> tuple[NDArray[np.int64], 
             continue
         if len(found) > width and not any(found[width:]):
             found = found[:width]
-        if len(found) > width or ("\t" not in line and len(found) < width):
+        lacking = width - len(found)
+        if lacking < 0 or (lacking and ("\t" not in line or lacking % 3)):
             raise FileRefused(
                 f"{path}: row {line_number} holds {len(found)} cells, {width} are expected for {count} markers. "
                 f"Export it again."
             )
-        found += [""] * (width - len(found))
+        short += [line_number] * (lacking > 0)
+        found += [""] * lacking
         table.append([parse_number(cell, f"{path}, row {line_number}") for cell in found])
     if not table:
         raise FileRefused(f"{path}: holds a header but no frame. Export the recording again.")
     array = np.array(table)
-    return array[:, 0].astype(int), array[:, 1], array[:, 2:].reshape(len(table), count, 3)
+    said = (
+        [f"{len(short)} rows are short (first: row {short[0]}): their last markers count as not seen."] if short else []
+    )
+    return array[:, 0].astype(int), array[:, 1], array[:, 2:].reshape(len(table), count, 3), said
 
 
 def _spread(values: Array) -> float:
     """Return the median over frames of the largest extent of the markers (T, K, 3), file units; 0 if none is seen."""
-    seen = values[np.logical_not(np.isnan(values).all(axis=(1, 2)))]
-    return float(np.median(np.max(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=1))) if len(seen) else 0.0
+    known = np.isfinite(values)
+    extent = np.where(known, values, -np.inf).max(axis=1) - np.where(known, values, np.inf).min(axis=1)
+    seen = extent[np.isfinite(extent).any(axis=1)]
+    return float(np.median(seen.max(axis=1))) if len(seen) else 0.0
 
 
 def _equal_steps(

@@ -20,7 +20,8 @@ _AXES = ("x", "y", "z")
 @dataclass(frozen=True)
 class PlateFault:
     """One fault of a plate: ``name`` of its effect, ``parameter`` and ``unit`` of its size, and whether it is
-    ``lasting``: stays with a laboratory from one session to the next.
+    ``lasting``: stays with a laboratory from one session to the next; ``legal`` sizes: beyond them the plate
+    reads another unit, or is another plate, which no correction mends.
 
     With a fault of some size at a place (a channel ``Fz``, a pair ``Fz->My``, an axis ``x``) a plate reads ``mixing`` @
     wrench + size ``zero``, about its centre (N, N·m).
@@ -29,6 +30,7 @@ class PlateFault:
     name: str
     parameter: str
     unit: str
+    legal: tuple[float, float]
     lasting: bool = True
 
     @property
@@ -167,12 +169,12 @@ def _channel(place: str) -> Array:
     return np.eye(6)[CHANNELS.index(place)]
 
 
-POSITION = _Position("plate_position", "shift", "m")
-ROTATION = _Rotation("plate_rotation", "angle", "rad")
-GAIN = _Gain("plate_gain", "gain", "1")
-CROSSTALK = _Crosstalk("plate_crosstalk", "ratio", "1")
-OFFSET = _Offset("plate_offset", "offset", "N or N·m", lasting=False)
-DELAY = _Delay("time_delay", "delay", "s")
+POSITION = _Position("plate_position", "shift", "m", (-10.0, 10.0))
+ROTATION = _Rotation("plate_rotation", "angle", "rad", (-np.pi, np.pi))
+GAIN = _Gain("plate_gain", "gain", "1", (-0.5, 1.0))
+CROSSTALK = _Crosstalk("plate_crosstalk", "ratio", "1", (-1.0, 1.0))
+OFFSET = _Offset("plate_offset", "offset", "N or N·m", (-2e4, 2e4), lasting=False)
+DELAY = _Delay("time_delay", "delay", "s", (-10.0, 10.0))
 PLATE_FAULTS: Mapping[str, PlateFault] = MappingProxyType(
     {one.name: one for one in (POSITION, ROTATION, GAIN, CROSSTALK, OFFSET, DELAY)}
 )

@@ -81,9 +81,9 @@ def _table(path: Path) -> tuple[Array, tuple[str, ...]]:
         frame = pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path, encoding="utf-8-sig")
         values = frame.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     except (OSError, ValueError, pd.errors.ParserError) as error:
-        raise FileRefused(
-            f"{path}: cannot be read as a table ({error}). Give columns with a heading each, separated by commas."
-        ) from error
+        why = " ".join(str(error).split())
+        said = f"{path}: cannot be read as a table ({why}). Give columns with a heading each, separated by commas."
+        raise FileRefused(said) from error
     return values, tuple(str(name).strip() for name in frame.columns)
 
 

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from biodance.errors import FileRefused
+from biodance.library import parse_json
 from biodance.version import __version__
 
 MANIFEST = "manifest.json"
@@ -68,7 +69,7 @@ def read_manifest(folder: Path) -> Manifest | None:
     if not path.is_file():
         return None
     try:
-        found = Manifest(**json.loads(path.read_text(encoding="utf-8")))
+        found = Manifest(**parse_json(path.read_text(encoding="utf-8")))
         if all(isinstance(part, dict) for part in (found.inputs, found.outputs)):
             return found
     except (OSError, ValueError, TypeError) as error:

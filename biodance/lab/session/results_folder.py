@@ -9,7 +9,8 @@ import ctypes
 import os
 import platform
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -167,11 +168,34 @@ def made_folder(folder: Path) -> Path:
     return folder
 
 
-def new_folder(folder: Path) -> Path:
-    """Return a folder that was missing or empty, made; SessionRefused if it holds files or cannot be made."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+@contextmanager
+def whole_folder(folder: Path, *, over: bool = False) -> Iterator[Path]:
+    """Yield a folder beside ``folder`` to write into; when all is written, it is flushed to the disk and takes its
+    place in one step. What fails or is stopped leaves ``folder`` as it was.
+
+    ``folder`` must be missing or empty, unless ``over`` allows to replace all of it.
+
+    Raises
+    ------
+    SessionRefused
+        It holds files, is one, another run is writing there, or it cannot be written.
+    """
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not over)):
         raise SessionRefused(f"{folder}: holds files already and nothing is overwritten. Give another folder.")
-    return made_folder(folder)
+    place = Path(os.path.realpath(folder))
+    part = place / ".part" if os.path.ismount(place) else place.with_name(f".{place.name}.part")
+    _taken(part, place)
+    try:
+        yield part
+        (part / _LOCK).unlink(missing_ok=True)
+        put_in_place(part, place)
+    except OSError as error:
+        raise SessionRefused(
+            f"{folder}: cannot be written ({error.strerror or error}). What was there is as before. Make room, or "
+            f"choose another place, and run again."
+        ) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def _taken(part: Path, place: Path) -> None:

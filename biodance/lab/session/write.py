@@ -24,7 +24,7 @@ from biodance.lab.plates.corners import plate_axes
 from biodance.lab.session.file import FILES
 from biodance.lab.session.plate_lines import plate_lines
 from biodance.lab.session.read import read_session
-from biodance.lab.session.results_folder import made_folder
+from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench
 
 FILE = "session.toml"
@@ -215,7 +215,21 @@ def write_registered(
     """
     assert trial.markers is not None
     markers, recordings, rate = _common(trial.markers, plates)
-    _emptied(made_folder(folder))
+    path = folder / f"{trial.source.path.stem}.c3d"
+    with whole_folder(folder, over=True) as part:
+        _write_registered(part, session, trial, (markers, recordings, rate))
+        (part / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+        for file in _not_ours(folder):
+            if not (part / file.name).exists():
+                shutil.copy2(file, part / file.name) if file.is_file() else shutil.copytree(file, part / file.name)
+    return path
+
+
+def _write_registered(
+    folder: Path, session: Session, trial: Trial, recorded: tuple[Markers, list[PlateRecording], float]
+) -> None:
+    markers, recordings, rate = recorded
+    assert trial.markers is not None
     path = folder / f"{trial.source.path.stem}.c3d"
     first = trial.source.first_frame + int(np.searchsorted(trial.markers.time, markers.time[0]))
     said_of = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
@@ -233,8 +247,6 @@ def write_registered(
     for name in FILES:
         if (folder / name).is_file():
             _take_plates_out(folder / name)
-    (folder / _MARK).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-    return path
 
 
 def _take_plates_out(path: Path) -> None:
@@ -243,12 +255,10 @@ def _take_plates_out(path: Path) -> None:
     path.write_text(re.sub(r"(?ms)^\[plates\b.*?(?=^\[[A-Za-z]|\Z)", "", text), encoding="utf-8")
 
 
-def _emptied(folder: Path) -> None:
-    """Remove what an earlier registration wrote."""
-    if (folder / _MARK).is_file():
-        for file in folder.iterdir():
-            if file.is_file() and (file.suffix == ".c3d" or file.name in FILES or file.name == _MARK):
-                file.unlink()
+def _not_ours(folder: Path) -> list[Path]:
+    """Return what lies in the folder of an earlier registration and was not written by it."""
+    inside = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [one for one in inside if one.is_dir() or not (one.suffix == ".c3d" or one.name in (*FILES, _MARK))]
 
 
 def _common(markers: Markers, plates: Sequence[Plate]) -> tuple[Markers, list[PlateRecording], float]:

@@ -36,7 +36,8 @@ def determination(body: Body, columns: list[int], seen: NDArray[np.bool_]) -> De
     in units of moved weight and ``LEVER``, its smallest singular value must reach ``LEAST_MOTION``.
     """
     free = np.concatenate([np.ones(body.n_root, dtype=bool), body.free])
-    jacobian = _jacobian(body, columns)[:, :, free]
+    jacobian = general_jacobian(body, columns)[:, :, free]
+    jacobian[:, :, body.n_root // 2 :] /= _LEVER
     useful = seen & (body.markers.weight[columns] > 0)
     first = np.concatenate([[True], (useful[1:] != useful[:-1]).any(axis=1)])[: len(useful)]
     patterns, which = np.unique(useful[first], axis=0, return_inverse=True)
@@ -69,12 +70,10 @@ def _open(normal: Array) -> NDArray[np.bool_]:
     return (np.abs(vector[:, value < LEAST_MOTION**2]) > 0.2).any(axis=1)
 
 
-def _jacobian(body: Body, columns: list[int]) -> Array:
-    """Return (K, 3, nv) at a general posture: marker motion per m, and per rad divided by LEVER."""
+def general_jacobian(body: Body, columns: list[int]) -> Array:
+    """Return (K, 3, nv) at a general posture: how the markers of ``columns`` move, m per m and per rad."""
     angles = np.clip(0.4 + 0.2 * np.cos(1.7 * np.arange(len(body.joints))), body.limits.lower, body.limits.upper)
     pose = poses(body, np.concatenate([body.neutral[: body.nq - len(angles)], angles]))
     segment = [body.markers.segment[c] for c in columns]
-    out = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[columns]))
-    out = out.reshape(len(columns), 3, body.nv)
-    out[:, :, body.n_root // 2 :] /= _LEVER
-    return out
+    places = pose.points(segment, body.markers.position[columns])
+    return np.asarray(place_jacobian(body, pose, segment, places)).reshape(len(columns), 3, body.nv)

@@ -99,7 +99,7 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     if not shows.any():
         raise TrialRefused(_NOBODY)
     if not shows.all():
-        postures = replace(postures, time=postures.time[shows], xyz=postures.xyz[shows])
+        postures = Markers(postures.names, postures.time[shows], postures.xyz[shows])
         scaling = replace(scaling, notes=(*scaling.notes, _not_shown(shows)))
         fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), fresh.q[shows], noise=skin)
     alike = max(1.0, postures.time.size * _ALIKE / seconds)

@@ -1,6 +1,5 @@
 """Write the page that leads a person through a dance: one file, no network, opened from disk."""
 
-import json
 from base64 import b64encode
 from importlib.resources import files
 from pathlib import Path
@@ -21,7 +20,7 @@ from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, side_in_name
 from biodance.report.files import refuse_page, write_files
-from biodance.report.pages.template import render, template_text, three_js
+from biodance.report.pages.template import render, script_json, template_text, three_js
 from biodance.version import __version__
 
 _POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
@@ -246,7 +245,7 @@ def feedback_page(name: str, scene: dict[str, Any], carried: dict[str, str] | No
         style=Markup(template_text("feedback.css")),
         program=Markup(template_text("feedback.js")),
         three=Markup(three_js()),
-        scene=Markup(json.dumps(scene, separators=(",", ":")).replace("</", "<\\/")),
+        scene=Markup(script_json(scene)),
         bundle={key: Markup(value) for key, value in carried.items()} if carried else None,
         following=Markup(template_text("follow_body.js") + template_text("follow.js")),
     )

@@ -62,7 +62,8 @@ class CurveFigure:
     """Panels over one time axis: ``cells`` of strips that stand over each other, the cells in columns.
 
     ``time`` (T,); ``about`` what it shows, one sentence; ``used`` (T,) False where frames are left out (grey);
-    ``trial`` makes the cursor go with the replay of that trial; ``label`` of the time axis; ``band`` what bands mean.
+    ``trial`` makes the cursor go with the replay of that trial; ``label`` of the time axis; ``band`` what bands mean;
+    ``filled`` (T,) True where angles rest on markers that were put into a gap (yellow).
     """
 
     time: Array
@@ -72,18 +73,21 @@ class CurveFigure:
     trial: str = ""
     label: str = "time (s)"
     band: str = "95 % interval"
+    filled: NDArray[np.bool_] | None = None
 
     def html(self) -> str:
         """Return the figure as HTML: legend of switches, panels, and a line that tells the values at the cursor."""
         x = Axis(float(self.time[0]), float(self.time[-1]), self.label)
         left_out = [] if self.used is None else runs(np.logical_not(self.used))
+        filled = [] if self.filled is None else runs(self.filled)
         shades = [shade(x, float(self.time[a]), float(self.time[b - 1])) for a, b in left_out]
+        shades += [shade(x, float(self.time[a]), float(self.time[b - 1]), kind="filled") for a, b in filled]
         cells = "".join(f'<div class="cell">{self._cell(x, strips, shades)}</div>' for strips in self.cells)
         trial = f' data-trial="{escape(self.trial)}"' if self.trial else ""
         trial += self._first_view(x)
         return (
             f'<div class="curves" role="group" aria-label="{escape(self.about)}"{trial}>'
-            f'<div class="legend">{self._legend(bool(shades))}</div><p class="reading"></p>'
+            f'<div class="legend">{self._legend(bool(left_out), bool(filled))}</div><p class="reading"></p>'
             f'<div class="cells">{cells}</div></div>'
         )
 
@@ -112,7 +116,7 @@ class CurveFigure:
             out.append(panel(x, y, marks, about, frame=Frame(height=height), numbers=last))
         return "".join(out)
 
-    def _legend(self, left_out: bool) -> str:
+    def _legend(self, left_out: bool, filled: bool) -> str:
         looks = {one.name: one for cell in self.cells for strip in cell for one in strip.curves}
         buttons = "".join(
             f'<button type="button" aria-pressed="true" data-name="{escape(name)}">{swatch(one.look)}'
@@ -121,6 +125,7 @@ class CurveFigure:
         )
         banded = any(one.half_width is not None for one in looks.values())
         grey = '<span><i class="swatch out"></i>left out: not fully measured</span>' if left_out else ""
+        grey += '<span><i class="swatch filled"></i>filled: markers put into a gap</span>' if filled else ""
         return buttons + (f'<span><i class="swatch in"></i>{escape(self.band)}</span>' if banded else "") + grey
 
 

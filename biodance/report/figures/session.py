@@ -141,22 +141,24 @@ def _channels(curves: list[tuple[str, Array, Stroke]], measured: Array, used: ND
     return cells
 
 
-def wrench_figure(comparison: WrenchComparison, trial: str = "") -> str:
-    """Return six channels, measured and simulated with the table, each over its residual; grey frames are left out."""
+def wrench_figure(comparison: WrenchComparison, trial: str = "", *, filled: NDArray[np.bool_] | None = None) -> str:
+    """Return six channels, measured and simulated with the table, each over its residual; grey frames are left out, in
+    yellow ones posture rests on ``filled`` (T,) gaps.
+    """
     curves = [("with the table", comparison.simulated, TABLE)]
     cells = _channels(curves, comparison.measured, comparison.used)
     about = "Measured and simulated ground wrench; the numbers are in the table below"
-    return CurveFigure(comparison.time, cells, about, comparison.used, trial).html()
+    return CurveFigure(comparison.time, cells, about, comparison.used, trial, filled=filled).html()
 
 
-def validation_figure(one: TrialValidation) -> str:
+def validation_figure(one: TrialValidation, *, filled: NDArray[np.bool_] | None = None) -> str:
     """Return six channels, measured, with the table and with the identified parameters, each over its differences;
-    grey frames are left out.
+    grey frames are left out, in yellow ones posture rests on ``filled`` (T,) gaps.
     """
     curves = [("with the table", one.table.value, TABLE), ("identified", one.identified.value, IDENTIFIED)]
     about = "Measured ground wrench beside the table's and the identified body's; the numbers are in the table below"
     cells = _channels(curves, one.measured.value, one.use)
-    return CurveFigure(one.measured.time, cells, about, one.use, one.name).html()
+    return CurveFigure(one.measured.time, cells, about, one.use, one.name, filled=filled).html()
 
 
 def place_words(about: Array) -> str:

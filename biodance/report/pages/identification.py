@@ -12,7 +12,7 @@ from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
 from biodance.identification.torques import Impact, TorqueBands
 from biodance.pipeline.identification import SessionIdentification
-from biodance.records import CHANNELS
+from biodance.records import CHANNELS, AngleState
 from biodance.report.documents.identification import information_share, segment_rows, torques_document
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.session import bar_list
@@ -180,7 +180,8 @@ def torque_figure(bands: TorqueBands) -> str:
             curves.append(Curve(f"{side or 'trunk'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
         cells.append([Strip(f"{title} (N·m)", curves, 4.0)])
     about = "Torques of the large joints; the largest values are in the table below"
-    return CurveFigure(bands.time, cells, about, bands.use, bands.trial).html()
+    filled = bands.state == AngleState.FILLED
+    return CurveFigure(bands.time, cells, about, bands.use, bands.trial, filled=filled).html()
 
 
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}

@@ -18,6 +18,7 @@ from biodance.report.documents.plates import plates_document
 from biodance.report.figures.style import figure, look, svg_address
 from biodance.report.files import write_files
 from biodance.report.pages.template import print_sheet, render, template_text
+from biodance.report.tables import for_spreadsheets
 from biodance.report.wording import moment
 from biodance.version import __version__
 
@@ -149,7 +150,7 @@ def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
     texts = {
         "results.json": to_text(document),
         "report.html": plates_page(found, document),
-        "plates.csv": found.table().to_csv(index=False, lineterminator="\n"),
+        "plates.csv": for_spreadsheets(found.table()).to_csv(index=False, lineterminator="\n"),
     }
     write_files(folder, texts)
     return dict(plain_values(document))

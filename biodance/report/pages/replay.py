@@ -1,6 +1,5 @@
 """The replay in the page: frames packed as small whole numbers, drawn by three.js and ``replay.js``; no network."""
 
-import json
 from base64 import b64encode
 from typing import Any
 
@@ -9,7 +8,7 @@ import numpy as np
 from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.records import Array
 from biodance.report.figures.still import FORCE_SCALE, RESIDUAL_SCALE
-from biodance.report.pages.template import template_text, three_js
+from biodance.report.pages.template import script_json, template_text, three_js
 
 _UNKNOWN = -32768
 """Whole number of a place that is not known."""
@@ -22,7 +21,7 @@ def replay_data(found: SessionReplay) -> str:
     the arrows m per N; ``trials`` with ``name``, ``frames``, ``start_s``, ``step_s``, ``worst_s``, ``origin`` m and
     ``unit`` m of a step, and int16 arrays, little-endian in base64, frame by frame: ``places`` of segments, markers,
     centre of mass and the two centres of pressure, ``turns`` (x y z w in 1/32767), ``forces`` measured, simulated and
-    left in 0.1 N.
+    left in 0.1 N; ``state`` one digit a frame, `AngleState`.
     """
     scene = {
         "boxes": [
@@ -34,7 +33,7 @@ def replay_data(found: SessionReplay) -> str:
         "residual_scale": RESIDUAL_SCALE,
         "trials": [_trial(one) for one in found.trials],
     }
-    return json.dumps(scene, separators=(",", ":")).replace("</", "<\\/")
+    return script_json(scene)
 
 
 def _trial(one: TrialReplay) -> dict[str, Any]:
@@ -60,6 +59,7 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
         "places": _packed((places - origin.round(4)) / unit),
         "turns": _packed(32767 * one.rotations),
         "forces": _packed(10 * forces),
+        "state": "".join(str(int(one)) for one in one.state),
     }
 
 

@@ -18,7 +18,7 @@ from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session_frames import SessionReplay
 from biodance.pipeline.trial_result import Check, TrialResult
-from biodance.records import CHANNELS
+from biodance.records import CHANNELS, AngleState
 from biodance.records.attention import Attention, told_together
 from biodance.report.figures.session import (
     marker_figure,
@@ -123,10 +123,11 @@ class TrialPart:
 
 def _trial_part(result: TrialResult, validated: Mapping[str, TrialValidation]) -> TrialPart:
     name = result.trial.name
+    filled = None if result.motion is None else result.motion.frame_state == AngleState.FILLED
     if name in validated:
-        wrench = validation_figure(validated[name])
+        wrench = validation_figure(validated[name], filled=filled)
     else:
-        wrench = wrench_figure(result.comparison, name) if result.comparison else ""
+        wrench = wrench_figure(result.comparison, name, filled=filled) if result.comparison else ""
     return TrialPart(result, marker_figure(result.fit) if result.fit else "", wrench, validated.get(name))
 
 

@@ -3,6 +3,7 @@ hash.
 """
 
 import functools
+import json
 import os
 import re
 import zipfile
@@ -48,6 +49,11 @@ def three_js() -> str:
     if text is None or "</script" in text.group(1):
         raise BiodanceError(f"{place}: holds no three.js. Install the trimesh of constraints.txt.")
     return text.group(1)
+
+
+def script_json(document: object) -> str:
+    """Return a document as JSON that may stand in a ``<script>`` of a page: no text in it can end or open one."""
+    return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def template_text(name: str) -> str:

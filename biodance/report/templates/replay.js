@@ -109,11 +109,12 @@
   function draw() {
     const at = Math.min(Math.max((second - trial.start_s) / trial.step_s, 0), trial.frames - 1);
     const frame = Math.floor(at), share = at - frame, last = trial.segments + trial.markers;
-    const on = (name) => part(name).checked;
+    const on = (name) => part(name).checked, state = Number(trial.state[frame]);
     bodies.forEach((mesh, i) => {
       const point = place(frame, data.boxes[i].on, share);
       mesh.visible = Boolean(point) && on("solids");
       if (!point) return;
+      mesh.material.opacity = [0.55, 0.3, 0.12][state]; // measured, filled, not determined: a guess
       mesh.position.copy(point);
       mesh.quaternion.copy(turn(frame, data.boxes[i].on, share));
     });
@@ -136,7 +137,8 @@
       load.position.add(place(frame, data.load.on, share));
     }
     const size = force(frame, 2, 1), word = part("said");
-    word.textContent = `${second.toFixed(2)} s` + (size ? ` \u00b7 residual ${size.length().toFixed(0)} N` : "");
+    word.textContent = `${second.toFixed(2)} s` + (size ? ` \u00b7 residual ${size.length().toFixed(0)} N` : "")
+      + ["", " \u00b7 markers filled", " \u00b7 not determined by the markers"][state];
     part("time").value = second;
     part("time").setAttribute("aria-valuetext", word.textContent);
     if (!renderer) return;
