@@ -1,7 +1,7 @@
 """Evidence of the witnesses of a session: their observations, and the contribution of every cause to each of them."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -13,13 +13,14 @@ from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.records import Array, Session
 from biodance.witnesses import (
-    Alteration,
+    Cause,
     Observation,
     SeenTrial,
+    corrected,
     observe,
     possible_causes,
     recording,
-    traces,
+    sensitivities,
     turned_signs,
     witnesses,
 )
@@ -53,7 +54,7 @@ class WitnessEvidence:
     """
 
     observations: tuple[Observation, ...]
-    causes: Mapping[tuple[str, str], Alteration]
+    causes: Mapping[tuple[str, str], Cause]
     traces: Mapping[tuple[str, str], Array]
     turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -71,6 +72,15 @@ class WitnessEvidence:
             self.seconds,
             self.recorded,
         )
+
+    def columns(self, effect: str, target: str, parameters: Sequence[str]) -> Array:
+        """Return (n, p) what one unit of each of the ``parameters`` (p) of an effect adds to the observations; 0 where
+        an observation does not respond. A row is in the unit of its observation, as ``value - expected`` is.
+
+        ``effect``, ``target`` and ``parameters`` as in the family of effects, not only of the ``causes`` that are
+        looked for.
+        """
+        return _columns(self.recorded, self.observations, effect, target, parameters)
 
     @cached_property
     def norms(self) -> tuple[str, ...]:
@@ -173,28 +183,55 @@ def collect_evidence(
     """
     asked = causes(chosen)
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    found, single = [_correlate_strides(observe(one)) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
+    seen = tuple(recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip")
+    single = all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
-    parts = {name: [np.zeros(len(some)) for some in found] for name in known}
-    plainly, found = found, [tuple(_apply_norm(o, norms) for o in some) for some in found]
-    turned: dict[tuple[str, str], list[Array]] = {}
-    plain = [np.array([o.value - o.expected for o in some]) for some in found]
-    for i, (one, some) in enumerate(zip(seen, found, strict=True)):
-        for cause in possible_causes(one, single=single) if some else ():
-            if cause.names in known:
-                parts[cause.names][i] = traces(one, some, cause)
-        shift = np.array([o.expected - p.expected for o, p in zip(some, plainly[i], strict=True)])
-        for name, undo in turned_signs(one, single=single).items() if one.steps and "axis_error" in asked else ():
-            turned.setdefault(name, [value.copy() for value in plain])[i] = _observe_again(undo(one), some) - shift
+    by_trial = [tuple(_apply_norm(o, norms) for o in _correlate_strides(observe(one))) for one in seen]
+    found = tuple(one for some in by_trial for one in some)
     return WitnessEvidence(
-        tuple(o for some in found for o in some),
+        found,
         known,
-        {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
-        {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
+        {names: _columns(seen, found, *names, (cause.parameter,))[:, 0] for names, cause in known.items()},
+        _turned(seen, found, norms, single=single) if "axis_error" in asked else {},
         {one.trial.name: one.seconds for one in seen},
-        tuple(seen),
+        seen,
     )
+
+
+def _columns(
+    recorded: Sequence[SeenTrial], found: Sequence[Observation], effect: str, target: str, parameters: Sequence[str]
+) -> Array:
+    """Return (n, p) what one unit of each parameter of an effect adds to observations ``found`` in recordings."""
+    out = np.zeros((len(found), len(parameters)))
+    for seen in recorded:
+        here = [i for i, one in enumerate(found) if one.trial == seen.trial.name]
+        own = [found[i] for i in here]
+        for k, parameter in enumerate(parameters):
+            out[here, k] = sensitivities(seen, own, effect, target, parameter)
+    return out
+
+
+def _turned(
+    recorded: Sequence[SeenTrial],
+    found: Sequence[Observation],
+    norms: Mapping[str, tuple[float, float]],
+    *,
+    single: bool,
+) -> dict[tuple[str, str], Array]:
+    """Return by channel the value minus expectation (n,) of the observations after its sign is reversed, in trials with
+    steps. The sign of the vertical force is gravity's: what responds to that force alone is as it was.
+    """
+    plain = np.array([one.value - one.expected for one in found])
+    out: dict[tuple[str, str], Array] = {}
+    for seen in recorded:
+        here = [i for i, o in enumerate(found) if o.trial == seen.trial.name and not o.sensitivity.only_vertical]
+        own = [found[i] for i in here]
+        asked = {one.witness for one in own if one.counts}
+        for name, right in turned_signs(seen, single=single).items() if seen.steps else ():
+            after = {one.key: _apply_norm(one, norms) for one in observe(right, asked)}
+            again = [after[one.key].value - after[one.key].expected if one.key in after else np.nan for one in own]
+            out.setdefault(name, plain.copy())[here] = again
+    return out
 
 
 def undo_causes(evidence: WitnessEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
@@ -204,18 +241,18 @@ def undo_causes(evidence: WitnessEvidence, sizes: Mapping[tuple[str, str], float
     """
     added = np.full(len(evidence.observations), np.nan)
     slopes = np.zeros((added.size, len(sizes)))
-    single = all(len(one.trial.plates) == 1 for one in evidence.recorded)
-    for one in evidence.recorded:
-        here = [i for i, o in enumerate(evidence.observations) if o.trial == one.trial.name]
-        found = tuple(evidence.observations[i] for i in here)
-        known = {cause.names: cause for cause in possible_causes(one, single=single) if cause.names in sizes}
-        right = one
-        for names, cause in known.items():
-            right = cause.alter(right, -sizes[names])
-        added[here] = _observe_again(right, found) - _observe_again(one, found)
+    for seen in evidence.recorded:
+        right = seen
+        for names, size in sizes.items():
+            right = corrected(right, *names, size)
+        before, after = ({one.key: one for one in observe(one)} for one in (seen, right))
+        here = [i for i, o in enumerate(evidence.observations) if o.key in after and o.key in before]
+        for i in here:
+            was, now = (some[evidence.observations[i].key] for some in (before, after))
+            added[i] = now.value - now.expected - was.value + was.expected
+        own = [after[evidence.observations[i].key] for i in here]
         for k, names in enumerate(sizes):
-            if names in known:
-                slopes[here, k] = traces(right, found, known[names])
+            slopes[here, k] = sensitivities(right, own, *names, evidence.causes[names].parameter)
     return added, slopes
 
 
@@ -247,9 +284,3 @@ def _apply_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> O
     share = usual / (usual + sd**2)
     left = {name: size * (np.sqrt(1 - share) if name in own else 1.0) for name, size in one.norms.items()}
     return replace(one, expected=one.expected + share * value, norms=left)
-
-
-def _observe_again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:
-    """Return value minus expectation (n,) of the same observations in an altered recording; NaN where missing."""
-    values = {one.key: one.value - one.expected for one in observe(altered)}
-    return np.array([values.get(one.key, np.nan) for one in before])

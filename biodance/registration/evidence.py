@@ -109,18 +109,16 @@ def _step(
     if not (np.isfinite(heel[near]).all() and np.isfinite(toe[near]).all()):
         return None
     path = FootPath(SIDES[foot], frames, heel, toe, toe)
-    ahead, beside, apart = path.in_foot(time, place[:, :2])
-    behind, front = path.at(time)
-    forwards = (front - behind) * np.array([1.0, 1.0, 0.0]) / apart[:, None]
-    left = np.stack([-forwards[:, 1], forwards[:, 0], np.zeros(len(forwards))], axis=1)
-    outwards = -left if SIDES[foot] == "right" else left
+    under = path.in_foot(time, place[:, :2])
+    ahead, beside = under.place.T
+    forwards, outwards = np.moveaxis(np.pad(under.axes, ((0, 0), (0, 0), (0, 1))), 1, 0)
     phase = (time - time[0]) / (time[-1] - time[0])
     onset = time[0] - heel_strike(path, float(time.mean()), time[0])
     known = np.isfinite(ahead)
     phase, place, forwards, outwards, ahead, beside = (
         x[known] for x in (phase, place, forwards, outwards, ahead, beside)
     )
-    length = float(np.median(apart))
+    length = float(np.median(under.length))
     return PlateStep(number, SIDES[foot], phase, place, forwards, outwards, ahead, beside, length, onset)
 
 

@@ -2,9 +2,10 @@
 
 A witness says where the centre of pressure lies in the foot that stands there, when the force comes, what the plates
 weigh over a step, what they read empty. It needs a static trial, foot markers and plates: no inverse kinematics, no
-segment masses. It is given as ``WITNESS`` by its file, others come by the entry points ``biodance.witnesses``. What a
-cause (a plate that lies elsewhere, a late force ...) does to its value is not written by its author: the recording is
-altered as the cause would alter it, and the witness is asked again (`traces`).
+segment masses. It is given as ``WITNESS`` by its file, others come by the entry points ``biodance.witnesses``. Its
+author says how the value responds to the samples of the plates, to a late clock and to the declared mass
+(`Sensitivity`); what a cause (a plate that lies elsewhere ...) does to the samples is known of every cause
+(`sensitivities`).
 """
 
 import inspect
@@ -20,10 +21,11 @@ import numpy as np
 
 from biodance.discovery import Chosen, Family
 from biodance.records import assign
-from biodance.witnesses._causes import Alteration, possible_causes, turned_signs
+from biodance.witnesses._causes import Cause, corrected, possible_causes, sensitivities, turned_signs
 from biodance.witnesses._feet import FootPath
 from biodance.witnesses._landmark import LANDMARK, shift_per_sd
 from biodance.witnesses._recording import ONSET, FootStep, SeenTrial, recording
+from biodance.witnesses._sensitivity import Sensitivity
 
 _TIME = re.compile(r" (at|from) [-\d.]+ s")
 """When a step was, as its name says it."""
@@ -31,17 +33,19 @@ _TIME = re.compile(r" (at|from) [-\d.]+ s")
 __all__ = [
     "LANDMARK",
     "ONSET",
-    "Alteration",
+    "Cause",
     "FootPath",
     "FootStep",
     "Observation",
     "SeenTrial",
+    "Sensitivity",
     "Witness",
+    "corrected",
     "observe",
     "possible_causes",
     "recording",
+    "sensitivities",
     "shift_per_sd",
-    "traces",
     "turned_signs",
     "witnesses",
 ]
@@ -55,7 +59,8 @@ class Observation:
     ``sd`` of this one observation, in ``unit``; ``expected`` of a recording without fault; ``norms`` how uncertain that
     expectation is, each part with a name: observations that share a name err together ("person" parts within one
     person, "laboratory" parts in all persons of one laboratory, others with their plate). ``counts`` False: it is
-    shown, and adds nothing to the evidence, because others hold it already.
+    shown, and adds nothing to the evidence, because others hold it already. ``sensitivity``: how value less expectation
+    responds to what may be wrong (`sensitivities`).
     """
 
     witness: str
@@ -68,6 +73,7 @@ class Observation:
     plate: str = ""
     norms: Mapping[str, float] = field(default_factory=dict)
     counts: bool = True
+    sensitivity: Sensitivity = field(default_factory=Sensitivity, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         assign(self, norms=MappingProxyType(dict(self.norms)))
@@ -144,22 +150,12 @@ def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Wi
 
 def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
     """Return all that the witnesses saw in one trial, finite values only."""
-    found = (one for witness in witnesses(chosen).values() for one in witness.observe(seen))
-    return tuple(one for one in found if all(map(math.isfinite, (one.value, one.expected, one.sd))))
+    known: tuple[Observation, ...] | None = seen.kept.get("observations") if chosen is None else None
+    if known is not None:
+        return known
+    each = (one for witness in witnesses(chosen).values() for one in witness.observe(seen))
+    found = tuple(one for one in each if all(map(math.isfinite, (one.value, one.expected, one.sd))))
+    if chosen is None:
+        seen.kept["observations"] = found
+    return found
 
-
-def traces(
-    seen: SeenTrial, found: tuple[Observation, ...], cause: Alteration, chosen: Chosen[Witness | type[Witness]] = None
-) -> np.ndarray:
-    """Return (n,) what one unit of a cause adds to value less expectation of the observations ``found`` of a
-    recording: the slope between the recordings altered by a step either way; 0 where the witness is blind.
-    """
-    asked, out = witnesses(chosen), np.zeros(len(found))
-    sides = [
-        {one.key: one.value - one.expected for one in observe(cause.alter(seen, size), asked)}
-        for size in (-cause.step, cause.step)
-    ]
-    for i, one in enumerate(found):
-        if all(one.key in side for side in sides):
-            out[i] = (sides[1][one.key] - sides[0][one.key]) / (2 * cause.step)
-    return out

@@ -1,24 +1,27 @@
-"""What causes do to a recording: the plates' records are altered as a wrong file, cable or clock would alter them.
+"""What causes do to a recording: plates' records are changed as a wrong file, cable or clock would change them.
 
-Witnesses are asked again about the altered recording; the difference is their sensitivity. Names and parameters are
-those of the effects (`biodance.effects`).
+Names and parameters are those of the effects (`biodance.effects`). One table says what a fault of a plate does to its
+wrench (`plate_change`): observations' sensitivities and the correction of a recording both come from it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
+from scipy.linalg import expm
 
 from biodance.records import CHANNELS, Array, Plate, Wrench
-from biodance.spatial import axis_rotation, wrench_about_origin, wrench_about_point
+from biodance.spatial import skew, wrench_shift
 from biodance.witnesses._recording import SeenTrial
+from biodance.witnesses._sensitivity import Sensitivity
 
 
-@dataclass(frozen=True, eq=False)
-class Alteration:
-    """A cause with one size: ``effect`` and ``target`` as in the family of effects, its ``parameter`` and ``unit``, a
-    small size ``step`` for differences; ``alter`` returns the recording that a size of it would have produced.
+@dataclass(frozen=True)
+class Cause:
+    """A fault with one size: ``effect``, ``target`` and ``parameter`` as in the family of effects, the parameter's
+    ``unit``, and a small size ``step``.
     """
 
     effect: str
@@ -26,7 +29,6 @@ class Alteration:
     parameter: str
     unit: str
     step: float
-    alter: Callable[[SeenTrial, float], SeenTrial]
 
     @property
     def names(self) -> tuple[str, str]:
@@ -34,119 +36,156 @@ class Alteration:
         return self.effect, self.target
 
 
-def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[Alteration, ...]:
-    """Return the causes that witnesses are asked about, in a recording with these plates; ``single`` whether targets
-    are named without the plate, because the session has no other (by default: this recording has none).
+class _Observed(Protocol):
+    @property
+    def sensitivity(self) -> Sensitivity: ...
+
+
+def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[Cause, ...]:
+    """Return the causes that are looked for in a recording with these plates; ``single`` whether targets are named
+    without the plate, because the session has no other (by default: this recording has none).
     """
     single = len(seen.trial.plates) == 1 if single is None else single
-    found = [
-        Alteration("time_delay", "", "delay", "s", 0.004, _late),
-        Alteration("body_mass", "", "error", "kg", 0.5, lambda seen, size: replace(seen, mass=seen.mass - size)),
-    ]
+    found = [Cause("time_delay", "", "delay", "s", 0.004), Cause("body_mass", "", "error", "kg", 0.5)]
     for plate in seen.trial.plates:
         prefix = "" if single else f"{plate.name}:"
-        found += [
-            Alteration("plate_position", f"{plate.name}:{a}", "shift", "m", 0.004, _moved(plate.name, a)) for a in "xy"
-        ]
-        found.append(Alteration("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02, _turned(plate.name)))
-        for k, name in enumerate(CHANNELS):
-            unit = "N" if k < 3 else "N·m"
-            found.append(
-                Alteration(
-                    "plate_offset", f"{prefix}{name}", "offset", unit, 2.0 if k < 3 else 0.5, _offset(plate.name, k)
-                )
-            )
-        for k, name in enumerate(CHANNELS[:3]):
-            found.append(Alteration("plate_gain", f"{prefix}{name}", "gain", "1", 0.02, _gained(plate.name, k)))
-        for k, name in ((3, "Mx"), (4, "My")):
-            found.append(
-                Alteration("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004, _crossed(plate.name, k))
-            )
+        found += [Cause("plate_position", f"{plate.name}:{axis}", "shift", "m", 0.004) for axis in "xy"]
+        found.append(Cause("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02))
+        found += [Cause("plate_offset", f"{prefix}{name}", "offset", "N", 2.0) for name in CHANNELS[:3]]
+        found += [Cause("plate_offset", f"{prefix}{name}", "offset", "N·m", 0.5) for name in CHANNELS[3:]]
+        found += [Cause("plate_gain", f"{prefix}{name}", "gain", "1", 0.02) for name in CHANNELS[:3]]
+        found += [Cause("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004) for name in ("Mx", "My")]
     return tuple(found)
 
 
-def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], Callable[[SeenTrial], SeenTrial]]:
-    """Return by effect and target what undoes one channel of one plate that has the wrong sign.
+def _shifted(_plate: Plate, axis: str) -> Array:
+    """Return the moment of the force over a shift of a metre; the height of a plate changes no pressure on it."""
+    out = np.zeros((6, 7))
+    out[3:, :3] = skew(np.eye(3)["xyz".index(axis)]) if axis != "z" else 0.0
+    return out
 
-    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up.
-    ``single`` as in `possible_causes`.
+
+def _about_centre(plate: Plate, local: Array) -> Array:
+    """Return the change B (6, 7) about the lab origin of what is changed by ``local`` (6, 7) about a plate's centre."""
+    there = wrench_shift(plate.centre)
+    return np.asarray(np.linalg.inv(there) @ np.column_stack([local[:, :6] @ there, local[:, 6]]))
+
+
+def _turned(plate: Plate, axis: str) -> Array:
+    turn = skew(np.eye(3)["xyz".index(axis)])
+    return _about_centre(plate, np.column_stack([np.kron(np.eye(2), turn), np.zeros(6)]))
+
+
+def _in_channel(plate: Plate, source: int, channel: str) -> Array:
+    """Return the change by an entry of [w; 1] (6: a constant) in one channel about the plate's centre."""
+    return _about_centre(plate, np.outer(np.eye(6)[CHANNELS.index(channel)], np.eye(7)[source]))
+
+
+_CHANGES: Mapping[str, tuple[str, Callable[[Plate, str], Array]]] = MappingProxyType(
+    {
+        "plate_position": ("shift", _shifted),
+        "plate_rotation": ("angle", _turned),
+        "plate_offset": ("offset", lambda plate, channel: _in_channel(plate, 6, channel)),
+        "plate_gain": ("gain", lambda plate, channel: _in_channel(plate, CHANNELS.index(channel), channel)),
+        "plate_crosstalk": (
+            "ratio",
+            lambda plate, pair: _in_channel(plate, CHANNELS.index(pair.partition("->")[0]), pair.partition("->")[2]),
+        ),
+    }
+)
+"""Parameter of each effect that maps a plate's wrench, and what one unit of it adds."""
+
+
+def plate_change(effect: str, target: str, plate: Plate) -> Array:
+    """Return B (6, 7): what one unit of a fault adds to a plate's wrench w about the lab origin is B [w; 1]; zero for
+    faults of other plates, and where a reader's zero takes it off.
+
+    ``target`` as in the family of effects (``plate1:x``, ``plate1:Fz->Mx``, ``Fz`` where there is one plate).
     """
-    prefix = {plate.name: "" if single else f"{plate.name}:" for plate in seen.trial.plates}
-    return MappingProxyType(
-        {
-            ("axis_error", f"{prefix[plate.name]}{name}"): _mirrored(plate.name, name)
-            for plate in seen.trial.plates
-            for name in CHANNELS[:5]
-        }
-    )
+    name, _, where = target.rpartition(":")
+    taken_off = effect == "plate_offset" and was_zeroed(plate)
+    if effect not in _CHANGES or name not in ("", plate.name) or taken_off:
+        return np.zeros((6, 7))
+    return _CHANGES[effect][1](plate, where)
 
 
-def _with(seen: SeenTrial, plate: Plate) -> SeenTrial:
-    """Return the recording with one plate replaced by its altered self."""
-    plates = tuple(plate if one.name == plate.name else one for one in seen.trial.plates)
-    return replace(seen, trial=replace(seen.trial, plates=plates))
+def sensitivities(
+    seen: SeenTrial, found: Sequence[_Observed], effect: str, target: str, parameter: str
+) -> Array:
+    """Return (n,) the derivatives of the values less the expectations of the observations ``found`` in one recording
+    with respect to a parameter of an effect; 0 where an observation does not respond.
+    """
+    known = [one.sensitivity for one in found]
+    if (effect, parameter) == ("time_delay", "delay"):
+        return np.array([one.delay for one in known])
+    if (effect, parameter) in {("body_mass", "error"), ("added_mass", "mass")}:
+        return np.array([one.mass for one in known])
+    if effect == "toe_landmark":
+        sides = ("left", "right") if target == "both" else (target,)
+        return np.array([sum(one.landmarks.get((side, parameter), 0.0) for side in sides) for one in known])
+    out = np.zeros(len(known))
+    if effect not in _CHANGES or _CHANGES[effect][0] != parameter:
+        return out
+    for plate in seen.trial.plates:
+        change = plate_change(effect, target, plate)
+        out += [np.sum(one.plates[plate.name] * change) if plate.name in one.plates else 0.0 for one in known]
+        if effect == "plate_offset" and target in (f"{plate.name}:{target[-2:]}", target[-2:]) and was_zeroed(plate):
+            level = np.eye(6)[CHANNELS.index(target[-2:])][:3]
+            out += [one.zero[plate.name] @ level if plate.name in one.zero else 0.0 for one in known]
+    return out
 
 
-def _about_centre(seen: SeenTrial, name: str, change: Callable[[Array], Array]) -> SeenTrial:
-    """Return the recording with a change of a plate's wrench (S, 6) about its centre."""
-    plate = seen.plate(name)
-    value = wrench_about_origin(change(wrench_about_point(plate.wrench.value, plate.centre)), plate.centre)
-    return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value)))
+def corrected(seen: SeenTrial, effect: str, target: str, size: float) -> SeenTrial:
+    """Return the recording that would have been made without a cause of a ``size``."""
+    trial = seen.trial
+    if effect == "body_mass":
+        return replace(seen, mass=seen.mass + size)
+    if effect == "time_delay":
+        plates = [replace(p, wrench=Wrench(p.wrench.time - size, p.wrench.value)) for p in trial.plates]
+    else:
+        plates = [_corrected(plate, effect, target, size) for plate in trial.plates]
+    return replace(seen, trial=replace(trial, plates=tuple(plates)))
 
 
-def _in_channel(seen: SeenTrial, name: str, k: int, added: Array | float) -> SeenTrial:
-    """Return the recording with ``added`` (S,) or always the same in channel ``k`` of a plate, about its centre."""
-    plate = seen.plate(name)
-    unit = wrench_about_origin(np.eye(6)[k], plate.centre)
-    value = plate.wrench.value + np.multiply.outer(added, unit)
+def _corrected(plate: Plate, effect: str, target: str, size: float) -> Plate:
+    """Return a plate without a fault of a ``size``: a turn is undone by the turn back, all else is linear."""
+    name, _, where = target.rpartition(":")
+    if effect == "plate_offset" and name in ("", plate.name) and was_zeroed(plate):
+        return replace(plate, zero=plate.zero - size * np.eye(6)[CHANNELS.index(where)][:3])
+    change = plate_change(effect, target, plate)
+    if not change.any():
+        return plate
+    added = -size * change
+    if effect == "plate_rotation":
+        added[:, :6] = expm(added[:, :6]) - np.eye(6)
+    corners = plate.corners
+    if effect == "plate_position":
+        corners = corners - size * np.eye(3)["xyz".index(where)]
+    return replace(plate, wrench=_changed(plate.wrench, added), corners=corners)
+
+
+def _changed(wrench: Wrench, change: Array) -> Wrench:
+    value = wrench.value + wrench.value @ change[:, :6].T + change[:, 6]
     value.setflags(write=False)  # the record keeps it without a copy
-    return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value)))
+    return Wrench(wrench.time, value)
 
 
-def _late(seen: SeenTrial, delay: float) -> SeenTrial:
-    plates = tuple(replace(p, wrench=Wrench(p.wrench.time + delay, p.wrench.value)) for p in seen.trial.plates)
-    return replace(seen, trial=replace(seen.trial, plates=plates))
+def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], SeenTrial]:
+    """Return by effect and target the recording in which one channel of one plate has the other sign.
 
-
-def _moved(name: str, axis: str) -> Callable[[SeenTrial, float], SeenTrial]:
-    def alter(seen: SeenTrial, shift: float) -> SeenTrial:
-        plate, vector = seen.plate(name), shift * np.eye(3)["xyz".index(axis)]
-        value = wrench_about_origin(plate.wrench.value, vector)
-        return _with(seen, replace(plate, wrench=Wrench(plate.wrench.time, value), corners=plate.corners + vector))
-
-    return alter
-
-
-def _turned(name: str) -> Callable[[SeenTrial, float], SeenTrial]:
-    def alter(seen: SeenTrial, angle: float) -> SeenTrial:
-        turn = axis_rotation(np.array([0.0, 0.0, 1.0]), np.array([angle]))[0]
-        return _about_centre(seen, name, lambda w: np.concatenate([w[:, :3] @ turn.T, w[:, 3:] @ turn.T], axis=1))
-
-    return alter
-
-
-def _offset(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    def alter(seen: SeenTrial, offset: float) -> SeenTrial:
-        plate = seen.plate(name)
-        if was_zeroed(plate):
-            return _with(seen, replace(plate, zero=plate.zero + offset * np.eye(6)[k][:3]))
-        return _in_channel(seen, name, k, offset)
-
-    return alter
-
-
-def _gained(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    return lambda seen, gain: _in_channel(seen, name, k, gain * seen.plate(name).wrench.value[:, k])
-
-
-def _crossed(name: str, k: int) -> Callable[[SeenTrial, float], SeenTrial]:
-    return lambda seen, ratio: _in_channel(seen, name, k, ratio * seen.plate(name).wrench.value[:, 2])
-
-
-def _mirrored(name: str, channel: str) -> Callable[[SeenTrial], SeenTrial]:
-    sign = 1.0 - 2.0 * np.eye(6)[CHANNELS.index(channel)]
-    sign = -sign if channel == "Fz" else sign
-    return lambda seen: _about_centre(seen, name, lambda w: w * sign)
+    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up: all other
+    channels are reversed. ``single`` as in `possible_causes`.
+    """
+    found = {}
+    for plate in seen.trial.plates:
+        for k, name in enumerate(CHANNELS[:5]):
+            wrong = np.eye(6)[k] if name != "Fz" else 1 - np.eye(6)[k]
+            change = _about_centre(plate, np.column_stack([np.diag(-2 * wrong), np.zeros(6)]))
+            right = replace(plate, wrench=_changed(plate.wrench, change))
+            plates = tuple(right if one.name == plate.name else one for one in seen.trial.plates)
+            target = name if single else f"{plate.name}:{name}"
+            found["axis_error", target] = replace(seen, trial=replace(seen.trial, plates=plates))
+    return MappingProxyType(found)
 
 
 def was_zeroed(plate: Plate) -> bool:

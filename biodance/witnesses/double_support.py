@@ -33,7 +33,12 @@ class DoubleSupport(Witness):
                 continue
             what = f"{first.plate} less {last.plate} from {first.middle:.2f} s"
             value, sd = before.value - after.value, _OWN * seen.mass
-            found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "kg", counts=False))
+            found.append(
+                Observation(
+                    self.name, what, seen.trial.name, value, sd, 0.0, "kg", counts=False,
+                    sensitivity=before.sensitivity - after.sensitivity,
+                )
+            )  # fmt: skip
         return tuple(found)
 
 

@@ -10,6 +10,7 @@ from biodance.records import CHANNELS, Plate
 from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses._causes import was_zeroed
 from biodance.witnesses._recording import ONSET
+from biodance.witnesses._sensitivity import Sensitivity, of_mean
 
 _SETTLES = 0.15
 """s after the step in which a plate still rings."""
@@ -37,10 +38,11 @@ class EmptyPlate(Witness):
             return []
         return [
             Observation(
-                self.name, f"{plate.name} {name}, taken off", seen.trial.name, float(size), _OWN, 0.0, "N", plate.name
+                self.name, f"{plate.name} {name}, taken off", seen.trial.name, float(size), _OWN, 0.0, "N", plate.name,
+                sensitivity=Sensitivity(zero={plate.name: np.eye(3)[k]}),
             )
-            for name, size in zip(CHANNELS[:3], plate.zero, strict=True)
-        ]
+            for k, (name, size) in enumerate(zip(CHANNELS[:3], plate.zero, strict=True))
+        ]  # fmt: skip
 
     def _change(self, seen: SeenTrial, plate: Plate) -> list[Observation]:
         wrench = plate.wrench
@@ -52,12 +54,13 @@ class EmptyPlate(Witness):
         if before.stop < least or after.stop - after.start < least:
             return []
         value = wrench.force[after].mean(axis=0) - wrench.force[before].mean(axis=0)
+        moved = [of_mean(wrench.value[after], k) - of_mean(wrench.value[before], k) for k in range(3)]
         return [
             Observation(
                 self.name, f"{plate.name} {name}, after less before", seen.trial.name, float(size), 1.0, 0.0, "N",
-                plate.name, counts=False,
+                plate.name, counts=False, sensitivity=Sensitivity({plate.name: moves}),
             )
-            for name, size in zip(CHANNELS[:3], value, strict=True)
+            for name, size, moves in zip(CHANNELS[:3], value, moved, strict=True)
         ]  # fmt: skip
 
 

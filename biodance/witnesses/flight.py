@@ -6,6 +6,7 @@ import numpy as np
 
 from biodance.records import Array, runs
 from biodance.witnesses import FootPath, Observation, SeenTrial, Witness
+from biodance.witnesses._sensitivity import Sensitivity, of_mean
 
 _HIGH = 0.06
 """m above their lowest place in the trial that both markers of a foot in flight are."""
@@ -34,12 +35,20 @@ class Flight(Witness):
         found = []
         for plate in seen.trial.plates:
             wrench = plate.wrench
-            inside = np.any([(wrench.time >= a) & (wrench.time <= b) for a, b in spans], axis=0) if spans else []
+            inside = np.any([(wrench.time >= a) & (wrench.time <= b) for a, b in spans], axis=0) if spans else np.empty(0)
             if not np.any(inside) or wrench.force[:, 2].max() < 100.0:
                 continue
+            lost = [wrench.force[a] - wrench.force[b - 1] for a, b in runs(inside)]
+            late = np.sum(lost, axis=0) / np.count_nonzero(inside) * wrench.rate
             for axis, (channel, sd) in enumerate(_OWN.items()):
                 value, what = float(wrench.force[inside, axis].mean()), f"{plate.name} {channel} in flight"
-                found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name))
+                plates = {plate.name: of_mean(wrench.value[inside], axis)}
+                responds = Sensitivity(plates, delay=float(late[axis]))
+                found.append(
+                    Observation(
+                        self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name, sensitivity=responds
+                    )
+                )
         return tuple(found)
 
 

@@ -5,10 +5,11 @@ tell it from where the laboratory puts its toe marker. A turned plate shows as a
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._landmark import landmark_across
-from biodance.witnesses._stance import by_step, step_course
+from biodance.witnesses._landmark import LEVERS, landmark_across
+from biodance.witnesses._stance import step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -37,7 +38,6 @@ class FootAcross(Witness):
         """
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         ways = ((ACROSS_PHASES, False), (_RUNNING, True))
         return [one for way in ways for one in self._phases(seen, step, *way)]
@@ -54,11 +54,15 @@ class FootAcross(Witness):
                 continue
             norms = {f"person {step.side} foot across, {phase}": foot, f"laboratory across, {phase}": laboratory}
             norms |= landmark_across(path, phase)
-            value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
+            value, responds = part.place(1, start, stop)
+            own, shown = (sd**2 + step.overhang**2) ** 0.5, {(step.side, "inwards"): LEVERS[phase]}
             what = f"{step.name}, {phase}"
             found.append(
-                Observation(self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred)
-            )
+                Observation(
+                    self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
+                    replace(responds, landmarks=shown),
+                )
+            )  # fmt: skip
         return found
 
 

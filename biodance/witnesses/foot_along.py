@@ -4,9 +4,11 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 plates, tell plate from foot.
 """
 
+from dataclasses import replace
+
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._landmark import landmark_along
-from biodance.witnesses._stance import by_step, step_course
+from biodance.witnesses._stance import step_course
 
 ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -31,7 +33,6 @@ class FootAlong(Witness):
         """Return two observations of each step in which the heel came down first, one of a foot on two plates."""
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, found = step_course(seen, step), []
         if part is None:
@@ -44,11 +45,15 @@ class FootAlong(Witness):
                 f"laboratory along, {phase}": laboratory * part.length,
                 **landmark_along(path),
             }
-            value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
+            value, responds = part.place(0, start, stop)
+            own, shown = ((sd * part.length) ** 2 + step.overhang**2) ** 0.5, {(step.side, "backwards"): 1.0}
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(
-                Observation(self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred)
-            )
+                Observation(
+                    self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
+                    replace(responds, landmarks=shown),
+                )
+            )  # fmt: skip
         return found
 
 

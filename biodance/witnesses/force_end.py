@@ -8,7 +8,8 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import by_step, steps, walks
+from biodance.witnesses._sensitivity import Sensitivity
+from biodance.witnesses._stance import crossing, steps, walks
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves; what half as much more on either side shows larger
@@ -31,14 +32,21 @@ class ForceEnd(Witness):
         """Return one observation of each step that ends within the recording."""
         return tuple(one for step in seen.steps if not step.mixed for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
-        part, time = seen.stance(step), seen.plate(step.plate).wrench.time
+        part, wrench = seen.stance(step), seen.plate(step.plate).wrench
+        time = wrench.time
         if part is None or part.stop >= time.size or not (walks(seen, step) and steps(seen, step)):
             return []
         end, foot = float(time[part.stop - 1]), seen.foot(step.side)
         value, norms = end - toe_pulled(foot, step.middle, end), {"person toe off": _PERSON}
-        return [Observation(self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms)]
+        _, slope = crossing(wrench, part.stop)
+        responds = Sensitivity({step.plate: slope}, delay=1.0)
+        return [
+            Observation(
+                self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms,
+                sensitivity=responds,
+            )
+        ]  # fmt: skip
 
 
 def toe_pulled(foot: FootPath, middle: float, near: float) -> float:

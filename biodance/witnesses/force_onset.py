@@ -8,8 +8,8 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import by_step, steps
+from biodance.witnesses._sensitivity import Sensitivity
+from biodance.witnesses._stance import crossing, steps
 
 _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
@@ -34,22 +34,24 @@ class ForceOnset(Witness):
             one for step in seen.steps if step.heel_first and not step.mixed for one in self._of_step(seen, step)
         )
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
         if part is None or part.start == 0 or not steps(seen, step):
             return []
-        wrench = seen.plate(step.plate).wrench
-        before, after = wrench.force[part.start - 1, 2], wrench.force[part.start, 2]
-        share = (ONSET - before) / (after - before) if after > before else 1.0
-        onset = wrench.time[part.start - 1] + share * (wrench.time[part.start] - wrench.time[part.start - 1])
+        onset, slope = crossing(seen.plate(step.plate).wrench, part.start)
         foot = seen.foot(step.side)
         struck = heel_strike(foot, step.middle, onset)
         expected, step_sd, laboratory = ONSET_AFTER_STRIKE
         own = float(np.hypot(step_sd, 0.25 / foot.rate))
         norms = {"laboratory onset": laboratory}
         value = onset - struck
-        return [Observation(self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms)]
+        responds = Sensitivity({step.plate: slope}, delay=1.0)
+        return [
+            Observation(
+                self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms,
+                sensitivity=responds,
+            )
+        ]  # fmt: skip
 
 
 def heel_strike(foot: FootPath, middle: float, near: float) -> float:

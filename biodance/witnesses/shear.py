@@ -9,7 +9,8 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import StepCourse, by_step, step_course
+from biodance.witnesses._sensitivity import Sensitivity, by_samples
+from biodance.witnesses._stance import StepCourse, step_course
 
 _PARTS = {
     "braking": (0.08, 0.35, 0, -0.177, 0.022, 0.030),
@@ -43,38 +44,71 @@ class Shear(Witness):
         whole = (step for step in seen.steps if step.heel_first and not step.beside)
         return tuple(one for step in whole for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = step_course(seen, step)
         path = way(seen, step, part) if part is not None else None
         if part is None or path is None:
             return []
         velocity, bending = path
-        ahead = velocity / np.linalg.norm(velocity, axis=1)[:, None]
+        speed = np.linalg.norm(velocity, axis=1)[:, None]
+        ahead = velocity / speed
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-        inwards, weight = (1 if step.side == "left" else -1), float(part.force[:, 2].mean())
-        along = np.stack([np.sum(part.force[:, :2] * one, axis=1) for one in (ahead, left)])
-        gained = np.array([bending @ one[len(one) // 2] for one in (ahead, left)]) / seen.trial.settings.gravity
-        found = []
-        for what, (start, stop, axis, expected, sd, person) in _PARTS.items():
-            value = (part.mean(along[axis], start, stop) / weight - gained[axis]) * (inwards if axis else 1)
-            found.append(self._observation(seen, step, what, value, sd, expected, "1", {f"person {what}": person}))
-        slant, (expected, sd, person) = float(np.arctan(_slope(along[1], along[0], part.force[:, 2]))), _SLANT
-        norms = {f"person {step.side} slant": person}
-        return [*found, self._observation(seen, step, "slant", slant, sd, expected, "rad", norms)]
+        axes, turns = np.stack([ahead, left], axis=1), left @ bending / speed[:, 0]
+        parts = [self._part(seen, step, part, axes, turns, bending, what) for what in _PARTS]
+        return [*parts, self._slant(seen, step, part, axes, turns)]
 
-    def _observation(
-        self, seen: SeenTrial, step: FootStep, what: str, value: float, sd: float, expected: float, unit: str,
-        norms: dict[str, float],
-    ) -> Observation:  # fmt: skip
-        return Observation(
-            self.name, f"{step.name}, {what}", seen.trial.name, value, sd, expected, unit, step.plate, norms
+    def _part(
+        self, seen: SeenTrial, step: FootStep, course: StepCourse, axes: Array, turns: Array, bending: Array, what: str
+    ) -> Observation:
+        """Return the mean shear along one of the ``axes`` (n, 2, 2), which turn by ``turns`` (n,) rad/s."""
+        start, stop, axis, expected, sd, person = _PARTS[what]
+        inwards, part, middle = (-1 if axis and step.side == "right" else 1), course.part(start, stop), len(axes) // 2
+        force, weight, g = course.force[part, :2], float(course.force[:, 2].mean()), seen.trial.settings.gravity
+        share = float(np.sum(force * axes[part, axis], axis=1).mean()) / weight if force.size else float("nan")
+        other = np.sum(force * axes[part, 1 - axis], axis=1) * turns[part] * (-1 if axis else 1)
+        gains = turns[middle] * (bending @ axes[middle, 1 - axis]) * (-1 if axis else 1) / g
+        gradient = np.zeros_like(course.wrench)
+        gradient[part, :2] = axes[part, axis] / max(len(force), 1) / weight
+        gradient[:, 2] = -share / weight / len(gradient)
+        return self._observation(
+            seen, step, what, inwards * (share - float(bending @ axes[middle, axis]) / g), (expected, sd, person),
+            _responds(course, inwards * gradient, inwards * float(other.sum() / max(len(force), 1) / weight - gains)),
+        )  # fmt: skip
+
+    def _slant(
+        self, seen: SeenTrial, step: FootStep, course: StepCourse, axes: Array, turns: Array
+    ) -> Observation:
+        """Return how the shear to the left follows the one ahead, beside what follows the vertical force."""
+        ahead, left = np.einsum("nij,nj->in", axes, course.force[:, :2])
+        X = np.stack([ahead, course.force[:, 2]], axis=1)
+        beta, *_ = np.linalg.lstsq(X, left, rcond=None)
+        first = np.linalg.pinv(X.T @ X)[0]
+        of_left, of_others = X @ first, np.outer(left - X @ beta, first) - np.outer(X @ first, beta)
+        steep = 1 / (1 + beta[0] ** 2)
+        gradient = np.zeros_like(course.wrench)
+        gradient[:, :2] = of_left[:, None] * axes[:, 1] + of_others[:, :1] * axes[:, 0]
+        gradient[:, 2] = of_others[:, 1]
+        late = float(np.sum(turns * (of_others[:, 0] * left - of_left * ahead)))
+        return self._observation(
+            seen, step, "slant", float(np.arctan(beta[0])), _SLANT, _responds(course, steep * gradient, steep * late)
         )
 
+    def _observation(
+        self, seen: SeenTrial, step: FootStep, what: str, value: float, norm: tuple[float, float, float],
+        responds: Sensitivity,
+    ) -> Observation:  # fmt: skip
+        """Return one observation; ``norm`` what is expected, sd of one step, sd of one person."""
+        expected, sd, person = norm
+        unit, norms = ("rad", f"person {step.side} slant") if what == "slant" else ("1", f"person {what}")
+        return Observation(
+            self.name, f"{step.name}, {what}", seen.trial.name, value, sd, expected, unit, step.plate, {norms: person},
+            sensitivity=responds,
+        )  # fmt: skip
 
-def _slope(left: Array, ahead: Array, vertical: Array) -> float:
-    """Return how the shear to the left follows the one ahead, beside what follows the vertical force."""
-    return float(np.linalg.lstsq(np.stack([ahead, vertical], axis=1), left, rcond=None)[0][0])
+
+def _responds(course: StepCourse, gradient: Array, late: float) -> Sensitivity:
+    """Return the sensitivity of what has the derivatives (n, 6) with respect to the wrench under the foot."""
+    return Sensitivity({name: by_samples(gradient, one) for name, one in course.plates.items()}, delay=late)
 
 
 def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> tuple[Array, Array] | None:

@@ -24,9 +24,14 @@ class Sides(Witness):
             right, left = sides.get("right"), sides.get("left")
             if right is None or left is None:
                 continue
-            value = right.mean(right.outwards, *_MIDDLE) - left.mean(left.outwards, *_MIDDLE)
+            (one, responds), (other, too) = (side.place(1, *_MIDDLE) for side in (right, left))
             what = f"right less left foot, {first.plate} and {last.plate} from {first.middle:.2f} s"
-            found.append(Observation(self.name, what, seen.trial.name, value, _OWN, 0.0, "m", counts=False))
+            found.append(
+                Observation(
+                    self.name, what, seen.trial.name, one - other, _OWN, 0.0, "m", counts=False,
+                    sensitivity=responds - too,
+                )
+            )  # fmt: skip
         return tuple(found)
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from biodance.body.tables.error_sizes import error_size
-from biodance.records import Array
+from biodance.records import Array, Plate
 from biodance.witnesses import Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
+from biodance.witnesses._sensitivity import Sensitivity, of_mean
 from biodance.witnesses.stride_force import DECLARED
 
 _ON_PLATES = (0.75, 1.35)
@@ -38,11 +39,22 @@ class StandingForce(Witness):
         where = plates[0].name if len(plates) == 1 else ""
         mass = force[2] / seen.trial.settings.gravity
         norms, trial = {"person declared mass": DECLARED * seen.mass}, seen.trial.name
-        found = [Observation(self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms)]
+        g = seen.trial.settings.gravity
+        weighs = Sensitivity({p.name: of_mean(_known(p), 2) / g for p in seen.trial.plates}, mass=1.0)
+        found = [
+            Observation(
+                self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms, sensitivity=weighs
+            )
+        ]
         sd = _SWAY * weight / max(1.0, (total.time[-1] - total.time[0])) ** 0.5
         for axis, channel in enumerate(("Fx", "Fy")):
             value, own = float(force[axis]), {f"plate level along {'xy'[axis]}": _level(axis) * weight}
-            found.append(Observation(self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where, own))
+            pushes = Sensitivity({p.name: of_mean(_known(p), axis) for p in seen.trial.plates})
+            found.append(
+                Observation(
+                    self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where, own, sensitivity=pushes
+                )
+            )
         return tuple(found)
 
 
@@ -53,6 +65,11 @@ def _level(axis: int) -> float:
     about, channel = "yx"[axis], ("Fx", "Fy")[axis]
     lean = error_size("lab_tilt", about), error_size("plate_rotation", about)
     return float(np.linalg.norm([*lean, error_size("plate_crosstalk", f"Fz->{channel}")]))
+
+
+def _known(plate: Plate) -> Array:
+    """Return the wrench (n, 6) of a plate at the samples that are known."""
+    return plate.wrench.value[np.isfinite(plate.wrench.value).all(axis=1)]
 
 
 def mean_force(force: Array) -> Array:

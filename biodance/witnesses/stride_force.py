@@ -6,8 +6,8 @@ middle of a stance the other foot swings: one plate alone says the same a little
 other. A foot that reaches over the edge of its plate does not weigh: what it treads on beside it is not measured.
 """
 
-from collections.abc import Iterator
-from functools import lru_cache
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from biodance.motion.newton import fading
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
 from biodance.witnesses._recording import ONSET
+from biodance.witnesses._sensitivity import Sensitivity, of_mean
 from biodance.witnesses._stance import is_recorded, steps, walks
 
 DECLARED = 0.01
@@ -32,8 +33,6 @@ _ONE = (0.2, 0.8)
 """Start and stop, as shares of stance, of the time in which the other foot swings."""
 _SHORTEST = 0.15
 """s that one foot alone must be seen."""
-_KEPT = 64
-"""Sets of times of which the pelvis' part is kept."""
 
 
 class StrideForce(Witness):
@@ -50,10 +49,12 @@ class StrideForce(Witness):
         """Return one mass for each foot alone, one mass and two horizontal forces for each whole step, and one mass of
         all strides on a belt.
         """
-        return _weights(seen)
+        if self.name not in seen.kept:
+            seen.kept[self.name] = self._weights(seen)  # `double_support` and `newton` ask, too
+        found: tuple[Observation, ...] = seen.kept[self.name]
+        return found
 
-    def weights(self, seen: SeenTrial) -> tuple[Observation, ...]:
-        """Return the same, weighed anew."""
+    def _weights(self, seen: SeenTrial) -> tuple[Observation, ...]:
         if seen.pelvis is None or not seen.mass > 0:
             return ()
         alone = [one for step in seen.steps if not step.overhang for one in self._alone(seen, step)]
@@ -63,83 +64,92 @@ class StrideForce(Witness):
         moving = [step for step in seen.steps if seen.belt(step) is not None]
         if len(moving) < _MANY or len(moving) < len(seen.steps) or not seen.one_clock:
             return []
-        total, names = seen.total, {step.plate for step in moving}
-        here = (total.time >= moving[0].middle) & (total.time <= moving[-1].middle)
-        value = _mass(seen, _means(seen, total.time[here], total.force[here]))
-        return [
-            _weighed(self.name, "all strides", seen, value, "going on", _ON, names.pop() if len(names) == 1 else "")
-        ]
+        time, names = seen.total.time, {step.plate for step in moving}
+        here = slice(*np.searchsorted(time, (moving[0].middle, np.nextafter(moving[-1].middle, np.inf))))
+        means = _means(seen, time[here], _all_plates(seen, here))
+        return [_weighed(self.name, "all strides", seen, means, "going on", _ON, names.pop() if len(names) == 1 else "")]
 
     def _alone(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
         if part is None or not is_recorded(seen, step) or not walks(seen, step):
             return []
-        wrench, count = seen.under(step), part.stop - part.start
+        time, count = seen.plate(step.plate).wrench.time, part.stop - part.start
         span = slice(part.start + round(_ONE[0] * count), part.start + round(_ONE[1] * count))
         if step.beside:
-            here = np.flatnonzero(seen.swings(step, wrench.time[span])) + span.start
+            here = np.flatnonzero(seen.swings(step, time[span])) + span.start
             span = slice(here[0], here[-1] + 1) if here.size else slice(0, 0)
-        if span.stop - span.start < _SHORTEST * wrench.rate or _elsewhere(seen, step.plate, *step.beside)[span].any():
+        rate = seen.plate(step.plate).wrench.rate
+        if span.stop - span.start < _SHORTEST * rate or _elsewhere(seen, span, step.plate, *step.beside).any():
             return []
-        value = _mass(seen, _means(seen, wrench.time[span], wrench.force[span]))
-        return [_weighed(self.name, f"{step.name}, alone", seen, value, "on one foot", _ALONE, step.plate)]
+        means = _means(seen, time[span], seen.under(step, span))
+        return [_weighed(self.name, f"{step.name}, alone", seen, means, "on one foot", _ALONE, step.plate)]
 
     def _whole(self, seen: SeenTrial, first: FootStep, last: FootStep) -> list[Observation]:
         span = _both(seen, first, last)
         if span is None:
             return []
-        total, g, name = seen.total, seen.trial.settings.gravity, f"{first.side} to {last.side} step"
-        time, force = total.time[span], total.force[span]
+        g, name = seen.trial.settings.gravity, f"{first.side} to {last.side} step"
         what = f"{name} from {first.middle:.2f} s"
-        needed = _means(seen, time, force)
-        found = [_weighed(self.name, what, seen, _mass(seen, needed), "in a step", _STEP)]
+        means = _means(seen, seen.total.time[span], _all_plates(seen, span))
+        found = [_weighed(self.name, what, seen, means, "in a step", _STEP)]
         for axis, channel in enumerate(("Fx", "Fy")):
-            value, sd = float(needed[0, axis] - seen.mass * needed[1, axis]), _HORIZONTAL * seen.mass * g
-            found.append(Observation(self.name, f"{what}, mean {channel}", seen.trial.name, value, sd, 0.0, "N"))
+            value, sd = float(means.force[axis] - seen.mass * means.moved[axis]), _HORIZONTAL * seen.mass * g
+            late, heavier = -seen.mass * means.late[axis], float(means.moved[axis])
+            responds = Sensitivity(means.plates(axis), delay=float(late), mass=heavier)
+            found.append(
+                Observation(
+                    self.name, f"{what}, mean {channel}", seen.trial.name, value, sd, 0.0, "N", sensitivity=responds
+                )
+            )
         return found
 
 
-@lru_cache(maxsize=2)
-def _weights(seen: SeenTrial) -> tuple[Observation, ...]:
-    """Return what a trial weighs; of the last ones it is kept: `double_support` asks, too."""
-    return StrideForce().weights(seen)
+@dataclass(frozen=True, eq=False)
+class _Means:
+    """Mean ``force`` (3,) N and mean acceleration ``moved`` (3,) m/s² of the pelvis, with weights that begin and end as
+    a cosine does; ``late`` (3,) m/s³: how that grows where the forces come late; the ``share`` (n,) of each sample and
+    the wrenches (n, 6) about the lab origin ``by`` plate.
+    """
+
+    force: Array
+    moved: Array
+    late: Array
+    share: Array
+    by: Mapping[str, Array]
+
+    def plates(self, channel: int) -> dict[str, Array]:
+        """Return by plate the derivative (6, 7) of the mean of one channel."""
+        return {name: of_mean(wrench, channel, self.share) for name, wrench in self.by.items()}
+
+
+def _means(seen: SeenTrial, time: Array, by: Mapping[str, Array]) -> _Means:
+    """Return the means over times (n,) s: the acceleration is that of the path, weighed with the weights' second
+    derivative.
+    """
+    share, bend = fading(time)
+    path, speed = seen.pelvis_track.at(time), seen.pelvis_track.speed_at(time)
+    moved, late = bend @ (path - path.mean(axis=0)), bend @ (speed - speed.mean(axis=0))
+    force = sum((share @ wrench[:, :3] for wrench in by.values()), np.zeros(3))
+    return _Means(force, moved, late, share, by)
+
+
+def _all_plates(seen: SeenTrial, span: slice) -> dict[str, Array]:
+    return {plate.name: plate.wrench.value[span] for plate in seen.trial.plates}
 
 
 def _weighed(
-    name: str, what: str, seen: SeenTrial, value: float, way: str, norm: tuple[float, float, float], plate: str = ""
+    name: str, what: str, seen: SeenTrial, means: _Means, way: str, norm: tuple[float, float, float], plate: str = ""
 ) -> Observation:
+    """Return the mass kg whose weight and acceleration need the mean vertical force."""
     bias, sd, person = norm
     norms = {"person declared mass": DECLARED * seen.mass, f"person weighs {way}": person * seen.mass}
-    expected = (1 + bias) * seen.mass
-    return Observation(name, what, seen.trial.name, value, sd * seen.mass, expected, "kg", plate, norms)
-
-
-def _means(seen: SeenTrial, time: Array, force: Array) -> Array:
-    """Return the mean force (3,) N and the mean acceleration (3,) m/s² of the pelvis, with weights that begin and end
-    as a cosine does: the acceleration is that of the path, weighed with the weights' second derivative.
-    """
-    key = time.tobytes()
-    if key not in seen.moments:
-        if len(seen.moments) >= _KEPT:
-            seen.moments.pop(next(iter(seen.moments)))
-        seen.moments[key] = _fading(seen, time)
-    share, moved = seen.moments[key]
-    return np.stack([share @ force, moved])
-
-
-def _fading(seen: SeenTrial, time: Array) -> tuple[Array, Array]:
-    """Return the share (n,) of each of the times (n,) s in a mean, and the pelvis' mean acceleration (3,) m/s²."""
-    share, bend = fading(time)
-    path = seen.pelvis_at(time)
-    return share, bend @ (path - path.mean(axis=0))
-
-
-def _mass(seen: SeenTrial, means: Array) -> float:
-    """Return the mass kg whose weight and acceleration need the mean vertical force, of the ``means`` (2, 3) of force
-    N and acceleration m/s².
-    """
-    needed, moved = means[:, 2]
-    return float(needed / (seen.trial.settings.gravity + moved))
+    per = float(seen.trial.settings.gravity + means.moved[2])
+    value, expected = float(means.force[2]) / per, (1 + bias) * seen.mass
+    plates = {one: slope / per for one, slope in means.plates(2).items()}
+    responds = Sensitivity(plates, delay=-value / per * float(means.late[2]), mass=1 + bias)
+    return Observation(
+        name, what, seen.trial.name, value, sd * seen.mass, expected, "kg", plate, norms, sensitivity=responds
+    )
 
 
 def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
@@ -150,11 +160,11 @@ def _pairs(seen: SeenTrial) -> Iterator[tuple[FootStep, FootStep]]:
             yield first, last
 
 
-def _elsewhere(seen: SeenTrial, *plates: str) -> NDArray[np.bool_]:
-    """Return (S,) whether another plate than ``plates`` is loaded: the other foot stands there."""
+def _elsewhere(seen: SeenTrial, span: slice, *plates: str) -> NDArray[np.bool_]:
+    """Return (n,) whether another plate than ``plates`` is loaded at some samples: the other foot stands there."""
     others = [plate for plate in seen.trial.plates if plate.name not in plates] if seen.one_clock else []
-    none = np.zeros(seen.plate(plates[0]).wrench.time.size, dtype=bool)
-    return np.any([none, *(plate.wrench.force[:, 2] > ONSET for plate in others)], axis=0)
+    none = np.zeros(span.stop - span.start, dtype=bool)
+    return np.any([none, *(plate.wrench.force[span, 2] > ONSET for plate in others)], axis=0)
 
 
 def _both(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
@@ -167,10 +177,12 @@ def _both(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
     middle = slice((one.start + one.stop) // 2, (two.start + two.stop) // 2)
     begin = one.start + round(_ONE[0] * (one.stop - one.start))
     end = two.start + round(_ONE[1] * (two.stop - two.start))
-    loaded = _elsewhere(seen, first.plate, last.plate)
-    if loaded[middle].any():
+    if _elsewhere(seen, middle, first.plate, last.plate).any():
         return None
-    before, after = np.flatnonzero(loaded[begin : middle.start]), np.flatnonzero(loaded[middle.stop : end])
+    before, after = (
+        np.flatnonzero(_elsewhere(seen, span, first.plate, last.plate))
+        for span in (slice(begin, middle.start), slice(middle.stop, end))
+    )
     return slice(begin + before[-1] + 1 if before.size else begin, middle.stop + after[0] if after.size else end)
 
 

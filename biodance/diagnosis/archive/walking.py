@@ -1,7 +1,7 @@
 """What ordinary steps say of the plates they fall on: their place, the delay of the force, what they weigh.
 
 The witnesses (`biodance.witnesses`) tell how far the pressure lies from where it is in a foot; which way a plate would
-have to be moved for it is asked of them by altering the recording. Where a person's own foot has the pressure is
+have to be moved for it, their sensitivities say. Where a person's own foot has the pressure is
 unknown and the same in all steps of that foot: all steps of a visit, on all plates, are solved together, so that left
 and right, there and back tell the foot from the plate.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.records import Array
-from biodance.witnesses import Observation, SeenTrial, observe, possible_causes, traces
+from biodance.witnesses import Observation, SeenTrial, observe, sensitivities
 
 _PLACE, _ONSET, _WEIGHT = ("foot_across", "foot_along"), "force_onset", "stride_force"
 _BLIND = 0.03
@@ -49,8 +49,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
     for plate in dict.fromkeys(step.plate for step in seen.steps):
         own = tuple(one for one in found if one.plate == plate)
         if own:
-            causes = {one.target: one for one in possible_causes(seen) if one.effect == "plate_position"}
-            columns = np.column_stack([traces(seen, own, causes[f"{plate}:{axis}"], _PLACE) for axis in "xy"])
+            shifts = [sensitivities(seen, own, "plate_position", f"{plate}:{axis}", "shift") for axis in "xy"]
             out += [
                 StepRow(
                     labels[plate],
@@ -59,7 +58,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
                     one.sd,
                     {name: size for name, size in one.norms.items() if name.startswith(_OWN)},
                 )
-                for one, column in zip(own, columns, strict=True)
+                for one, column in zip(own, np.column_stack(shifts), strict=True)
             ]
     return out
 
