@@ -16,6 +16,7 @@ from biodance.witnesses import (
     Cause,
     Observation,
     SeenTrial,
+    changed,
     corrected,
     observe,
     possible_causes,
@@ -219,18 +220,24 @@ def _turned(
     single: bool,
 ) -> dict[tuple[str, str], Array]:
     """Return by channel the value minus expectation (n,) of the observations after its sign is reversed, in trials with
-    steps. The sign of the vertical force is gravity's: what responds to that force alone is as it was.
+    steps; NaN where an observation is then missing, or is only shown. The sign of the vertical force is gravity's, so
+    that most observations change linearly; the others are made again.
     """
-    plain = np.array([one.value - one.expected for one in found])
+    plain = np.array([one.value - one.expected if one.counts else np.nan for one in found])
     out: dict[tuple[str, str], Array] = {}
     for seen in recorded:
-        here = [i for i, o in enumerate(found) if o.trial == seen.trial.name and not o.sensitivity.only_vertical]
-        own = [found[i] for i in here]
-        asked = {one.witness for one in own if one.counts}
-        for name, right in turned_signs(seen, single=single).items() if seen.steps else ():
-            after = {one.key: _apply_norm(one, norms) for one in observe(right, asked)}
-            again = [after[one.key].value - after[one.key].expected if one.key in after else np.nan for one in own]
-            out.setdefault(name, plain.copy())[here] = again
+        here = [i for i, o in enumerate(found) if o.trial == seen.trial.name and o.counts]
+        again = {found[i].witness for i in here if not found[i].sensitivity.linear}
+        for name, (plate, change) in turned_signs(seen, single=single).items() if seen.steps else ():
+            value = out.setdefault(name, plain.copy())
+            right = observe(changed(seen, plate, change), again) if again else ()
+            after = {one.key: _apply_norm(one, norms) for one in right}
+            for i in here:
+                if found[i].witness not in again:
+                    value[i] += found[i].sensitivity.to(plate, change)
+                else:
+                    one = after.get(found[i].key)
+                    value[i] = one.value - one.expected if one else np.nan
     return out
 
 

@@ -243,20 +243,23 @@ def slopes_of(trunk: Trunk, told: LagAndMass, total: Wrench, changes: Array, *, 
     """Return the derivatives of lag and mass of `lag_and_mass` with respect to the sizes (d,) of ``changes`` (S, d) N
     of the total vertical force; 0 of what is not told.
 
-    The lag is the top of the parabola through three correlations: its derivative is that of the three. Of the mass the
-    lag, and what each span weighs among all, are held.
+    The lag is the top of the parabola through three correlations: its derivative is that of the three. The mass changes
+    with the forces, with the lag, and with what each span weighs among all.
     """
     rate = 1 / float(np.median(np.diff(total.time)))
     slow = low_pass(np.column_stack([total.force[:, 2], changes]), rate, _BAND)
+    slow = np.column_stack([slow, np.gradient(slow[:, 0], total.time)])
     lags, masses = np.zeros(changes.shape[1]), np.zeros(changes.shape[1])
     if np.isfinite(told.lag):
-        lags = _lag_slope(trunk, total.time, slow, told.lag)
+        lags = _lag_slope(trunk, total.time, slow[:, :-1], told.lag)
     weights = trunk.weights(gravity) if np.isfinite(told.mass) else []
     times = trunk.time + (told.lag if np.isfinite(told.lag) else 0.0)
     each = np.array([weight @ _at(times[span], total.time, slow) for span, weight, _ in weights])
     if len(each):
         share = (np.abs(each[:, 0]) * [sd for *_, sd in weights]) ** -2
-        masses = share @ each[:, 1:] / share.sum()
+        share /= share.sum()
+        share *= 1 - 2 * (each[:, 0] - told.mass) / each[:, 0]  # a heavier span weighs less among all
+        masses = share @ (each[:, 1:-1] + np.outer(each[:, -1], lags))
     return lags, masses
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from biodance.discovery import Chosen, Family
 from biodance.records import assign
-from biodance.witnesses._causes import Cause, corrected, possible_causes, sensitivities, turned_signs
+from biodance.witnesses._causes import Cause, changed, corrected, possible_causes, sensitivities, turned_signs
 from biodance.witnesses._feet import FootPath
 from biodance.witnesses._landmark import LANDMARK, shift_per_sd
 from biodance.witnesses._recording import ONSET, FootStep, SeenTrial, recording
@@ -40,6 +40,7 @@ __all__ = [
     "SeenTrial",
     "Sensitivity",
     "Witness",
+    "changed",
     "corrected",
     "observe",
     "possible_causes",

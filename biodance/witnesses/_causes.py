@@ -128,7 +128,7 @@ def sensitivities(
         return out
     for plate in seen.trial.plates:
         change = plate_change(effect, target, plate)
-        out += [np.sum(one.plates[plate.name] * change) if plate.name in one.plates else 0.0 for one in known]
+        out += [one.to(plate.name, change) for one in known]
         if effect == "plate_offset" and target in (f"{plate.name}:{target[-2:]}", target[-2:]) and was_zeroed(plate):
             level = np.eye(6)[CHANNELS.index(target[-2:])][:3]
             out += [one.zero[plate.name] @ level if plate.name in one.zero else 0.0 for one in known]
@@ -170,8 +170,8 @@ def _changed(wrench: Wrench, change: Array) -> Wrench:
     return Wrench(wrench.time, value)
 
 
-def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], SeenTrial]:
-    """Return by effect and target the recording in which one channel of one plate has the other sign.
+def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], tuple[str, Array]]:
+    """Return by effect and target the plate and the change B (6, 7) that turn one channel round, about its centre.
 
     Where that is the vertical force, the reader has turned the whole plate round to make the weight point up: all other
     channels are reversed. ``single`` as in `possible_causes`.
@@ -181,11 +181,17 @@ def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], S
         for k, name in enumerate(CHANNELS[:5]):
             wrong = np.eye(6)[k] if name != "Fz" else 1 - np.eye(6)[k]
             change = _about_centre(plate, np.column_stack([np.diag(-2 * wrong), np.zeros(6)]))
-            right = replace(plate, wrench=_changed(plate.wrench, change))
-            plates = tuple(right if one.name == plate.name else one for one in seen.trial.plates)
-            target = name if single else f"{plate.name}:{name}"
-            found["axis_error", target] = replace(seen, trial=replace(seen.trial, plates=plates))
+            found["axis_error", name if single else f"{plate.name}:{name}"] = plate.name, change
     return MappingProxyType(found)
+
+
+def changed(seen: SeenTrial, name: str, change: Array) -> SeenTrial:
+    """Return the recording with a plate's wrench changed by B (6, 7) about the lab origin."""
+    plates = [
+        replace(plate, wrench=_changed(plate.wrench, change)) if plate.name == name else plate
+        for plate in seen.trial.plates
+    ]
+    return replace(seen, trial=replace(seen.trial, plates=tuple(plates)))
 
 
 def was_zeroed(plate: Plate) -> bool:

@@ -93,15 +93,17 @@ class SeenTrial:
     def stance(self, step: FootStep) -> slice | None:
         """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
         time = self.plate(step.plate).wrench.time
-        here = [run for run in self._contacts[step.plate] if time[run[0]] <= step.middle]
-        if not here or time[here[-1][1] - 1] < step.middle:
+        runs_on = self._contacts[step.plate]
+        last = int(np.searchsorted(time[runs_on[:, 0]], step.middle, side="right")) - 1
+        if last < 0 or time[runs_on[last, 1] - 1] < step.middle:
             return None
-        return slice(*here[-1])
+        return slice(*map(int, runs_on[last]))
 
     @cached_property
-    def _contacts(self) -> dict[str, list[tuple[int, int]]]:
-        """First sample and end of every contact with each plate."""
-        return {plate.name: runs(plate.wrench.force[:, 2] > ONSET) for plate in self.trial.plates}
+    def _contacts(self) -> dict[str, Index]:
+        """(n, 2) first sample and end of every contact with each plate."""
+        each = ((plate.name, runs(plate.wrench.force[:, 2] > ONSET)) for plate in self.trial.plates)
+        return {name: np.array(found, dtype=int).reshape(-1, 2) for name, found in each}
 
     def under(self, step: FootStep, part: slice | Index) -> dict[str, Array]:
         """Return by plate the wrench (n, 6) about the lab origin that carries the foot of a step at some of its plate's

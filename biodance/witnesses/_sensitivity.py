@@ -20,6 +20,7 @@ class Sensitivity:
     becomes w + B [w; 1]; ``zero`` by plate (3,) 1/N: of the force that its reader took off; ``delay`` 1/s: of all
     forces, late = positive; ``mass`` 1/kg: of what the person weighs more than declared; ``landmarks`` 1/m by side and
     direction: of toe markers that lie ``inwards``, of heel markers that lie ``backwards`` of where they are expected.
+    ``linear``: ``plates`` holds for changes of any size that leave the vertical force as it is.
     """
 
     plates: Mapping[str, Array] = field(default_factory=dict)
@@ -27,6 +28,7 @@ class Sensitivity:
     delay: float = 0.0
     mass: float = 0.0
     landmarks: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    linear: bool = True
 
     def __sub__(self, other: "Sensitivity") -> "Sensitivity":
         """Return the sensitivity of the difference of two observations' values."""
@@ -36,10 +38,9 @@ class Sensitivity:
         }
         return Sensitivity(plates, delay=self.delay - other.delay, mass=self.mass - other.mass)
 
-    @property
-    def only_vertical(self) -> bool:
-        """Whether of all channels of plates it responds to the vertical force alone."""
-        return not any(np.delete(one, 2, axis=0).any() for one in self.plates.values())
+    def to(self, plate: str, change: Array) -> float:
+        """Return the derivative with respect to the size of a ``change`` B (6, 7) of a plate."""
+        return float(np.sum(self.plates[plate] * change)) if plate in self.plates else 0.0
 
 
 def by_samples(gradient: Array, wrench: Array) -> Array:

@@ -46,7 +46,7 @@ class FootOutline(Witness):
         median = np.argsort(distance)[[(distance.size - 1) // 2, distance.size // 2]]
         at = np.flatnonzero(known)[median]
         gradient = pressure_gradient(wrench[at], _away(cop[at], sole[at]), plate.height) / 2
-        responds = Sensitivity({name: by_samples(gradient, one[at]) for name, one in plates.items()})
+        responds = Sensitivity({name: by_samples(gradient, one[at]) for name, one in plates.items()}, linear=False)
         return Observation(
             self.name, step.name, seen.trial.name, float(np.median(distance)), _OWN, 0.0, "m", step.plate, counts=False,
             sensitivity=responds,

@@ -5,6 +5,8 @@ turn the shear turns with it. What the pelvis is accelerated by over the step is
 slows down brakes more.
 """
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from biodance.records import Array
@@ -49,16 +51,15 @@ class Shear(Witness):
         path = way(seen, step, part) if part is not None else None
         if part is None or path is None:
             return []
-        velocity, bending = path
-        speed = np.linalg.norm(velocity, axis=1)[:, None]
-        ahead = velocity / speed
+        speed = np.linalg.norm(path.velocity, axis=1)
+        ahead = path.velocity / speed[:, None]
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-        axes, turns = np.stack([ahead, left], axis=1), left @ bending / speed[:, 0]
-        parts = [self._part(seen, step, part, axes, turns, bending, what) for what in _PARTS]
+        axes, turns = np.stack([ahead, left], axis=1), np.sum(left * path.velocity_late, axis=1) / speed
+        parts = [self._part(seen, step, part, axes, turns, path, what) for what in _PARTS]
         return [*parts, self._slant(seen, step, part, axes, turns)]
 
     def _part(
-        self, seen: SeenTrial, step: FootStep, course: StepCourse, axes: Array, turns: Array, bending: Array, what: str
+        self, seen: SeenTrial, step: FootStep, course: StepCourse, axes: Array, turns: Array, path: "Way", what: str
     ) -> Observation:
         """Return the mean shear along one of the ``axes`` (n, 2, 2), which turn by ``turns`` (n,) rad/s."""
         start, stop, axis, expected, sd, person = _PARTS[what]
@@ -66,13 +67,14 @@ class Shear(Witness):
         force, weight, g = course.force[part, :2], float(course.force[:, 2].mean()), seen.trial.settings.gravity
         share = float(np.sum(force * axes[part, axis], axis=1).mean()) / weight if force.size else float("nan")
         other = np.sum(force * axes[part, 1 - axis], axis=1) * turns[part] * (-1 if axis else 1)
-        gains = turns[middle] * (bending @ axes[middle, 1 - axis]) * (-1 if axis else 1) / g
+        gained, other_gained = axes[middle, [axis, 1 - axis]] @ path.bending / g
+        late = path.bending_late @ axes[middle, axis] / g + turns[middle] * other_gained * (-1 if axis else 1)
         gradient = np.zeros_like(course.wrench)
         gradient[part, :2] = axes[part, axis] / max(len(force), 1) / weight
         gradient[:, 2] = -share / weight / len(gradient)
         return self._observation(
-            seen, step, what, inwards * (share - float(bending @ axes[middle, axis]) / g), (expected, sd, person),
-            _responds(course, inwards * gradient, inwards * float(other.sum() / max(len(force), 1) / weight - gains)),
+            seen, step, what, inwards * (share - float(gained)), (expected, sd, person),
+            _responds(course, inwards * gradient, inwards * float(other.sum() / max(len(force), 1) / weight - late)),
         )  # fmt: skip
 
     def _slant(
@@ -89,9 +91,8 @@ class Shear(Witness):
         gradient[:, :2] = of_left[:, None] * axes[:, 1] + of_others[:, :1] * axes[:, 0]
         gradient[:, 2] = of_others[:, 1]
         late = float(np.sum(turns * (of_others[:, 0] * left - of_left * ahead)))
-        return self._observation(
-            seen, step, "slant", float(np.arctan(beta[0])), _SLANT, _responds(course, steep * gradient, steep * late)
-        )
+        responds = replace(_responds(course, steep * gradient, steep * late), linear=False)
+        return self._observation(seen, step, "slant", float(np.arctan(beta[0])), _SLANT, responds)
 
     def _observation(
         self, seen: SeenTrial, step: FootStep, what: str, value: float, norm: tuple[float, float, float],
@@ -111,21 +112,33 @@ def _responds(course: StepCourse, gradient: Array, late: float) -> Sensitivity:
     return Sensitivity({name: by_samples(gradient, one) for name, one in course.plates.items()}, delay=late)
 
 
-def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> tuple[Array, Array] | None:
-    """Return the horizontal velocity (n, 2) m/s of the pelvis over the ground or belt during a stance, evenly
-    accelerated, and that acceleration (2,) m/s²; None where the pelvis is not seen or hardly goes.
+@dataclass(frozen=True, eq=False)
+class Way:
+    """How the pelvis goes over the ground or belt during a stance: ``velocity`` (n, 2) m/s, evenly accelerated, and that
+    acceleration ``bending`` (2,) m/s²; ``velocity_late`` (n, 2) m/s² and ``bending_late`` (2,) m/s³: how they change
+    where the stance is late.
     """
-    assert seen.trial.markers is not None
-    known, middle = seen.trial.markers.time, float(np.mean(part.time[[0, -1]]))
-    here = (known >= part.time[0]) & (known <= part.time[-1])
-    path = seen.pelvis[here, :2] if seen.pelvis is not None else np.empty((0, 2))
-    told = np.isfinite(path).all(axis=1)
-    if told.sum() < _FRAMES:
+
+    velocity: Array
+    bending: Array
+    velocity_late: Array
+    bending_late: Array
+
+
+def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> Way | None:
+    """Return how the pelvis goes during a stance; None where it is not seen or hardly goes."""
+    path, middle, since = seen.pelvis_track, float(np.mean(part.time[[0, -1]])), part.time[:, None]
+    here = (path.time >= part.time[0]) & (path.time <= part.time[-1])
+    if np.count_nonzero(here) < _FRAMES:
         return None
-    bend, speed, _ = np.linalg.lstsq(np.vander(known[here][told] - middle, 3), path[told], rcond=None)[0]
+    known = np.hstack([path.place[:2, here].T, path.speed[:2, here].T])
+    bend, speed, _ = np.linalg.lstsq(np.vander(path.time[here] - middle, 3), known, rcond=None)[0]
+    both = speed + 2 * bend * (since - middle)
     belt = seen.belt(step)
-    velocity = speed - (np.zeros(2) if belt is None else belt) + 2 * bend * (part.time - middle)[:, None]
-    return (velocity, 2 * bend) if np.linalg.norm(velocity, axis=1).min() > _GOES else None
+    velocity = both[:, :2] - (np.zeros(2) if belt is None else belt)
+    if not np.linalg.norm(velocity, axis=1).min() > _GOES:
+        return None
+    return Way(velocity, 2 * bend[:2], both[:, 2:], 2 * bend[2:])
 
 
 WITNESS = Shear

@@ -55,7 +55,7 @@ class StandingPlace(Witness):
 
         def responds(axis: Array) -> Sensitivity:
             gradient = pressure_gradient(total, np.tile(axis, (len(total), 1)), height) / len(total)
-            return Sensitivity({plate.name: by_samples(gradient, plate.wrench.value[known]) for plate in plates})
+            return Sensitivity({plate.name: by_samples(gradient, plate.wrench.value[known]) for plate in plates}, linear=False)
 
         return tuple(
             Observation(

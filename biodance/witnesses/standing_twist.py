@@ -39,7 +39,7 @@ class StandingTwist(Witness):
         aside = np.tile([mean[1], -mean[0]], (len(value), 1))  # the twist loses this times the place of the pressure
         gradient = -pressure_gradient(value, aside, height) / len(value)
         gradient += np.array([y, -x, 0.0, 0.0, 0.0, 1.0]) / len(value)
-        responds = Sensitivity({plate.name: by_samples(gradient, plate.wrench.value) for plate in plates})
+        responds = Sensitivity({plate.name: by_samples(gradient, plate.wrench.value) for plate in plates}, linear=False)
         return (
             Observation(
                 self.name, "moment about the vertical", trial.name, twist, sd, 0.0, "N·m", where, sensitivity=responds
