@@ -159,4 +159,3 @@ def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> 
     if chosen is None:
         seen.kept["observations"] = found
     return found
-

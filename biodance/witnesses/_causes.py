@@ -109,9 +109,7 @@ def plate_change(effect: str, target: str, plate: Plate) -> Array:
     return _CHANGES[effect][1](plate, where)
 
 
-def sensitivities(
-    seen: SeenTrial, found: Sequence[_Observed], effect: str, target: str, parameter: str
-) -> Array:
+def sensitivities(seen: SeenTrial, found: Sequence[_Observed], effect: str, target: str, parameter: str) -> Array:
     """Return (n,) the derivatives of the values less the expectations of the observations ``found`` in one recording
     with respect to a parameter of an effect; 0 where an observation does not respond.
     """

@@ -112,7 +112,10 @@ class FootPath:
 
     def in_foot(self, time: Array, point: Array) -> InFoot:
         """Return points (n, 2) m in the foot at times (n,) s."""
-        (heel, front), speeds = (path[:, :2] for path in self.at(time)), [one.speed_at(time)[:, :2] for one in self.tracks]
+        (heel, front), speeds = (
+            (path[:, :2] for path in self.at(time)),
+            [one.speed_at(time)[:, :2] for one in self.tracks],
+        )
         length = np.linalg.norm(front - heel, axis=1)
         ahead = (front - heel) / length[:, None]
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)

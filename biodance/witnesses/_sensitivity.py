@@ -43,11 +43,11 @@ class Sensitivity:
         return float(np.sum(self.plates[plate] * change)) if plate in self.plates else 0.0
 
 
-def by_samples(gradient: Array, wrench: Array) -> Array:
-    """Return the derivative (6, 7) with respect to B of a function of a plate's wrench (n, 6) about the lab origin
-    whose derivatives with respect to the samples are ``gradient`` (n, 6).
+def by_plate(gradient: Array, plates: Mapping[str, Array]) -> dict[str, Array]:
+    """Return by plate the derivative (6, 7) with respect to B of a function of the sum of their wrenches (n, 6) about
+    the lab origin, whose derivatives with respect to its samples are ``gradient`` (n, 6).
     """
-    return np.column_stack([gradient.T @ wrench, gradient.sum(axis=0)])
+    return {name: np.column_stack([gradient.T @ wrench, gradient.sum(axis=0)]) for name, wrench in plates.items()}
 
 
 def of_mean(wrench: Array, channel: int, weights: Array | None = None) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from biodance.records import Array, Wrench
 from biodance.witnesses._feet import FootPath, InFoot, Track
 from biodance.witnesses._recording import ONSET, FootStep, SeenTrial
-from biodance.witnesses._sensitivity import Sensitivity, by_samples, of_mean, pressure_gradient
+from biodance.witnesses._sensitivity import Sensitivity, by_plate, of_mean, pressure_gradient
 
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""
@@ -44,9 +44,7 @@ class StepCourse:
 
     def part(self, start: float, stop: float) -> slice:
         """Return the samples of a part of the stance."""
-        return slice(
-            int(np.searchsorted(self.phase, start)), int(np.searchsorted(self.phase, stop, side="right"))
-        )
+        return slice(int(np.searchsorted(self.phase, start)), int(np.searchsorted(self.phase, stop, side="right")))
 
     def place(self, axis: int, start: float, stop: float) -> tuple[float, Sensitivity]:
         """Return where the pressure is in the foot on average over a part of the stance, m ahead of the heel marker
@@ -58,7 +56,7 @@ class StepCourse:
             return float("nan"), Sensitivity()
         at = np.arange(part.start, part.stop)[known]
         gradient = pressure_gradient(self.wrench[at], self.foot.axes[at, axis], self.height) / at.size
-        plates = {name: by_samples(gradient, wrench[at]) for name, wrench in self.plates.items()}
+        plates = by_plate(gradient, {name: wrench[at] for name, wrench in self.plates.items()})
         delay = float(np.nan_to_num(self.foot.moves[at, axis]).mean())
         return float(self.foot.place[at, axis].mean()), Sensitivity(plates, delay=delay)
 

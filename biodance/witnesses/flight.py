@@ -35,8 +35,10 @@ class Flight(Witness):
         found = []
         for plate in seen.trial.plates:
             wrench = plate.wrench
-            inside = np.any([(wrench.time >= a) & (wrench.time <= b) for a, b in spans], axis=0) if spans else np.empty(0)
-            if not np.any(inside) or wrench.force[:, 2].max() < 100.0:
+            inside = np.zeros(wrench.time.size, dtype=bool)
+            for start, stop in spans:
+                inside |= (wrench.time >= start) & (wrench.time <= stop)
+            if not inside.any() or wrench.force[:, 2].max() < 100.0:
                 continue
             lost = [wrench.force[a] - wrench.force[b - 1] for a, b in runs(inside)]
             late = np.sum(lost, axis=0) / np.count_nonzero(inside) * wrench.rate
@@ -45,9 +47,7 @@ class Flight(Witness):
                 plates = {plate.name: of_mean(wrench.value[inside], axis)}
                 responds = Sensitivity(plates, delay=float(late[axis]))
                 found.append(
-                    Observation(
-                        self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name, sensitivity=responds
-                    )
+                    Observation(self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name, sensitivity=responds)
                 )
         return tuple(found)
 

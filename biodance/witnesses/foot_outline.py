@@ -5,7 +5,7 @@ import numpy as np
 from biodance.motion.contact.over import distance_to_hull
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_samples, pressure_gradient
+from biodance.witnesses._sensitivity import Sensitivity, by_plate, pressure_gradient
 
 _STEADY = (0.1, 0.9)
 """Shares of stance between which the pressure must lie under the foot."""
@@ -46,7 +46,7 @@ class FootOutline(Witness):
         median = np.argsort(distance)[[(distance.size - 1) // 2, distance.size // 2]]
         at = np.flatnonzero(known)[median]
         gradient = pressure_gradient(wrench[at], _away(cop[at], sole[at]), plate.height) / 2
-        responds = Sensitivity({name: by_samples(gradient, one[at]) for name, one in plates.items()}, linear=False)
+        responds = Sensitivity(by_plate(gradient, {name: one[at] for name, one in plates.items()}), linear=False)
         return Observation(
             self.name, step.name, seen.trial.name, float(np.median(distance)), _OWN, 0.0, "m", step.plate, counts=False,
             sensitivity=responds,

@@ -5,13 +5,13 @@ turn the shear turns with it. What the pelvis is accelerated by over the step is
 slows down brakes more.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_samples
+from biodance.witnesses._sensitivity import Sensitivity, by_plate
 from biodance.witnesses._stance import StepCourse, step_course
 
 _PARTS = {
@@ -47,51 +47,44 @@ class Shear(Witness):
         return tuple(one for step in whole for one in self._of_step(seen, step))
 
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
-        part = step_course(seen, step)
-        path = way(seen, step, part) if part is not None else None
-        if part is None or path is None:
+        course = step_course(seen, step)
+        path = way(seen, step, course) if course is not None else None
+        if course is None or path is None:
             return []
-        speed = np.linalg.norm(path.velocity, axis=1)
-        ahead = path.velocity / speed[:, None]
-        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-        axes, turns = np.stack([ahead, left], axis=1), np.sum(left * path.velocity_late, axis=1) / speed
-        parts = [self._part(seen, step, part, axes, turns, path, what) for what in _PARTS]
-        return [*parts, self._slant(seen, step, part, axes, turns)]
+        parts = [self._part(seen, step, course, path, what) for what in _PARTS]
+        return [*parts, self._slant(seen, step, course, path)]
 
-    def _part(
-        self, seen: SeenTrial, step: FootStep, course: StepCourse, axes: Array, turns: Array, path: "Way", what: str
-    ) -> Observation:
-        """Return the mean shear along one of the ``axes`` (n, 2, 2), which turn by ``turns`` (n,) rad/s."""
+    def _part(self, seen: SeenTrial, step: FootStep, course: StepCourse, path: "Way", what: str) -> Observation:
+        """Return the mean shear in a part of the stance, beyond what accelerates the pelvis in its middle."""
         start, stop, axis, expected, sd, person = _PARTS[what]
-        inwards, part, middle = (-1 if axis and step.side == "right" else 1), course.part(start, stop), len(axes) // 2
-        force, weight, g = course.force[part, :2], float(course.force[:, 2].mean()), seen.trial.settings.gravity
-        share = float(np.sum(force * axes[part, axis], axis=1).mean()) / weight if force.size else float("nan")
-        other = np.sum(force * axes[part, 1 - axis], axis=1) * turns[part] * (-1 if axis else 1)
-        gained, other_gained = axes[middle, [axis, 1 - axis]] @ path.bending / g
-        late = path.bending_late @ axes[middle, axis] / g + turns[middle] * other_gained * (-1 if axis else 1)
+        inwards, turns = (-1 if axis and step.side == "right" else 1), (-1 if axis else 1) * path.turns
+        part, middle, weight = course.part(start, stop), len(path.turns) // 2, float(course.force[:, 2].mean())
+        share = np.zeros(len(path.turns))
+        share[part] = inwards / max(part.stop - part.start, 1) / weight
+        along = path.along(course.force)
+        per = inwards / seen.trial.settings.gravity
+        gained, late = path.axes[middle] @ path.bending * per, path.axes[middle] @ path.bending_late * per
+        value = float(share @ along[axis])
         gradient = np.zeros_like(course.wrench)
-        gradient[part, :2] = axes[part, axis] / max(len(force), 1) / weight
-        gradient[:, 2] = -share / weight / len(gradient)
-        return self._observation(
-            seen, step, what, inwards * (share - float(gained)), (expected, sd, person),
-            _responds(course, inwards * gradient, inwards * float(other.sum() / max(len(force), 1) / weight - late)),
-        )  # fmt: skip
+        gradient[:, :2] = share[:, None] * path.axes[:, axis]
+        gradient[:, 2] = -value / weight / len(gradient)
+        delay = share @ (turns * along[1 - axis]) - late[axis] - turns[middle] * gained[1 - axis]
+        responds = Sensitivity(by_plate(gradient, course.plates), delay=float(delay))
+        return self._observation(seen, step, what, value - float(gained[axis]), (expected, sd, person), responds)
 
-    def _slant(
-        self, seen: SeenTrial, step: FootStep, course: StepCourse, axes: Array, turns: Array
-    ) -> Observation:
+    def _slant(self, seen: SeenTrial, step: FootStep, course: StepCourse, path: "Way") -> Observation:
         """Return how the shear to the left follows the one ahead, beside what follows the vertical force."""
-        ahead, left = np.einsum("nij,nj->in", axes, course.force[:, :2])
+        ahead, left = path.along(course.force)
         X = np.stack([ahead, course.force[:, 2]], axis=1)
         beta, *_ = np.linalg.lstsq(X, left, rcond=None)
-        first = np.linalg.pinv(X.T @ X)[0]
-        of_left, of_others = X @ first, np.outer(left - X @ beta, first) - np.outer(X @ first, beta)
-        steep = 1 / (1 + beta[0] ** 2)
+        first = np.linalg.pinv(X.T @ X)[0] / (1 + beta[0] ** 2)
+        of_left = X @ first
+        of_ahead, of_vertical = (np.outer(left - X @ beta, first) - np.outer(of_left, beta)).T
         gradient = np.zeros_like(course.wrench)
-        gradient[:, :2] = of_left[:, None] * axes[:, 1] + of_others[:, :1] * axes[:, 0]
-        gradient[:, 2] = of_others[:, 1]
-        late = float(np.sum(turns * (of_others[:, 0] * left - of_left * ahead)))
-        responds = replace(_responds(course, steep * gradient, steep * late), linear=False)
+        gradient[:, :2] = of_left[:, None] * path.axes[:, 1] + of_ahead[:, None] * path.axes[:, 0]
+        gradient[:, 2] = of_vertical
+        late = float(np.sum(path.turns * (of_ahead * left - of_left * ahead)))
+        responds = Sensitivity(by_plate(gradient, course.plates), delay=late, linear=False)
         return self._observation(seen, step, "slant", float(np.arctan(beta[0])), _SLANT, responds)
 
     def _observation(
@@ -107,38 +100,40 @@ class Shear(Witness):
         )  # fmt: skip
 
 
-def _responds(course: StepCourse, gradient: Array, late: float) -> Sensitivity:
-    """Return the sensitivity of what has the derivatives (n, 6) with respect to the wrench under the foot."""
-    return Sensitivity({name: by_samples(gradient, one) for name, one in course.plates.items()}, delay=late)
-
-
 @dataclass(frozen=True, eq=False)
 class Way:
-    """How the pelvis goes over the ground or belt during a stance: ``velocity`` (n, 2) m/s, evenly accelerated, and that
-    acceleration ``bending`` (2,) m/s²; ``velocity_late`` (n, 2) m/s² and ``bending_late`` (2,) m/s³: how they change
-    where the stance is late.
+    """How the pelvis goes over the ground or belt in a stance: ``axes`` (n, 2, 2) unit vectors ahead and to the left,
+    which turn to the left by ``turns`` (n,) rad/s; ``bending`` (2,) m/s² its even acceleration; ``bending_late`` (2,)
+    m/s³: how that changes where the stance is late.
     """
 
-    velocity: Array
+    axes: Array
+    turns: Array
     bending: Array
-    velocity_late: Array
     bending_late: Array
 
+    def along(self, force: Array) -> Array:
+        """Return forces (n, 3) N ahead and to the left (2, n)."""
+        return np.asarray(np.einsum("nij,nj->in", self.axes, force[:, :2]))
 
-def way(seen: SeenTrial, step: FootStep, part: StepCourse) -> Way | None:
+
+def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> Way | None:
     """Return how the pelvis goes during a stance; None where it is not seen or hardly goes."""
-    path, middle, since = seen.pelvis_track, float(np.mean(part.time[[0, -1]])), part.time[:, None]
-    here = (path.time >= part.time[0]) & (path.time <= part.time[-1])
+    path, middle = seen.pelvis_track, float(np.mean(course.time[[0, -1]]))
+    here = (path.time >= course.time[0]) & (path.time <= course.time[-1])
     if np.count_nonzero(here) < _FRAMES:
         return None
     known = np.hstack([path.place[:2, here].T, path.speed[:2, here].T])
     bend, speed, _ = np.linalg.lstsq(np.vander(path.time[here] - middle, 3), known, rcond=None)[0]
-    both = speed + 2 * bend * (since - middle)
+    both = speed + 2 * bend * (course.time - middle)[:, None]
     belt = seen.belt(step)
-    velocity = both[:, :2] - (np.zeros(2) if belt is None else belt)
-    if not np.linalg.norm(velocity, axis=1).min() > _GOES:
+    velocity, late = both[:, :2] - (np.zeros(2) if belt is None else belt), both[:, 2:]
+    goes = np.linalg.norm(velocity, axis=1)
+    if not goes.min() > _GOES:
         return None
-    return Way(velocity, 2 * bend[:2], both[:, 2:], 2 * bend[2:])
+    ahead = velocity / goes[:, None]
+    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    return Way(np.stack([ahead, left], axis=1), np.sum(left * late, axis=1) / goes, 2 * bend[:2], 2 * bend[2:])
 
 
 WITNESS = Shear

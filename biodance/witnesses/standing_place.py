@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.records import Array
 from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_samples, pressure_gradient
+from biodance.witnesses._sensitivity import Sensitivity, by_plate, pressure_gradient
 from biodance.witnesses.standing_force import mean_force
 
 _ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
@@ -51,16 +51,16 @@ class StandingPlace(Witness):
         loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * force]
         where = loaded[0] if len(loaded) == 1 else ""
         axes = {"to the left": (np.array([-ahead[1], ahead[0]]), _ASIDE), "ahead": (ahead, _AHEAD)}
-        total = seen.total.value[known]
-
-        def responds(axis: Array) -> Sensitivity:
-            gradient = pressure_gradient(total, np.tile(axis, (len(total), 1)), height) / len(total)
-            return Sensitivity({plate.name: by_samples(gradient, plate.wrench.value[known]) for plate in plates}, linear=False)
-
+        total, each = seen.total.value[known], {plate.name: plate.wrench.value[known] for plate in plates}
+        rows = {
+            what: pressure_gradient(total, np.tile(axis, (len(total), 1)), height) / len(total)
+            for what, (axis, _) in axes.items()
+        }
         return tuple(
             Observation(
                 self.name, f"pressure {what} of the pelvis", trial.name, float(away @ axis), _OWN, expected, "m", where,
-                {f"person stands {what}": person, f"laboratory stands {what}": laboratory}, sensitivity=responds(axis),
+                {f"person stands {what}": person, f"laboratory stands {what}": laboratory},
+                sensitivity=Sensitivity(by_plate(rows[what], each), linear=False),
             )
             for what, (axis, (expected, person, laboratory)) in axes.items()
         )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_samples, pressure_gradient
+from biodance.witnesses._sensitivity import Sensitivity, by_plate, pressure_gradient
 
 _OWN = 0.4
 """N·m of sway over a second or longer: 0.00 to 0.16 in eleven static trials of three laboratories."""
@@ -39,7 +39,7 @@ class StandingTwist(Witness):
         aside = np.tile([mean[1], -mean[0]], (len(value), 1))  # the twist loses this times the place of the pressure
         gradient = -pressure_gradient(value, aside, height) / len(value)
         gradient += np.array([y, -x, 0.0, 0.0, 0.0, 1.0]) / len(value)
-        responds = Sensitivity({plate.name: by_samples(gradient, plate.wrench.value) for plate in plates}, linear=False)
+        responds = Sensitivity(by_plate(gradient, {plate.name: plate.wrench.value for plate in plates}), linear=False)
         return (
             Observation(
                 self.name, "moment about the vertical", trial.name, twist, sd, 0.0, "N·m", where, sensitivity=responds

@@ -67,7 +67,8 @@ class StrideForce(Witness):
         time, names = seen.total.time, {step.plate for step in moving}
         here = slice(*np.searchsorted(time, (moving[0].middle, np.nextafter(moving[-1].middle, np.inf))))
         means = _means(seen, time[here], _all_plates(seen, here))
-        return [_weighed(self.name, "all strides", seen, means, "going on", _ON, names.pop() if len(names) == 1 else "")]
+        where = names.pop() if len(names) == 1 else ""
+        return [_weighed(self.name, "all strides", seen, means, "going on", _ON, where)]
 
     def _alone(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
