@@ -21,8 +21,7 @@ from biodance.diagnosis.size_dependence import changes_wrench, size_dependences
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effects
 from biodance.pipeline.reason_words import reason_notes
-from biodance.witnesses import Observation
-from biodance.witnesses._causes import Alteration
+from biodance.witnesses import Cause, Observation
 
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
 
@@ -157,7 +156,7 @@ def weighed(value: float, sd: float, varies_with: str = "") -> Finding:
 
 def observed(witness: str) -> witness_evidence.WitnessEvidence:
     one = Observation(witness, "mass", "stand", 66.0, 0.5, 70.0, "kg")
-    step = Alteration(*MASS, "error", "kg", 0.5, lambda seen, size: seen)
+    step = Cause(*MASS, "error", "kg", 0.5)
     return witness_evidence.WitnessEvidence((one,), {MASS: step}, {MASS: np.array([1.0])})
 
 

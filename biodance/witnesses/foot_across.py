@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._landmark import LEVERS, landmark_across
+from biodance.witnesses._landmark import landmark_across
 from biodance.witnesses._stance import step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
@@ -55,12 +55,12 @@ class FootAcross(Witness):
             norms = {f"person {step.side} foot across, {phase}": foot, f"laboratory across, {phase}": laboratory}
             norms |= landmark_across(path, phase)
             value, responds = part.place(1, start, stop)
-            own, shown = (sd**2 + step.overhang**2) ** 0.5, {(step.side, "inwards"): LEVERS[phase]}
+            own, lever = (sd**2 + step.overhang**2) ** 0.5, part.place(0, start, stop)[0] / part.length
             what = f"{step.name}, {phase}"
             found.append(
                 Observation(
                     self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
-                    replace(responds, landmarks=shown),
+                    replace(responds, landmarks={(step.side, "inwards"): lever}),
                 )
             )  # fmt: skip
         return found

@@ -46,12 +46,13 @@ class FootAlong(Witness):
                 **landmark_along(path),
             }
             value, responds = part.place(0, start, stop)
-            own, shown = ((sd * part.length) ** 2 + step.overhang**2) ** 0.5, {(step.side, "backwards"): 1.0}
+            own, beside = ((sd * part.length) ** 2 + step.overhang**2) ** 0.5, part.place(1, start, stop)[0]
+            levers = {(step.side, "backwards"): 1 - share, (step.side, "inwards"): -beside / part.length}
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(
                 Observation(
                     self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
-                    replace(responds, landmarks=shown),
+                    replace(responds, landmarks=levers),
                 )
             )  # fmt: skip
         return found
