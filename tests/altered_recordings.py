@@ -1,7 +1,7 @@
 """Recordings altered as a wrong file, cable or clock would alter them: what sensitivities are compared with.
 
 The plates' samples themselves are altered, channel by channel about the plate's centre; no formula here is one of
-`biodance.witnesses`.
+`biodance.observations`.
 """
 
 from collections.abc import Callable
@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from biodance.observations import Observation, SeenTrial, observe
 from biodance.records import CHANNELS, Array, Plate, Wrench
 from biodance.spatial import axis_rotation, wrench_about_origin, wrench_about_point
-from biodance.witnesses import Observation, SeenTrial, observe
 
 
 def altered(seen: SeenTrial, effect: str, target: str, size: float) -> SeenTrial:

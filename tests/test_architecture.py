@@ -28,7 +28,7 @@ CONTRACTS = {
     "biodance.dance.limits": {"LIMIT"},
     "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "sniff", "read"},
     "biodance.body.export": {"FORMAT", "SUFFIX", "text", "data", "beside"},
-    "biodance.witnesses": {"WITNESS"},
+    "biodance.observations": {"OBSERVER"},
 }
 """Family -> the names that every member gives because its contract asks for them."""
 FAMILIES = {*CONTRACTS, "biodance.body.tables.segment_data", "biodance.lab.markers.sets"}

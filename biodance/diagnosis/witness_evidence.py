@@ -1,4 +1,4 @@
-"""Evidence of the witnesses of a session: their observations, and the contribution of every cause to each of them."""
+"""Observations of a session that need no model of the body, and what every cause adds to each of them."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
-from biodance.records import Array, Session
-from biodance.witnesses import (
+from biodance.observations import (
     Cause,
     Observation,
     SeenTrial,
     changed,
     corrected,
     observe,
+    observers,
     possible_causes,
     recording,
     sensitivities,
-    turned_signs,
-    witnesses,
+    sign_reversals,
 )
+from biodance.records import Array, Session
 
 _FAULT = 4.0
 """A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
-_BLIND = 0.2
-"""Standard deviations that a usual fault adds to an observation that is blind to it."""
+_UNRESPONSIVE = 0.2
+"""Standard deviations that a usual fault adds to an observation that does not respond to it."""
 _HABIT = 3.0
 """Standard deviations of laboratories beyond which a norm is no habit of one."""
 _REPEATED = 0.5
@@ -41,35 +41,35 @@ _REACH = 0.15
 what plates are off in laboratories); what lies farther is of another foot, of plates exchanged or of a wrong sign.
 """
 _EXACT = ("empty_plate", "flight", "standing_force", "standing_twist")
-"""Witnesses of which Newton alone says what they see: plates with nobody on them; who stands still has a weight, and no
+"""Observers of which Newton alone says what they see: plates with nobody on them; who stands still has a weight, and no
 other force or turn.
 """
 
 
 @dataclass(frozen=True, eq=False)
-class WitnessEvidence:
-    """All ``observations`` (n) of a session. ``traces``: for every cause, the change of each observation per unit of
-    the cause (n,). ``turned``: for every channel, value minus expectation (n,) after its sign is reversed, NaN where
-    the observation is then missing. ``seconds``: by trial, time in single support on a plate. ``recorded``: the trials
-    that were examined.
+class ObservedEvidence:
+    """All ``observations`` (n) of a session. ``sensitivities``: for every cause, the change of each observation per
+    unit of the cause (n,). ``sign_reversed``: for every channel, value minus expectation (n,) after its sign is
+    reversed, NaN where the observation is then missing, or is only shown. ``seconds``: by trial, time in single support
+    on a plate. ``recorded``: the trials that were examined.
     """
 
     observations: tuple[Observation, ...]
     causes: Mapping[tuple[str, str], Cause]
-    traces: Mapping[tuple[str, str], Array]
-    turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+    sensitivities: Mapping[tuple[str, str], Array]
+    sign_reversed: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     recorded: tuple[SeenTrial, ...] = ()
 
     @cached_property
-    def counting(self) -> "WitnessEvidence":
+    def counting(self) -> "ObservedEvidence":
         """Only the observations that count as evidence."""
         kept = np.array([one.counts for one in self.observations], dtype=bool)
-        return WitnessEvidence(
+        return ObservedEvidence(
             tuple(one for one in self.observations if one.counts),
             self.causes,
-            {name: trace[kept] for name, trace in self.traces.items()},
-            {name: value[kept] for name, value in self.turned.items()},
+            {name: column[kept] for name, column in self.sensitivities.items()},
+            {name: value[kept] for name, value in self.sign_reversed.items()},
             self.seconds,
             self.recorded,
         )
@@ -107,79 +107,79 @@ class WitnessEvidence:
         told = np.ones(len(self.observations), dtype=bool)
         if cause is not None:
             own = np.array([one.sd for one in self.observations])
-            told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= own)
+            told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= own)
         seen = [one for one, here in zip(self.observations, told, strict=True) if here]
-        touched = {one.contact for one in seen if one.witness not in _EXACT}
-        return 2 if cause and any(one.witness in _EXACT for one in seen) else len(touched)
+        touched = {one.contact for one in seen if one.observer not in _EXACT}
+        return 2 if cause and any(one.observer in _EXACT for one in seen) else len(touched)
 
     def strongest(self, index: int) -> tuple[str, str]:
         """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""
-        size = {name: abs(c.step * self.traces[name][index]) for name, c in self.causes.items()}
+        size = {name: abs(c.step * self.sensitivities[name][index]) for name, c in self.causes.items()}
         best = max(size, key=lambda name: size[name], default=("", ""))
-        return best if size.get(best, 0.0) * _FAULT > _BLIND * self.observations[index].expected_sd else ("", "")
+        return best if size.get(best, 0.0) * _FAULT > _UNRESPONSIVE * self.observations[index].expected_sd else ("", "")
 
-    def sees(self, cause: tuple[str, str]) -> Array:
+    def detects(self, cause: tuple[str, str]) -> Array:
         """Return (n,) bool: observations that each detect the usual fault of a cause at one standard deviation."""
         expected = np.array([one.expected_sd for one in self.observations])
-        return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= expected)
+        return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= expected)
 
-    def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
-        """Return the witnesses that detect the usual fault of a cause at ``least`` standard deviations, over all their
+    def detected_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
+        """Return the observers that detect the usual fault of a cause at ``least`` standard deviations, over all their
         observations; () if none does.
         """
         size = self.causes[cause].step * _FAULT
         total: dict[str, float] = {}
-        for one, trace in zip(self.observations, self.traces[cause], strict=True):
-            total[one.witness] = total.get(one.witness, 0.0) + (size * trace / one.expected_sd) ** 2
+        for one, column in zip(self.observations, self.sensitivities[cause], strict=True):
+            total[one.observer] = total.get(one.observer, 0.0) + (size * column / one.expected_sd) ** 2
         return tuple(name for name, power in total.items() if power**0.5 >= least)
 
 
 @dataclass(frozen=True)
 class CauseVisibility:
-    """How well the witnesses of a session determine one cause: ``sd`` of its size in ``unit`` from all of them
-    (infinite if none responds), the responding ``witnesses``, the causes ``alike`` that they cannot distinguish from
-    it, and ``would``: movements or markers, in words, that would make further witnesses respond.
+    """How well the observers of a session determine one cause: ``sd`` of its size in ``unit`` from all of them
+    (infinite if none responds), the responding ``observers``, the causes ``alike`` that they cannot distinguish from
+    it, and ``would``: movements or markers, in words, that would make further observers respond.
     """
 
     effect: str
     target: str
     unit: str
     sd: float
-    witnesses: tuple[str, ...]
+    observers: tuple[str, ...]
     alike: tuple[tuple[str, str], ...]
     would: tuple[str, ...]
 
 
-def cause_visibilities(evidence: WitnessEvidence) -> tuple[CauseVisibility, ...]:
-    """Return how well each cause is determined by the witnesses, undetermined causes last."""
-    counting, family = evidence.counting, witnesses()
-    spoke = {one.witness for one in evidence.observations}
+def cause_visibilities(evidence: ObservedEvidence) -> tuple[CauseVisibility, ...]:
+    """Return how well each cause is determined by the observers, undetermined causes last."""
+    counting, family = evidence.counting, observers()
+    responded = {one.observer for one in evidence.observations}
     sd = np.array([one.sd for one in counting.observations])
     inner = np.diag(sd**2) + counting.shared @ counting.shared.T
-    white = {name: np.linalg.solve(inner, trace) if trace.size else trace for name, trace in counting.traces.items()}
-    power = {name: float(counting.traces[name] @ white[name]) for name in counting.traces}
+    white = {name: np.linalg.solve(inner, one) if one.size else one for name, one in counting.sensitivities.items()}
+    power = {name: float(counting.sensitivities[name] @ white[name]) for name in counting.sensitivities}
     found = []
     for name, cause in evidence.causes.items():
-        seen = counting.seen_by(name)
+        seen = counting.detected_by(name)
         alike = tuple(
             other
             for other in evidence.causes
             if other != name
             and seen
-            and abs(counting.traces[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
+            and abs(counting.sensitivities[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
         )
-        silent = [one for one in family.values() if cause.effect in one.sees and one.name not in spoke]
+        missing = [one for one in family.values() if cause.effect in one.responds_to and one.name not in responded]
         size = power[name] ** -0.5 if seen else float("inf")
-        found.append(CauseVisibility(*name, cause.unit, size, seen, alike, tuple(one.needs for one in silent)))
-    return tuple(sorted(found, key=lambda one: not one.witnesses))
+        found.append(CauseVisibility(*name, cause.unit, size, seen, alike, tuple(one.needs for one in missing)))
+    return tuple(sorted(found, key=lambda one: not one.observers))
 
 
 def collect_evidence(
     session: Session,
     chosen: Chosen[Effect | DiscreteEffect] = None,
     norms: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> WitnessEvidence:
-    """Return the observations of all witnesses in all trials of a session except skipped ones. ``chosen`` restricts the
+) -> ObservedEvidence:
+    """Return the observations of all observers in all trials of a session except skipped ones. ``chosen`` restricts the
     causes; ``norms`` are those of the laboratory (`Tolerances.norms`).
     """
     asked = causes(chosen)
@@ -189,11 +189,11 @@ def collect_evidence(
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     by_trial = [tuple(_apply_norm(o, norms) for o in _correlate_strides(observe(one))) for one in seen]
     found = tuple(one for some in by_trial for one in some)
-    return WitnessEvidence(
+    return ObservedEvidence(
         found,
         known,
         {names: _columns(seen, found, *names, (cause.parameter,))[:, 0] for names, cause in known.items()},
-        _turned(seen, found, norms, single=single) if "axis_error" in asked else {},
+        _reversed(seen, found, norms, single=single) if "axis_error" in asked else {},
         {one.trial.name: one.seconds for one in seen},
         seen,
     )
@@ -212,7 +212,7 @@ def _columns(
     return out
 
 
-def _turned(
+def _reversed(
     recorded: Sequence[SeenTrial],
     found: Sequence[Observation],
     norms: Mapping[str, tuple[float, float]],
@@ -227,13 +227,13 @@ def _turned(
     out: dict[tuple[str, str], Array] = {}
     for seen in recorded:
         here = [i for i, o in enumerate(found) if o.trial == seen.trial.name and o.counts]
-        again = {found[i].witness for i in here if not found[i].sensitivity.linear}
-        for name, (plate, change) in turned_signs(seen, single=single).items() if seen.steps else ():
+        again = {found[i].observer for i in here if not found[i].sensitivity.linear}
+        for name, (plate, change) in sign_reversals(seen, single=single).items() if seen.steps else ():
             value = out.setdefault(name, plain.copy())
             right = observe(changed(seen, plate, change), again) if again else ()
             after = {one.key: _apply_norm(one, norms) for one in right}
             for i in here:
-                if found[i].witness not in again:
+                if found[i].observer not in again:
                     value[i] += found[i].sensitivity.to(plate, change)
                 else:
                     one = after.get(found[i].key)
@@ -241,10 +241,10 @@ def _turned(
     return out
 
 
-def undo_causes(evidence: WitnessEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
+def undo_causes(evidence: ObservedEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
     """Return the change of each observation (n,) when causes of the given ``sizes`` are undone in the recording, NaN
-    where the observation is then missing, and the traces (n, p) in the corrected recording. They differ from the traces
-    of the original one: a step that begins 30 ms earlier covers another part of the step.
+    where the observation is then missing, and the sensitivities (n, p) in the corrected recording. They differ
+    from those of the original one: a step that begins 30 ms earlier covers another part of the step.
     """
     added = np.full(len(evidence.observations), np.nan)
     slopes = np.zeros((added.size, len(sizes)))

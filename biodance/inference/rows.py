@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from biodance.diagnosis.candidates import Candidate, removed, slopes
 from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnosis.problem import Problem
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Effect
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
@@ -36,7 +36,7 @@ class Rows:
         Where the simulated rows come from; None where only observations judge.
     tolerances : Tolerances
         Nominal sizes under which the rows are whitened.
-    evidence : WitnessEvidence or None
+    evidence : ObservedEvidence or None
         Observations that count; None without any.
     X : (r, K) array
         Whitened columns of all that is no fault, per nominal standard deviation.
@@ -55,7 +55,7 @@ class Rows:
 
     problem: Problem | None
     tolerances: Tolerances
-    evidence: WitnessEvidence | None
+    evidence: ObservedEvidence | None
     X: Array
     y: Array
     group: NDArray[np.intp]
@@ -112,7 +112,7 @@ class Rows:
         return out
 
 
-def observed_causes(evidence: WitnessEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
+def observed_causes(evidence: ObservedEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
     """Return the causes that only observations judge, with no simulated rows."""
     kinds = {name: one for name, one in family.items() if isinstance(one, Effect)}
     return tuple(
@@ -123,7 +123,7 @@ def observed_causes(evidence: WitnessEvidence, family: Mapping[str, object]) -> 
 
 
 def rows_of(
-    problem: Problem | None, causes: Sequence[Candidate], tolerances: Tolerances, evidence: WitnessEvidence | None
+    problem: Problem | None, causes: Sequence[Candidate], tolerances: Tolerances, evidence: ObservedEvidence | None
 ) -> Rows:
     """Return the evidence of a session; those of ``causes`` with a learned size are tolerances, too."""
     seen = None if evidence is None or not evidence.counting.observations else evidence.counting
@@ -165,7 +165,7 @@ def _simulated(
 
 
 def _with_observations(
-    X: Array, y: Array, names: list[str], units: _Units, seen: WitnessEvidence
+    X: Array, y: Array, names: list[str], units: _Units, seen: ObservedEvidence
 ) -> tuple[Array, Array, list[str]]:
     """Return columns, target and groups with the observations below: a plate that lies elsewhere within its tolerance
     shows in both. A pressure out of reach of its foot is of another foot, and tells no size.

@@ -44,7 +44,7 @@ _WEIGHED, _UNLIKE = 0.002, 0.25
 goes unlike the centre of mass (slope of force against acceleration: 0.75 to 0.85 of the mass in squats and in running).
 """
 _TRUNKS: "WeakKeyDictionary[Trial, tuple[float, Trunk | None]]" = WeakKeyDictionary()
-"""The trunk of a trial with the mass it was asked for, kept as long as the trial lives: checks and witnesses ask."""
+"""The trunk of a trial with the mass it was asked for, kept as long as the trial lives: checks and observers ask."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -136,7 +136,7 @@ def diagnose_session(
     mended = with_faults_undone(result, mended, causes(effects), reference=reference, tell=tell)
     result = result if mended is None else mended.result
     found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
-    tell("asking the witnesses: feet on plates, clocks, weights")
+    tell("observing feet on plates, clocks, weights")
     evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
     naming = found.examined.naming if found.examined else None
     measured = _measured(naming, found.diagnosis.why) if naming else {}

@@ -19,7 +19,7 @@ from biodance.diagnosis.engine import Examined, without_name
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.naming import cause_key
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.diagnosis.witness_inference import infer_causes
 from biodance.effects import Case
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
@@ -150,7 +150,7 @@ def combined_with_witnesses(
     result: SessionResult,
     one: Diagnosis,
     examined: Examined | None,
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     measured: Mapping[tuple[str, str], SimulatedSize],
 ) -> Diagnosis:
     """Return the diagnosis with what the witnesses name (`combine_findings`), every correction of a plate or a clock

@@ -2,7 +2,7 @@
 the foot of an ordinary step and when the heel strikes.
 
 What steps share (a person's foot, a laboratory's way to put its toe marker) is shared in their covariance: two steps of
-one foot do not halve it. Norms and standard deviations are those of the witnesses.
+one foot do not halve it. Norms and standard deviations are those of the observations.
 """
 
 from collections.abc import Iterable
@@ -19,14 +19,14 @@ from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.over import inside
 from biodance.motion.contact.soles import Soles
+from biodance.observations import ONSET, FootPath
+from biodance.observations.foot_across import ACROSS_PHASES
+from biodance.observations.foot_along import ALONG_PHASES
+from biodance.observations.force_onset import ONSET_AFTER_STRIKE, heel_strike
 from biodance.records import SIDES, Array, Motion, Trial, Wrench, runs
 from biodance.registration.pose import Forces, FramePose
 from biodance.spatial import cross, wrench_about_origin, wrench_about_point
 from biodance.uncertainty.tolerances import Tolerances
-from biodance.witnesses import ONSET, FootPath
-from biodance.witnesses.foot_across import ACROSS_PHASES
-from biodance.witnesses.foot_along import ALONG_PHASES
-from biodance.witnesses.force_onset import ONSET_AFTER_STRIKE, heel_strike
 
 _SHORTEST_STEP, _LONGEST_STEP = 0.3, 1.6
 """s: a walking step."""

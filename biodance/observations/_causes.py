@@ -12,10 +12,10 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import expm
 
+from biodance.observations._recording import SeenTrial
+from biodance.observations._sensitivity import Sensitivity
 from biodance.records import CHANNELS, Array, Plate, Wrench
 from biodance.spatial import skew, wrench_shift
-from biodance.witnesses._recording import SeenTrial
-from biodance.witnesses._sensitivity import Sensitivity
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def _changed(wrench: Wrench, change: Array) -> Wrench:
     return Wrench(wrench.time, value)
 
 
-def turned_signs(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], tuple[str, Array]]:
+def sign_reversals(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], tuple[str, Array]]:
     """Return by effect and target the plate and the change B (6, 7) that turn one channel round, about its centre.
 
     Where that is the vertical force, the reader has turned the whole plate round to make the weight point up: all other

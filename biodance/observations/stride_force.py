@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.motion.newton import fading
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._recording import ONSET
+from biodance.observations._sensitivity import Sensitivity, of_mean
+from biodance.observations._stance import is_recorded, steps, walks
 from biodance.records import Array
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._recording import ONSET
-from biodance.witnesses._sensitivity import Sensitivity, of_mean
-from biodance.witnesses._stance import is_recorded, steps, walks
 
 DECLARED = 0.01
 """Share of the declared mass by which careful declarations are wrong: clothes, shoes, another day."""
@@ -35,13 +35,13 @@ _SHORTEST = 0.15
 """s that one foot alone must be seen."""
 
 
-class StrideForce(Witness):
+class StrideForce(Observer):
     """Mass (kg) by the mean vertical force over a step, over one foot alone, over all strides on a belt, and
     mean horizontal force (N) over a step.
     """
 
     name = "stride_force"
-    sees = ("plate_gain", "body_mass", "clipping")
+    responds_to = ("plate_gain", "body_mass", "clipping")
     needs = "Two steps one after the other on two plates, or one step while the other foot swings; pelvis markers."
     source = "21 whole steps and 40 single supports of 10 persons of 5 public laboratories"
 
@@ -187,4 +187,4 @@ def _both(seen: SeenTrial, first: FootStep, last: FootStep) -> slice | None:
     return slice(begin + before[-1] + 1 if before.size else begin, middle.stop + after[0] if after.size else end)
 
 
-WITNESS = StrideForce
+OBSERVER = StrideForce

@@ -6,9 +6,9 @@ plates, tell plate from foot.
 
 from dataclasses import replace
 
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._landmark import landmark_along
-from biodance.witnesses._stance import step_course
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._landmark import landmark_along
+from biodance.observations._stance import step_course
 
 ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -21,11 +21,11 @@ _MIDDLE = (0.30, 0.60, 0.75, 0.063, 0.11, 0.08)
 edge, which early and late hold the other foot, too (48 steps of 12 persons)."""
 
 
-class FootAlong(Witness):
+class FootAlong(Observer):
     """Centre of pressure ahead of the heel marker along the foot, m, early and late in stance."""
 
     name = "foot_along"
-    sees = ("plate_position", "plate_crosstalk", "axis_error")
+    responds_to = ("plate_position", "plate_crosstalk", "axis_error")
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -58,4 +58,4 @@ class FootAlong(Witness):
         return found
 
 
-WITNESS = FootAlong
+OBSERVER = FootAlong

@@ -6,20 +6,20 @@ is the zero of Mz; horizontal forces, which are small, hardly enter.
 
 import numpy as np
 
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_plate, pressure_gradient
 
 _OWN = 0.4
 """N·m of sway over a second or longer: 0.00 to 0.16 in eleven static trials of three laboratories."""
 
 
-class StandingTwist(Witness):
+class StandingTwist(Observer):
     """Mean moment (N·m) of all plates about the vertical through the mean centre of pressure in quiet standing."""
 
     name = "standing_twist"
-    sees = ("plate_offset",)
+    responds_to = ("plate_offset",)
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still does not turn; 11 static trials of 3 public laboratories"
 
@@ -47,4 +47,4 @@ class StandingTwist(Witness):
         )
 
 
-WITNESS = StandingTwist
+OBSERVER = StandingTwist

@@ -6,10 +6,10 @@ that runs, has no such instant: its largest acceleration is anywhere (40 ms apar
 
 import numpy as np
 
+from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._stance import crossing, steps, walks
 from biodance.records import Array
-from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity
-from biodance.witnesses._stance import crossing, steps, walks
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves; what half as much more on either side shows larger
@@ -18,13 +18,13 @@ _EXPECTED, _STEP, _PERSON = -0.024, 0.010, 0.009
 """s: end less peak, its sd of one step and of one person."""
 
 
-class ForceEnd(Witness):
+class ForceEnd(Observer):
     """End of the vertical force (20 N) less the peak of the toe marker's horizontal acceleration away from where it
     stood, s.
     """
 
     name = "force_end"
-    sees = ("time_delay",)
+    responds_to = ("time_delay",)
     needs = "Walking steps that leave an empty plate and swing off; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -64,4 +64,4 @@ def toe_pulled(foot: FootPath, middle: float, near: float) -> float:
     return float(best) if abs(best - near) < _AROUND else float("nan")
 
 
-WITNESS = ForceEnd
+OBSERVER = ForceEnd

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.observations._feet import FootPath, InFoot, Track
+from biodance.observations._recording import ONSET, FootStep, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate, of_mean, pressure_gradient
 from biodance.records import Array, Wrench
-from biodance.witnesses._feet import FootPath, InFoot, Track
-from biodance.witnesses._recording import ONSET, FootStep, SeenTrial
-from biodance.witnesses._sensitivity import Sensitivity, by_plate, of_mean, pressure_gradient
 
 _SEEN = 0.8
 """Share of a phase in which foot and pressure must be known."""

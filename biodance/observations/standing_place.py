@@ -6,10 +6,10 @@ the back of the pelvis stands for it: from side to side within some millimetres,
 
 import numpy as np
 
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
+from biodance.observations.standing_force import mean_force
 from biodance.records import Array
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_plate, pressure_gradient
-from biodance.witnesses.standing_force import mean_force
 
 _ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
 """m: expected place, sd of one person, sd of one laboratory (shoes, posture asked for, where the pelvis markers sit):
@@ -22,11 +22,11 @@ file says at all (exchanged, for example): of these no shift is told, along one 
 """
 
 
-class StandingPlace(Witness):
+class StandingPlace(Observer):
     """Centre of pressure to the left of the middle of the pelvis, and ahead of it, in quiet standing, m."""
 
     name = "standing_place"
-    sees = ("plate_position", "plate_crosstalk")
+    responds_to = ("plate_position", "plate_crosstalk")
     needs = "Standing still with both feet wholly on the plates; pelvis and foot markers."
     source = (
         "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
@@ -73,4 +73,4 @@ def _facing(seen: SeenTrial) -> Array | None:
     return both / length if length > 0.05 else None
 
 
-WITNESS = StandingPlace
+OBSERVER = StandingPlace

@@ -1,4 +1,4 @@
-"""One trial as witnesses look at it: where each foot was, which steps fell on which plate, which way the person went.
+"""One trial as observers look at it: where each foot was, which steps fell on which plate, which way the person went.
 
 The steps are sorted from the markers, not from the forces: a plate that lies elsewhere than the file says, or whose
 force comes late, must not hide the very steps that show it.
@@ -16,10 +16,10 @@ from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.still import is_still
 from biodance.motion.contact.over import inside
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
+from biodance.observations._feet import FootPath, Track, feet_of, pelvis_path, track
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
-from biodance.witnesses._feet import FootPath, Track, feet_of, pelvis_path, track
 
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -70,7 +70,7 @@ class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
     markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and
     whether somebody stands ``still`` throughout; the ``trunk``, against which the plates weigh and time (None = not
-    seen). ``kept`` holds what several witnesses ask for.
+    seen). ``kept`` holds what several observers ask for.
     """
 
     trial: Trial
@@ -180,7 +180,7 @@ class SeenTrial:
 
 
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
-    """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
+    """Return a trial as observers look at it; as read (forces at their own rate) it says most.
 
     ``mass`` kg as declared, NaN = unknown. Feet and pelvis are found by the trial's marker set, and by the known ones
     where it has none. Without foot markers or plates there are no steps; nothing is raised.

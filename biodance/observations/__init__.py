@@ -1,8 +1,8 @@
 """FAMILY: one piece of evidence per file that needs no model of the body, found automatically.
 
-A witness says where the centre of pressure lies in the foot that stands there, when the force comes, what the plates
+An observer measures where the centre of pressure lies in the foot that stands there, when the force comes, what the plates
 weigh over a step, what they read empty. It needs a static trial, foot markers and plates: no inverse kinematics, no
-segment masses. It is given as ``WITNESS`` by its file, others come by the entry points ``biodance.witnesses``. Its
+segment masses. It is given as ``OBSERVER`` by its file, others come by the entry points ``biodance.observations``. Its
 author says how the value responds to the samples of the plates, to a late clock and to the declared mass
 (`Sensitivity`); what a cause (a plate that lies elsewhere ...) does to the samples is known of every cause
 (`sensitivities`).
@@ -20,12 +20,12 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.discovery import Chosen, Family
+from biodance.observations._causes import Cause, changed, corrected, possible_causes, sensitivities, sign_reversals
+from biodance.observations._feet import FootPath
+from biodance.observations._landmark import LANDMARK, shift_per_sd
+from biodance.observations._recording import ONSET, FootStep, SeenTrial, recording
+from biodance.observations._sensitivity import Sensitivity
 from biodance.records import assign
-from biodance.witnesses._causes import Cause, changed, corrected, possible_causes, sensitivities, turned_signs
-from biodance.witnesses._feet import FootPath
-from biodance.witnesses._landmark import LANDMARK, shift_per_sd
-from biodance.witnesses._recording import ONSET, FootStep, SeenTrial, recording
-from biodance.witnesses._sensitivity import Sensitivity
 
 _TIME = re.compile(r" (at|from) [-\d.]+ s")
 """When a step was, as its name says it."""
@@ -37,26 +37,26 @@ __all__ = [
     "FootPath",
     "FootStep",
     "Observation",
+    "Observer",
     "SeenTrial",
     "Sensitivity",
-    "Witness",
     "changed",
     "corrected",
     "observe",
+    "observers",
     "possible_causes",
     "recording",
     "sensitivities",
     "shift_per_sd",
-    "turned_signs",
-    "witnesses",
+    "sign_reversals",
 ]
 
 
 @dataclass(frozen=True)
 class Observation:
-    """One value that a witness saw.
+    """One value that an observer measures.
 
-    ``witness`` its name; ``what`` of which foot, plate and phase; ``trial``; ``value`` with the standard deviation
+    ``observer`` its name; ``what`` of which foot, plate and phase; ``trial``; ``value`` with the standard deviation
     ``sd`` of this one observation, in ``unit``; ``expected`` of a recording without fault; ``norms`` how uncertain that
     expectation is, each part with a name: observations that share a name err together ("person" parts within one
     person, "laboratory" parts in all persons of one laboratory, others with their plate). ``counts`` False: it is
@@ -64,7 +64,7 @@ class Observation:
     responds to what may be wrong (`sensitivities`).
     """
 
-    witness: str
+    observer: str
     what: str
     trial: str
     value: float
@@ -81,19 +81,19 @@ class Observation:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Witness, trial and what: the same in an altered recording."""
-        return self.witness, self.trial, self.what
+        """Observer, trial and what: the same in an altered recording."""
+        return self.observer, self.trial, self.what
 
     @property
     def kind(self) -> str:
-        """Witness and phase: what a laboratory learns a norm of."""
+        """Observer and phase: what a laboratory learns a norm of."""
         _, comma, phase = self.what.rpartition(", ")
-        return f"{self.witness} {phase}" if comma else self.witness
+        return f"{self.observer} {phase}" if comma else self.observer
 
     @property
     def stride(self) -> str:
-        """Witness, trial and what, but for the time: the same in all strides of one foot on one plate in a trial."""
-        return f"{self.witness}, {self.trial}, {_TIME.sub('', self.what)}"
+        """Observer, trial and what, but for the time: the same in all strides of one foot on one plate in a trial."""
+        return f"{self.observer}, {self.trial}, {_TIME.sub('', self.what)}"
 
     @property
     def contact(self) -> tuple[str, str]:
@@ -114,47 +114,47 @@ class Observation:
         return (self.value - self.expected) / self.expected_sd
 
 
-class Witness(ABC):
-    """One piece of evidence: ``name`` that of its file; ``sees`` the effects that it is for; ``needs`` which movement
-    and markers, in words for the analyst; ``source`` of what it expects.
+class Observer(ABC):
+    """One piece of evidence: ``name`` that of its file; ``responds_to`` the effects that it is for; ``needs`` which
+    movement and markers, in words for the analyst; ``source`` of what it expects.
     """
 
     name: ClassVar[str] = ""
-    sees: ClassVar[tuple[str, ...]] = ()
+    responds_to: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[str] = ""
     source: ClassVar[str] = ""
 
     @abstractmethod
     def observe(self, seen: SeenTrial) -> tuple[Observation, ...]:
-        """Return what it saw in one trial; () where the trial does not hold what it needs."""
+        """Return what it observes in one trial; () where the trial does not hold what it needs."""
 
 
 def lacks(candidate: object) -> tuple[str, ...]:
-    """Return what an object or class lacks to be a witness."""
+    """Return what an object or class lacks to be an observer."""
     kind = candidate if isinstance(candidate, type) else type(candidate)
-    if not issubclass(kind, Witness):
-        return ("the base class Witness",)
-    missing = [name for name in ("name", "sees", "needs", "source") if not getattr(kind, name)]
+    if not issubclass(kind, Observer):
+        return ("the base class Observer",)
+    missing = [name for name in ("name", "responds_to", "needs", "source") if not getattr(kind, name)]
     return (*missing, *(sorted(getattr(kind, "__abstractmethods__", ())) if inspect.isabstract(kind) else ()))
 
 
-FAMILY: Family[Witness | type[Witness]] = Family(
-    "witness", "biodance.witnesses", __name__, "WITNESS", lacks, lambda kind: kind.name
+FAMILY: Family[Observer | type[Observer]] = Family(
+    "observer", "biodance.observations", __name__, "OBSERVER", lacks, lambda kind: kind.name
 )
 
 
-def witnesses(chosen: Chosen[Witness | type[Witness]] = None) -> Mapping[str, Witness]:
-    """Return the witnesses by name: all, or the ``chosen`` ones (names; objects and classes join)."""
+def observers(chosen: Chosen[Observer | type[Observer]] = None) -> Mapping[str, Observer]:
+    """Return the observers by name: all, or the ``chosen`` ones (names; objects and classes join)."""
     found = FAMILY.choose(chosen)
     return MappingProxyType({name: one() if isinstance(one, type) else one for name, one in found.items()})
 
 
-def observe(seen: SeenTrial, chosen: Chosen[Witness | type[Witness]] = None) -> tuple[Observation, ...]:
-    """Return all that the witnesses saw in one trial, finite values only."""
+def observe(seen: SeenTrial, chosen: Chosen[Observer | type[Observer]] = None) -> tuple[Observation, ...]:
+    """Return all observations of one trial, finite values only."""
     known: tuple[Observation, ...] | None = seen.kept.get("observations") if chosen is None else None
     if known is not None:
         return known
-    each = (one for witness in witnesses(chosen).values() for one in witness.observe(seen))
+    each = (one for observer in observers(chosen).values() for one in observer.observe(seen))
     found = tuple(one for one in each if all(map(math.isfinite, (one.value, one.expected, one.sd))))
     if chosen is None:
         seen.kept["observations"] = found

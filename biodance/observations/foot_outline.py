@@ -3,9 +3,9 @@
 import numpy as np
 
 from biodance.motion.contact.over import distance_to_hull
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
 from biodance.records import Array
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_plate, pressure_gradient
 
 _STEADY = (0.1, 0.9)
 """Shares of stance between which the pressure must lie under the foot."""
@@ -15,11 +15,11 @@ _NEAR = 1e-5
 """m: step by which the direction away from a sole is found."""
 
 
-class FootOutline(Witness):
+class FootOutline(Observer):
     """Median distance (m) of the centre of pressure outside the sole that stands there; 0 inside."""
 
     name = "foot_outline"
-    sees = ("plate_position", "axis_error")
+    responds_to = ("plate_position", "axis_error")
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "Pressure cannot act where nothing touches; soles by Winter 2009 and ANSUR II 2012."
 
@@ -60,4 +60,4 @@ def _away(point: Array, sole: Array) -> Array:
     return np.asarray(np.where(distance_to_hull(point, sole)[:, None] > 0, slope, 0.0))
 
 
-WITNESS = FootOutline
+OBSERVER = FootOutline

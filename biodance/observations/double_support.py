@@ -4,20 +4,20 @@ Each plate weighs the same person while one foot stands alone on it: the two mas
 plates' gains, whatever the person weighs.
 """
 
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses.stride_force import StrideForce
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations.stride_force import StrideForce
 
 _OWN = 0.02
 """Share of the mass: sd of one difference."""
 
 
-class DoubleSupport(Witness):
+class DoubleSupport(Observer):
     """Mass (kg) by one plate less that by the next one, each under one foot alone, in two steps with double support
     between.
     """
 
     name = "double_support"
-    sees = ("plate_gain",)
+    responds_to = ("plate_gain",)
     needs = "Two steps one after the other on two plates; pelvis markers."
     source = "20 pairs of steps of 9 persons of public laboratories"
 
@@ -42,4 +42,4 @@ class DoubleSupport(Witness):
         return tuple(found)
 
 
-WITNESS = DoubleSupport
+OBSERVER = DoubleSupport

@@ -6,10 +6,10 @@ swing: only the peaks near the ground count, and of these the one that is highes
 
 import numpy as np
 
+from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._stance import crossing, steps
 from biodance.records import Array
-from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity
-from biodance.witnesses._stance import crossing, steps
 
 _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
@@ -20,11 +20,11 @@ ONSET_AFTER_STRIKE = (-0.002, 0.005, 0.007)
 forces come up to 20 ms early; medians of thirteen laboratories, of which one, 40 ms early, is left out)."""
 
 
-class ForceOnset(Witness):
+class ForceOnset(Observer):
     """Onset of the vertical force (20 N) less the peak of the heel marker's upward acceleration, s."""
 
     name = "force_onset"
-    sees = ("time_delay",)
+    responds_to = ("time_delay",)
     needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -80,4 +80,4 @@ def _vertex(time: Array, value: Array, i: int) -> float:
     return float(time[i] + (0.5 * (before - after) / bend if bend < 0 else 0.0) * (time[i + 1] - time[i]))
 
 
-WITNESS = ForceOnset
+OBSERVER = ForceOnset

@@ -1,18 +1,18 @@
 """Left against right: the pressure's path in one foot mirrors the other's, wherever the laboratory puts its markers."""
 
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._stance import step_course
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._stance import step_course
 
 _MIDDLE = (0.1, 0.6)
 _OWN = 0.009
 """m: right less left foot of one visit."""
 
 
-class Sides(Witness):
+class Sides(Observer):
     """Centre of pressure outwards in the right foot less that in the left one, m, in each pair of steps."""
 
     name = "sides"
-    sees = ("plate_position",)
+    responds_to = ("plate_position",)
     needs = "A step of each foot, each alone on a plate; heel and toe markers."
     source = "6.7 mm between visits of adults, 18 pairs of steps of 9 persons of public laboratories"
 
@@ -35,4 +35,4 @@ class Sides(Witness):
         return tuple(found)
 
 
-WITNESS = Sides
+OBSERVER = Sides

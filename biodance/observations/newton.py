@@ -9,10 +9,10 @@ import math
 import numpy as np
 
 from biodance.motion.newton import LagAndMass, slopes_of
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.observations.stride_force import DECLARED, StrideForce
 from biodance.records import Array
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity
-from biodance.witnesses.stride_force import DECLARED, StrideForce
 
 _LABORATORY = 0.006
 """s: sd of one laboratory (and movement) of the lag of clean recordings: the means of 13 public laboratories have an sd
@@ -25,11 +25,11 @@ _PERSON = 0.005
 walking)."""
 
 
-class Newton(Witness):
+class Newton(Observer):
     """Lag (s) of the total vertical force behind the trunk, and the mass (kg) that it weighs."""
 
     name = "newton"
-    sees = ("time_delay", "body_mass", "plate_gain", "plate_offset")
+    responds_to = ("time_delay", "body_mass", "plate_gain", "plate_offset")
     needs = "Movement up and down with both feet on the plates (walking, squats); markers of pelvis or trunk, and feet."
     source = "Newton's second law; 13 public laboratories"
 
@@ -74,4 +74,4 @@ def _slopes(seen: SeenTrial, told: LagAndMass) -> tuple[dict[str, Array], dict[s
     return lags, masses
 
 
-WITNESS = Newton
+OBSERVER = Newton

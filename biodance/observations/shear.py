@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate
+from biodance.observations._stance import StepCourse, step_course
 from biodance.records import Array
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, by_plate
-from biodance.witnesses._stance import StepCourse, step_course
 
 _PARTS = {
     "braking": (0.08, 0.35, 0, -0.177, 0.022, 0.030),
@@ -29,13 +29,13 @@ _FRAMES = 8
 """Frames of a stance that show how the pelvis goes."""
 
 
-class Shear(Witness):
+class Shear(Observer):
     """Mean shear as a share of the mean vertical force: braking, pushing, inwards; and the slant (rad) of the line on
     which it goes from braking to pushing, to the left of the way.
     """
 
     name = "shear"
-    sees = ("plate_rotation", "axis_error")
+    responds_to = ("plate_rotation", "axis_error")
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
     source = "65 steps of 20 persons of 12 public laboratories; Winter 2009, chapter 5"
 
@@ -136,4 +136,4 @@ def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> Way | None:
     return Way(np.stack([ahead, left], axis=1), np.sum(left * late, axis=1) / goes, 2 * bend[:2], 2 * bend[2:])
 
 
-WITNESS = Shear
+OBSERVER = Shear

@@ -6,11 +6,11 @@ told all the same, because a trial in which the plate is never empty keeps it.
 
 import numpy as np
 
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._causes import was_zeroed
+from biodance.observations._recording import ONSET
+from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import CHANNELS, Plate
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._causes import was_zeroed
-from biodance.witnesses._recording import ONSET
-from biodance.witnesses._sensitivity import Sensitivity, of_mean
 
 _SETTLES = 0.15
 """s after the step in which a plate still rings."""
@@ -20,11 +20,11 @@ _OWN = 0.3
 """N: how exactly the level of an empty plate is known: noise, and neighbours that tremble."""
 
 
-class EmptyPlate(Witness):
+class EmptyPlate(Observer):
     """Force (N) that the empty plate read and that was taken off, and its change from before to after the steps."""
 
     name = "empty_plate"
-    sees = ("plate_offset", "plate_drift")
+    responds_to = ("plate_offset", "plate_drift")
     needs = "A trial that begins or ends with nobody on the plate."
     source = "An empty plate reads zero; 35 empty plates of 8 public laboratories were zeroed to 0-6 N (horizontal)."
 
@@ -64,4 +64,4 @@ class EmptyPlate(Witness):
         ]  # fmt: skip
 
 
-WITNESS = EmptyPlate
+OBSERVER = EmptyPlate

@@ -7,9 +7,9 @@ tell it from where the laboratory puts its toe marker. A turned plate shows as a
 from collections.abc import Mapping
 from dataclasses import replace
 
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._landmark import landmark_across
-from biodance.witnesses._stance import step_course
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._landmark import landmark_across
+from biodance.observations._stance import step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -24,11 +24,11 @@ doi:10.1016/j.gaitpost.2007.08.013); no public running was there to learn from, 
 """
 
 
-class FootAcross(Witness):
+class FootAcross(Observer):
     """Centre of pressure outwards of the line from the heel marker to the front of the foot, m, by phase of stance."""
 
     name = "foot_across"
-    sees = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
+    responds_to = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
     needs = "A step with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -66,4 +66,4 @@ class FootAcross(Witness):
         return found
 
 
-WITNESS = FootAcross
+OBSERVER = FootAcross

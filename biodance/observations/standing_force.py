@@ -3,11 +3,11 @@
 import numpy as np
 
 from biodance.body.tables.error_sizes import error_size
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._recording import ONSET
+from biodance.observations._sensitivity import Sensitivity, of_mean
+from biodance.observations.stride_force import DECLARED
 from biodance.records import Array, Plate
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._recording import ONSET
-from biodance.witnesses._sensitivity import Sensitivity, of_mean
-from biodance.witnesses.stride_force import DECLARED
 
 _ON_PLATES = (0.75, 1.35)
 """Share of the declared mass between which somebody stands on the plates with both feet and in the right unit."""
@@ -17,13 +17,13 @@ _SHORTEST = 0.4
 """s of standing."""
 
 
-class StandingForce(Witness):
+class StandingForce(Observer):
     """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N), in which no zero can
     be told from a plate that is not level.
     """
 
     name = "standing_force"
-    sees = ("body_mass", "plate_gain", "plate_offset")
+    responds_to = ("body_mass", "plate_gain", "plate_offset")
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 
@@ -78,4 +78,4 @@ def mean_force(force: Array) -> Array:
     return np.asarray(mean if np.isfinite(mean).all() else np.nanmean(force, axis=0))
 
 
-WITNESS = StandingForce
+OBSERVER = StandingForce

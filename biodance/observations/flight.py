@@ -4,9 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from biodance.observations import FootPath, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import Array, runs
-from biodance.witnesses import FootPath, Observation, SeenTrial, Witness
-from biodance.witnesses._sensitivity import Sensitivity, of_mean
 
 _HIGH = 0.06
 """m above their lowest place in the trial that both markers of a foot in flight are."""
@@ -18,11 +18,11 @@ _OWN = {"Fx": 1.5, "Fy": 1.5, "Fz": 4.0}
 """N: how exactly zero a plate reads so soon after a load."""
 
 
-class Flight(Witness):
+class Flight(Observer):
     """Mean force (N) of every plate while both feet are in the air."""
 
     name = "flight"
-    sees = ("plate_offset", "plate_drift")
+    responds_to = ("plate_offset", "plate_drift")
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 
@@ -65,4 +65,4 @@ def _height(foot: FootPath) -> Array:
     return np.nan_to_num(np.minimum(*each), nan=-np.inf)
 
 
-WITNESS = Flight
+OBSERVER = Flight

@@ -8,10 +8,10 @@ import pytest
 from altered_recordings import altered, differences
 from walking import FOOT, MASS, session, standing, walk
 
-from biodance.diagnosis.witness_evidence import WitnessEvidence, collect_evidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence, collect_evidence
 from biodance.lab.session.read import read_session
+from biodance.observations import SeenTrial, observe, recording, sensitivities
 from biodance.records import CHANNELS, Array, Session
-from biodance.witnesses import SeenTrial, observe, recording, sensitivities
 
 PAIRS = [f"{a}->{b}" for a in CHANNELS for b in CHANNELS if a != b]
 PLATE = [
@@ -40,7 +40,7 @@ def both(recorded: Seen, effect: str, target: str, parameter: str, step: float) 
         before = observe(seen)
         told = sensitivities(seen, before, effect, target, parameter)
         made = differences(seen, before, effect, target, step)
-        out += [(a / o.sd, b / o.sd, o.witness) for a, b, o in zip(told, made, before, strict=True)]
+        out += [(a / o.sd, b / o.sd, o.observer) for a, b, o in zip(told, made, before, strict=True)]
     told, made, who = zip(*out, strict=True)
     return np.array(told), np.array(made), list(who)
 
@@ -134,7 +134,7 @@ def test_columns_are_of_every_effect_and_parameter() -> None:
     evidence = collect_evidence(session(standing(), walk()))
     two = evidence.columns("plate_position", "plate1:y", ("shift", "nothing"))
     assert two.shape == (len(evidence.observations), 2)
-    np.testing.assert_array_equal(two[:, 0], evidence.traces["plate_position", "plate1:y"])
+    np.testing.assert_array_equal(two[:, 0], evidence.sensitivities["plate_position", "plate1:y"])
     assert not two[:, 1].any()
     assert evidence.columns("plate_gain", "plate1:Mx", ("gain",)).any()
     assert not evidence.columns("joint_centre", "hip", ("x", "y", "z")).any()
@@ -148,7 +148,7 @@ def test_columns_are_of_every_effect_and_parameter() -> None:
 
 def test_the_sign_of_a_channel_is_turned_in_all_that_counts(real: Session) -> None:
     evidence = collect_evidence(real)
-    for (effect, target), value in evidence.turned.items():
+    for (effect, target), value in evidence.sign_reversed.items():
         name, _, channel = target.rpartition(":")
         made = turned(evidence, name, channel)
         counts = np.array([one.counts for one in evidence.observations])
@@ -157,7 +157,7 @@ def test_the_sign_of_a_channel_is_turned_in_all_that_counts(real: Session) -> No
         np.testing.assert_allclose(value[counts], made[counts], atol=1e-9)
 
 
-def turned(evidence: WitnessEvidence, name: str, channel: str) -> Array:
+def turned(evidence: ObservedEvidence, name: str, channel: str) -> Array:
     """Return value minus expectation after a channel is multiplied by -1; of Fz all others are."""
     channels = [one for one in CHANNELS if (one == channel) is not (channel == "Fz")]
     out = np.array([one.value - one.expected for one in evidence.observations])
