@@ -10,7 +10,7 @@ from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_inference import WitnessFindings
-from biodance.observations import Cause, Observation
+from biodance.observations import ObservableCause, Observation
 
 NECK = {Reason.UNDESCRIBED_JOINTS: ("neck",)}
 
@@ -48,7 +48,7 @@ def heard(names: tuple[str, str], witness: str, value: float, sd: float) -> witn
     """Return one observation that shows a cause of size ``value``, and its look-alike `OTHER` one to one."""
     step, unit = (0.004, "s") if names[0] == "time_delay" else (0.005, "m")
     there = Observation(witness, "somewhere", "static", value, sd, 0.0, unit)
-    causes = {one: Cause(*one, "size", unit, step) for one in (names, OTHER)}
+    causes = {one: ObservableCause(*one, "size", unit, step) for one in (names, OTHER)}
     return witness_evidence.ObservedEvidence((there,), causes, dict.fromkeys(causes, np.ones(1)))
 
 

@@ -20,7 +20,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import changes_wrench, size_dependences
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effects
-from biodance.observations import Cause, Observation
+from biodance.observations import ObservableCause, Observation
 from biodance.pipeline.reason_words import reason_notes
 
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
@@ -156,7 +156,7 @@ def weighed(value: float, sd: float, varies_with: str = "") -> Finding:
 
 def observed(witness: str) -> witness_evidence.ObservedEvidence:
     one = Observation(witness, "mass", "stand", 66.0, 0.5, 70.0, "kg")
-    step = Cause(*MASS, "error", "kg", 0.5)
+    step = ObservableCause(*MASS, "error", "kg", 0.5)
     return witness_evidence.ObservedEvidence((one,), {MASS: step}, {MASS: np.array([1.0])})
 
 

@@ -27,7 +27,7 @@ def test_clean_walks_and_standing_name_nothing() -> None:
     rows = {(row.effect, row.target): row for row in cause_visibilities(evidence)}
     assert rows["plate_position", "plate1:y"].sd < 0.005
     assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
-    assert rows["plate_gain", "plate2:Fx"].witnesses == ()
+    assert rows["plate_gain", "plate2:Fx"].observers == ()
 
 
 @pytest.mark.parametrize(("heavier", "a_load"), [(0.05, True), (-0.05, False)])

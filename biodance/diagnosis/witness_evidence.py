@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.observations import (
-    Cause,
+    ObservableCause,
     Observation,
     SeenTrial,
-    changed,
     corrected,
     observe,
     observers,
@@ -23,6 +22,7 @@ from biodance.observations import (
     recording,
     sensitivities,
     sign_reversals,
+    with_changed_plate,
 )
 from biodance.records import Array, Session
 
@@ -55,7 +55,7 @@ class ObservedEvidence:
     """
 
     observations: tuple[Observation, ...]
-    causes: Mapping[tuple[str, str], Cause]
+    causes: Mapping[tuple[str, str], ObservableCause]
     sensitivities: Mapping[tuple[str, str], Array]
     sign_reversed: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -230,7 +230,7 @@ def _reversed(
         again = {found[i].observer for i in here if not found[i].sensitivity.linear}
         for name, (plate, change) in sign_reversals(seen, single=single).items() if seen.steps else ():
             value = out.setdefault(name, plain.copy())
-            right = observe(changed(seen, plate, change), again) if again else ()
+            right = observe(with_changed_plate(seen, plate, change), again) if again else ()
             after = {one.key: _apply_norm(one, norms) for one in right}
             for i in here:
                 if found[i].observer not in again:

@@ -1,9 +1,9 @@
 """FAMILY: one piece of evidence per file that needs no model of the body, found automatically.
 
-An observer measures where the centre of pressure lies in the foot that stands there, when the force comes, what the plates
-weigh over a step, what they read empty. It needs a static trial, foot markers and plates: no inverse kinematics, no
-segment masses. It is given as ``OBSERVER`` by its file, others come by the entry points ``biodance.observations``. Its
-author says how the value responds to the samples of the plates, to a late clock and to the declared mass
+An observer measures where the centre of pressure lies in the foot that stands there, when the force comes, what the
+plates weigh over a step, what they read empty. It needs a static trial, foot markers and plates: no inverse kinematics,
+no segment masses. It is given as ``OBSERVER`` by its file, others come by the entry points ``biodance.observations``.
+Its author says how the value responds to the samples of the plates, to a late clock and to the declared mass
 (`Sensitivity`); what a cause (a plate that lies elsewhere ...) does to the samples is known of every cause
 (`sensitivities`).
 """
@@ -20,7 +20,14 @@ from typing import ClassVar
 import numpy as np
 
 from biodance.discovery import Chosen, Family
-from biodance.observations._causes import Cause, changed, corrected, possible_causes, sensitivities, sign_reversals
+from biodance.observations._causes import (
+    ObservableCause,
+    corrected,
+    possible_causes,
+    sensitivities,
+    sign_reversals,
+    with_changed_plate,
+)
 from biodance.observations._feet import FootPath
 from biodance.observations._landmark import LANDMARK, shift_per_sd
 from biodance.observations._recording import ONSET, FootStep, SeenTrial, recording
@@ -33,14 +40,13 @@ _TIME = re.compile(r" (at|from) [-\d.]+ s")
 __all__ = [
     "LANDMARK",
     "ONSET",
-    "Cause",
     "FootPath",
     "FootStep",
+    "ObservableCause",
     "Observation",
     "Observer",
     "SeenTrial",
     "Sensitivity",
-    "changed",
     "corrected",
     "observe",
     "observers",
@@ -49,6 +55,7 @@ __all__ = [
     "sensitivities",
     "shift_per_sd",
     "sign_reversals",
+    "with_changed_plate",
 ]
 
 

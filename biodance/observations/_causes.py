@@ -19,7 +19,7 @@ from biodance.spatial import skew, wrench_shift
 
 
 @dataclass(frozen=True)
-class Cause:
+class ObservableCause:
     """A fault with one size: ``effect``, ``target`` and ``parameter`` as in the family of effects, the parameter's
     ``unit``, and a small size ``step``.
     """
@@ -41,20 +41,25 @@ class _Observed(Protocol):
     def sensitivity(self) -> Sensitivity: ...
 
 
-def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[Cause, ...]:
+def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[ObservableCause, ...]:
     """Return the causes that are looked for in a recording with these plates; ``single`` whether targets are named
     without the plate, because the session has no other (by default: this recording has none).
     """
     single = len(seen.trial.plates) == 1 if single is None else single
-    found = [Cause("time_delay", "", "delay", "s", 0.004), Cause("body_mass", "", "error", "kg", 0.5)]
+    found = [
+        ObservableCause("time_delay", "", "delay", "s", 0.004),
+        ObservableCause("body_mass", "", "error", "kg", 0.5),
+    ]
     for plate in seen.trial.plates:
         prefix = "" if single else f"{plate.name}:"
-        found += [Cause("plate_position", f"{plate.name}:{axis}", "shift", "m", 0.004) for axis in "xy"]
-        found.append(Cause("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02))
-        found += [Cause("plate_offset", f"{prefix}{name}", "offset", "N", 2.0) for name in CHANNELS[:3]]
-        found += [Cause("plate_offset", f"{prefix}{name}", "offset", "N·m", 0.5) for name in CHANNELS[3:]]
-        found += [Cause("plate_gain", f"{prefix}{name}", "gain", "1", 0.02) for name in CHANNELS[:3]]
-        found += [Cause("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004) for name in ("Mx", "My")]
+        found += [ObservableCause("plate_position", f"{plate.name}:{axis}", "shift", "m", 0.004) for axis in "xy"]
+        found.append(ObservableCause("plate_rotation", f"{plate.name}:z", "angle", "rad", 0.02))
+        found += [ObservableCause("plate_offset", f"{prefix}{name}", "offset", "N", 2.0) for name in CHANNELS[:3]]
+        found += [ObservableCause("plate_offset", f"{prefix}{name}", "offset", "N·m", 0.5) for name in CHANNELS[3:]]
+        found += [ObservableCause("plate_gain", f"{prefix}{name}", "gain", "1", 0.02) for name in CHANNELS[:3]]
+        found += [
+            ObservableCause("plate_crosstalk", f"{prefix}Fz->{name}", "ratio", "m", 0.004) for name in ("Mx", "My")
+        ]
     return tuple(found)
 
 
@@ -183,7 +188,7 @@ def sign_reversals(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str],
     return MappingProxyType(found)
 
 
-def changed(seen: SeenTrial, name: str, change: Array) -> SeenTrial:
+def with_changed_plate(seen: SeenTrial, name: str, change: Array) -> SeenTrial:
     """Return the recording with a plate's wrench changed by B (6, 7) about the lab origin."""
     plates = [
         replace(plate, wrench=_changed(plate.wrench, change)) if plate.name == name else plate

@@ -49,7 +49,7 @@ class Track:
         return out
 
 
-def track(time: Array, path: Array) -> Track:
+def track_of(time: Array, path: Array) -> Track:
     """Return the track of a path (T, n) m, NaN where it was not seen."""
     seen = np.isfinite(path).all(axis=1)
     return Track(time[seen], np.ascontiguousarray(path[seen].T))
@@ -86,12 +86,12 @@ class FootPath:
     @cached_property
     def tracks(self) -> tuple[Track, Track]:
         """Heel marker and front where they were seen."""
-        return track(self.time, self.heel), track(self.time, self.front)
+        return track_of(self.time, self.heel), track_of(self.time, self.front)
 
     @cached_property
     def toe_track(self) -> Track:
         """Toe marker where it was seen."""
-        return track(self.time, self.toe)
+        return track_of(self.time, self.toe)
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return heel and front (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
@@ -140,7 +140,7 @@ class FootPath:
 
     @cached_property
     def _velocity(self) -> Track:
-        return track(self.time, self.velocity)
+        return track_of(self.time, self.velocity)
 
     def velocity_at(self, time: Array) -> Array:
         """Return the velocity (n, 3) m/s of the middle between the two markers at other times (n,) s."""

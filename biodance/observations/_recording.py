@@ -16,7 +16,7 @@ from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.still import is_still
 from biodance.motion.contact.over import inside
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
-from biodance.observations._feet import FootPath, Track, feet_of, pelvis_path, track
+from biodance.observations._feet import FootPath, Track, feet_of, pelvis_path, track_of
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
@@ -176,7 +176,7 @@ class SeenTrial:
         """The pelvis where it was seen."""
         if self.pelvis is None or self.trial.markers is None:
             return Track(np.empty(0), np.empty((3, 0)))
-        return track(self.trial.markers.time, self.pelvis)
+        return track_of(self.trial.markers.time, self.pelvis)
 
 
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:

@@ -54,7 +54,9 @@ class Shear(Observer):
         parts = [self._part(seen, step, course, path, what) for what in _PARTS]
         return [*parts, self._slant(seen, step, course, path)]
 
-    def _part(self, seen: SeenTrial, step: FootStep, course: StepCourse, path: "Way", what: str) -> Observation:
+    def _part(
+        self, seen: SeenTrial, step: FootStep, course: StepCourse, path: "PelvisCourse", what: str
+    ) -> Observation:
         """Return the mean shear in a part of the stance, beyond what accelerates the pelvis in its middle."""
         start, stop, axis, expected, sd, person = _PARTS[what]
         inwards, turns = (-1 if axis and step.side == "right" else 1), (-1 if axis else 1) * path.turns
@@ -72,7 +74,7 @@ class Shear(Observer):
         responds = Sensitivity(by_plate(gradient, course.plates), delay=float(delay))
         return self._observation(seen, step, what, value - float(gained[axis]), (expected, sd, person), responds)
 
-    def _slant(self, seen: SeenTrial, step: FootStep, course: StepCourse, path: "Way") -> Observation:
+    def _slant(self, seen: SeenTrial, step: FootStep, course: StepCourse, path: "PelvisCourse") -> Observation:
         """Return how the shear to the left follows the one ahead, beside what follows the vertical force."""
         ahead, left = path.along(course.force)
         X = np.stack([ahead, course.force[:, 2]], axis=1)
@@ -101,7 +103,7 @@ class Shear(Observer):
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class PelvisCourse:
     """How the pelvis goes over the ground or belt in a stance: ``axes`` (n, 2, 2) unit vectors ahead and to the left,
     which turn to the left by ``turns`` (n,) rad/s; ``bending`` (2,) m/s² its even acceleration; ``bending_late`` (2,)
     m/s³: how that changes where the stance is late.
@@ -117,7 +119,7 @@ class Way:
         return np.asarray(np.einsum("nij,nj->in", self.axes, force[:, :2]))
 
 
-def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> Way | None:
+def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> PelvisCourse | None:
     """Return how the pelvis goes during a stance; None where it is not seen or hardly goes."""
     path, middle = seen.pelvis_track, float(np.mean(course.time[[0, -1]]))
     here = (path.time >= course.time[0]) & (path.time <= course.time[-1])
@@ -133,7 +135,7 @@ def way(seen: SeenTrial, step: FootStep, course: StepCourse) -> Way | None:
         return None
     ahead = velocity / goes[:, None]
     left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-    return Way(np.stack([ahead, left], axis=1), np.sum(left * late, axis=1) / goes, 2 * bend[:2], 2 * bend[2:])
+    return PelvisCourse(np.stack([ahead, left], axis=1), np.sum(left * late, axis=1) / goes, 2 * bend[:2], 2 * bend[2:])
 
 
 OBSERVER = Shear
