@@ -25,11 +25,11 @@ from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.plates.parameters import count_plates
 from biodance.lab.session.read import read_session
+from biodance.observations import SeenTrial, observe, recording
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Session
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
-from biodance.observations import SeenTrial, observe, recording
 
 CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
 SESSIONS = (*CHILDREN, "adl_gait", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "pycgm",

@@ -106,9 +106,9 @@ class Rows:
         if one is None:
             return np.zeros((0, len(names)))
         out, key = np.zeros((len(one.observations), len(names))), (effect.name, effect.target)
-        if key in one.traces and one.causes[key].parameter in names:
+        if key in one.sensitivities and one.causes[key].parameter in names:
             own = np.array([o.sd for o in one.observations])
-            out[:, names.index(one.causes[key].parameter)] = one.in_reach * one.traces[key] / own
+            out[:, names.index(one.causes[key].parameter)] = one.in_reach * one.sensitivities[key] / own
         return out
 
 
@@ -173,8 +173,8 @@ def _with_observations(
     own = np.array([one.sd for one in seen.observations])
     below = np.zeros((len(own), X.shape[1]))
     for name, (at, unit) in units.items():
-        if name in seen.traces:
-            below[:, at] = np.outer(seen.traces[name] / own, unit[0])
+        if name in seen.sensitivities:
+            below[:, at] = np.outer(seen.sensitivities[name] / own, unit[0])
     shared = seen.shared / own[:, None]
     top = np.concatenate([X, np.zeros((len(X), shared.shape[1]))], axis=1)
     bottom = np.concatenate([below, shared], axis=1) * seen.in_reach[:, None]
