@@ -11,8 +11,6 @@ from biodance.effects import Case, QualityCheck, Recorded
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Plate, Session, Source, Subject, Trial, Wrench
 
-SECTIONS = ("Signature:", "Look-alikes:", "Separated by")
-
 
 def example(plates: int = 1) -> Case:
     """Return a smooth trial of a random tree on one or two plates."""

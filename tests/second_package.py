@@ -20,10 +20,7 @@ tiny = tiny_lab.tiny_export
 """
 LIMIT_POINT = "[biodance.limits]\nlow_hands = tiny_lab.low_hands:LowHands\n"
 CABLE = '''
-"""A cable pulls sideways.
-
-Signature: a sine in Fy. TrialWindow-alikes: none. Separated by looking at the ceiling.
-"""
+"""A cable pulls sideways."""
 import numpy as np
 from biodance.effects import Case, Effect, Parameter
 

@@ -219,3 +219,83 @@ def test_the_checks_see_what_is_wrong(tiny: dict[str, ast.Module]) -> None:
     assert floors(graph, "package") == 3  # a, b and the folder room, in a circle
     assert floors({"h.a": {"h.b.x"}, "h.b.x": {"h.b.y"}, "h.b.y": set(), "h.c": {"h.a"}}, "h") == 3
     assert bodies(ast.parse('def f():\n    """Doc."""\n    a = 1\n    return a\n')) == [("f", 2)]
+
+
+NAMED_ELSEWHERE = {
+    "biodance.lab.plates.faults": "the six faults whose formulas corrections and tolerances need below `effects`",
+    "biodance.lab.plates.read": "the reader's two defects, by the names of the causes that tell them (`Defect.effect`)",
+    "biodance.body.human.prior": "joint_centre, a row of the table of error sizes",
+    "biodance.body.human.static_centres": "joint_centre, a row of the table of error sizes",
+    "biodance.body.tables.choice": "trunk_joint, the body's optional joint",
+    "biodance.body.tables.segment_data": "body_mass, a key of the tables of segments",
+    "biodance.uncertainty.caution": "joint_centre, a row of the table of error sizes",
+    "biodance.uncertainty.sources": "joint_centre, a row of the table of error sizes",
+    "biodance.uncertainty.tolerances": "joint_centre, a row of the table of error sizes",
+    "biodance.report.documents.identification": "added_mass, a key of the documents that programs read",
+    "biodance.report.documents.session": "added_mass, a key of the documents that programs read",
+}
+"""Modules that write a word that is an effect's name, too, and why: below `effects`, or another thing of that name."""
+APART = ("biodance.effects", "biodance.virtual_lab")
+"""Rooms that name effects: their own, and the one that makes faults without their formulas."""
+
+
+SEEN = "biodance.observations."
+"""Each witness says in its own file which effects it is for, as ``Member.name``: a fact of the witness."""
+
+
+def effect_names() -> set[str]:
+    return {path.stem for path in (PACKAGE / "effects").glob("*.py") if path.stem != "__init__"}
+
+
+def naming_effects(trees: Mapping[str, ast.Module], names: set[str]) -> set[str]:
+    """Modules with a string that is the name of an effect, docstrings not counted."""
+    return {
+        module
+        for module, tree in trees.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and node.value in names
+    }
+
+
+def keyed_by_effects(trees: Mapping[str, ast.Module], names: set[str], members: set[str]) -> list[str]:
+    """Tables whose keys or items are two effects or more, by their names or as ``Member.name``."""
+
+    def is_effect(node: ast.expr | None) -> bool:
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            return node.attr == "name" and node.value.id in members
+        if isinstance(node, ast.Tuple):
+            return bool(node.elts) and is_effect(node.elts[0])
+        return isinstance(node, ast.Constant) and node.value in names
+
+    found = []
+    for module, tree in trees.items():
+        for node in ast.walk(tree):
+            items = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
+            if sum(map(is_effect, items)) > 1:
+                found.append(f"{module}:{node.lineno}")
+    return found
+
+
+def outside(trees: Mapping[str, ast.Module]) -> dict[str, ast.Module]:
+    return {module: tree for module, tree in trees.items() if not module.startswith(APART)}
+
+
+def test_what_is_known_of_an_effect_stands_in_its_own_file() -> None:
+    """A table by effect is a second place that knows of them, and an effect from outside is in none of them."""
+    assert naming_effects(outside(modules()), effect_names()) == set(NAMED_ELSEWHERE)
+    members = {"".join(map(str.capitalize, name.split("_"))) for name in effect_names()}
+    assert [one for one in keyed_by_effects(outside(modules()), effect_names(), members) if SEEN not in one] == []
+
+
+def test_a_table_by_effect_is_seen() -> None:
+    tables = (
+        "A = {'tilt': 1, 'hum': 2}",
+        "A = ('tilt', 'hum')",
+        "A = {Tilt.name, Hum.name}",
+        "A = {('tilt', 'm'): 1, ('hum', 's'): 2}",
+    )
+    one = ("A = {'tilt': 1}", "A = ('tilt', 'place')")
+    for text in (*tables, *one):
+        trees = {"package.a": ast.parse(text)}
+        assert keyed_by_effects(trees, {"tilt", "hum"}, {"Tilt", "Hum"}) == (["package.a:1"] if text in tables else [])
+    assert naming_effects({"package.a": ast.parse(one[0])}, {"tilt"}) == {"package.a"}

@@ -5,13 +5,15 @@ folder.
 import importlib
 import re
 import sys
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
 import pytest
-from effect_cases import CASES, SECTIONS
+from effect_cases import CASES
 
 import biodance.effects as family
+from biodance.effects import CheckKind
 
 PAGE = Path(__file__).parent.parent / "CONTRIBUTING.md"
 
@@ -36,8 +38,9 @@ def test_one_file_is_enough(example: str) -> None:
     added = found.transform(case, found.typical).residual - case.residual
     np.testing.assert_allclose(added, columns[:, :, 0] * found.typical[0], atol=1e-9)
     assert np.abs(added[:, 2]).max() > 1.0
-    for section in SECTIONS:
-        assert section in (sys.modules[f"biodance.effects.{example}"].__doc__ or "")
+    assert all(astuple(found.about))
+    assert found.parameters[0].least_at("") < found.parameters[0].usual_at("") < found.typical[0]
+    assert CheckKind.FORCES in found.explains
 
 
 def test_without_its_file_it_is_gone() -> None:

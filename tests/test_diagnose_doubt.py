@@ -9,12 +9,12 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.diagnosis import engine
 from biodance.diagnosis.adequacy import LIMIT, largest_z
-from biodance.diagnosis.consequence import LEAST_THAT_MATTERS
 from biodance.diagnosis.doubt import may_not_matter
 from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.model import NamedCause
 from biodance.diagnosis.reasons import Reason
 from biodance.effects import effects
+from biodance.effects.time_delay import TimeDelay
 from biodance.uncertainty.tolerances import shipped
 
 family = effects()
@@ -64,7 +64,7 @@ def test_what_is_left_without_a_resembled_cause_is_what_alarms() -> None:
 
 def test_a_resembled_cause_alone_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """0.7 ms, where 0.3 would matter and somebody would feel them."""
-    monkeypatch.setitem(LEAST_THAT_MATTERS, "time_delay", {"s": 0.0003})
+    monkeypatch.setattr(TimeDelay, "parameters", (replace(TimeDelay.parameters[0], least=0.0003),))
     monkeypatch.setattr(engine, "changes_wrench", lambda found, cause: True)
     assert delayed(0.0007, error=0.05).verdict == "named, complete"
     like = delayed(0.0007, error=1.5)

@@ -104,7 +104,7 @@ def test_lower_filter_takes_the_fourth_power_and_reports_its_cut_off() -> None:
     found = effect("filter_mismatch").at("", CASE)
     truth = 6.0
     theta = np.array([(truth**-4 - REFERENCE**-4) / (4 / REFERENCE**5)])
-    name, value, sd, unit = found.reported(theta, 0.1 * theta)[0]
+    name, value, sd, unit = found.reported(CASE, theta, 0.1 * theta)[0]
     assert (name, unit) == ("cutoff", "Hz")
     assert value == pytest.approx(truth)
     assert sd == pytest.approx(0.25 * truth * 0.1 * (1 - (truth / REFERENCE) ** 4), rel=1e-6)

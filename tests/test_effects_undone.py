@@ -66,9 +66,9 @@ def test_added_is_what_transform_adds(name: str) -> None:
 
 def test_a_load_sloshes_at_the_frequency_that_is_reported() -> None:
     found = replace(effect("sloshing_load"), target="trunk_head")
-    rows = found.reported(np.array([2.0, 1.0, 0.5, 0.0]), np.array([0.1, 0.1, 0.05, 0.02]))
-    assert rows[2] == ("frequency", _FREQUENCY + 0.5, 0.05, "Hz")
     case = human_case(300)
+    rows = found.reported(case, np.array([2.0, 1.0, 0.5, 0.0]), np.array([0.1, 0.1, 0.05, 0.02]))
+    assert rows[2] == ("frequency", _FREQUENCY + 0.5, 0.05, "Hz")
     slow, quick = (found.added(case, np.array([0.0, 1.0, step, 0.0])) for step in (-0.4, 0.4))
     assert np.linalg.norm(slow - quick) > 0.1 * np.linalg.norm(slow)
 

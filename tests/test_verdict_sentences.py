@@ -10,14 +10,14 @@ from example_results import FOUND, VERDICTS, full_session
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.repairs import by_checks
-from biodance.effects import QualityCheck, effects
+from biodance.effects import QualityCheck
 from biodance.pipeline.attention import (
     identified_attention,
     is_well,
     reconcile_with_checks,
     session_attention,
 )
-from biodance.pipeline.finding_words import EXPLAINS, in_words
+from biodance.pipeline.finding_words import in_words
 from biodance.pipeline.headline import headline
 from biodance.pipeline.trial_result import Check, Step
 from biodance.pipeline.weighing import NOT_WEIGHED
@@ -127,10 +127,6 @@ def test_a_check_points_to_the_cause_that_was_found() -> None:
     assert named.level == "note"
     assert "Plate gain Fz" in named.text
     assert "Weigh again." not in named.text
-    family = {name for causes in EXPLAINS.values() for name in causes}
-    from biodance.effects import discrete_effects
-
-    assert family <= {*effects(), *discrete_effects()}
 
 
 def test_sentences_come_strongest_first_and_once() -> None:

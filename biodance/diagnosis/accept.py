@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.model import NamedCause
-from biodance.effects import Case
+from biodance.effects import Case, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
 from biodance.identification.validation import BLOCK_SECONDS
@@ -34,7 +34,8 @@ def accept(case: Case, named: tuple[NamedCause, ...]) -> Case:
 
 def _without_course(case: Case, one: NamedCause) -> Case:
     """Return ``case`` without a cause that came and went; as it is where nobody knows its course in this trial."""
-    columns, course = one.effect.local(case), one.course.get(case.trial.name)
+    columns = one.effect.local(case) if isinstance(one.effect, Transient) else None
+    course = one.course.get(case.trial.name)
     if columns is None or course is None:
         return case
     count = min(columns.shape[2], course.size)

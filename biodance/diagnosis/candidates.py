@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
-from biodance.effects import Case, Effect, effects
+from biodance.effects import Case, Effect, Transient, effects
 from biodance.records import Array
 
 SCALE = 3.0
@@ -124,7 +124,7 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
     return [*first.T, *second[:, bent].T]
 
 
-def local_basis(problem: Problem, effect: Effect) -> ByTrial | None:
+def local_basis(problem: Problem, effect: Transient) -> ByTrial | None:
     """Return the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
     blocks = []
     for index, case in enumerate(problem.cases):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.diagnosis.delay_contradicted import is_contradicted, without_contradicted
-from biodance.diagnosis.diagnosis import HABITS, Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
 from biodance.diagnosis.witness_evidence import ObservedEvidence
@@ -21,6 +21,7 @@ from biodance.diagnosis.witness_fit import is_beyond_usual
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
 from biodance.diagnosis.witness_landmark import with_habits
 from biodance.effects import Effect, causes
+from biodance.effects.labels_swapped import LabelsSwapped
 
 _FAR = 3.0
 """Standard deviations between two sizes of one cause that contradict each other."""
@@ -32,8 +33,6 @@ _STANDING = {*_WEIGHING, "standing_place"}
 """Witnesses of a mean wrench, of which a movement on the same plates has one, too."""
 _NOT_MOVED = "Feet, clocks and weights alone look like a {}; the movement, which would show it, shows none."
 """What is said of a cause that witnesses suggest in a session in whose movement nothing is wrong."""
-_RAW = ("clipping", "axis_error", "unit_error", "frame_rate")
-"""Causes that a check finds in the raw channels: what witnesses measure in such recordings has no size."""
 _ANYWAY = {"standing_twist"}
 """Witnesses to whom other channels hardly matter: heard beside a wrong one."""
 
@@ -60,11 +59,11 @@ def combine_findings(
     available; ``measured``: by effect and target what it tells of every cause where nothing was named (empty: it
     looked for none, or is not believed). What is a habit of the laboratory is told beside it and changes no verdict.
     """
-    habits = tuple(finding for finding in by_witnesses.findings if finding.effect in HABITS)
+    habits = tuple(finding for finding in by_witnesses.findings if finding.cause.habit)
     faults = replace(by_witnesses, findings=tuple(f for f in by_witnesses.findings if f not in habits))
     one = replace(one, witnesses=evidence if evidence.observations else None)
     found = _with_faults(one, faults, evidence, judged, measured)
-    return found if any(one.effect in _RAW for one in found.findings) else with_habits(found, habits)
+    return found if any(one.cause.raw for one in found.findings) else with_habits(found, habits)
 
 
 def _with_faults(
@@ -76,9 +75,9 @@ def _with_faults(
 ) -> Diagnosis:
     """Return the diagnosis with what the witnesses find wrong, see `combine_findings`."""
     by_witnesses = without_contradicted(by_witnesses, evidence)
-    if any(finding.effect in _RAW for finding in one.findings):
+    if any(finding.cause.raw for finding in one.findings):
         known = {_names(finding) for finding in one.findings}
-        told = (f for f in by_witnesses.findings if f.effect in _RAW or _is_shown_by(f, evidence, _ANYWAY))
+        told = (f for f in by_witnesses.findings if f.cause.raw or _is_shown_by(f, evidence, _ANYWAY))
         return replace(one, findings=(*one.findings, *(f for f in told if _names(f) not in known)))
     if not by_witnesses.findings:
         return _without_excluded(one, evidence)
@@ -143,7 +142,7 @@ def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: ObservedEv
         return True
     if same and Reason.SEVERAL_CROSSTALKS in one.why and _is_believed_alone(finding):
         return True
-    labels = one.findings and all(other.effect == "labels_swapped" for other in one.findings)
+    labels = one.findings and all(other.effect == LabelsSwapped.name for other in one.findings)
     if not finding.parameters or one.verdict == "nothing wrong" or labels:
         return False
     times = _size_over_limit(finding, one)

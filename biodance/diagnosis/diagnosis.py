@@ -14,6 +14,7 @@ from biodance import display
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, DiagnosisStatus, Reason, status_of
+from biodance.effects import known_cause
 from biodance.identification.knowledge import SIGMAS
 from biodance.records.attention import Attention, Judged
 
@@ -22,23 +23,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from biodance.diagnosis.witness_evidence import ObservedEvidence
-    from biodance.effects import QualityCheck
+    from biodance.effects import Cause, Checked, QualityCheck
 
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
-HABITS = ("toe_landmark",)
-"""Effects that are no fault of an instrument: told as findings, and nothing is wrong with them alone."""
 ABOUT = "diagnosis"
 """What the one of a diagnosis's sentences is about that says the verdict."""
 
 
 @dataclass(frozen=True)
 class Alias:
-    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` (natural) against "nothing wrong"."""
+    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` (natural) against "nothing wrong";
+    ``kind`` as in `Finding`.
+    """
 
     effect: str
     target: str
     log_bayes_factor: float
+    kind: "Cause | None" = field(default=None, compare=False, repr=False)
+
+    @property
+    def cause(self) -> "Cause | Checked":
+        """All that is known of the effect."""
+        return self.kind or known_cause(self.effect)
 
 
 @dataclass(frozen=True)
@@ -88,6 +95,10 @@ class Finding:
         Of one that is only resembled: what its size varies with ("" for none), though a true cause has one size.
     trials : tuple of str
         The trials in which it is; () for all.
+    probability : float
+        That it, or another cause of its set, is there.
+    kind : Cause or None
+        The effect itself where it is known (`of_family`); None: by its name, if it is of biodance or an entry point.
 
     Examples
     --------
@@ -105,6 +116,13 @@ class Finding:
     changes: tuple[str, ...] = ()
     varies_with: str = ""
     trials: tuple[str, ...] = ()
+    probability: float = 1.0
+    kind: "Cause | None" = None
+
+    @property
+    def cause(self) -> "Cause | Checked":
+        """All that is known of the effect."""
+        return self.kind or known_cause(self.effect)
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{one.name} {one.value:.3g} ± {one.sd:.2g} {one.unit}" for one in self.parameters)
@@ -169,6 +187,8 @@ class Diagnosis:
         Why it says no more (only standing, an unusual body), each with what it concerns.
     witnesses : ObservedEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
+    probability : float
+        Of what the verdict says; NaN where nothing could be judged.
 
     Examples
     --------
@@ -190,6 +210,7 @@ class Diagnosis:
     judged: tuple[Judged, ...] = ()
     why: Mapping[Reason, tuple[str, ...]] = field(default_factory=dict)
     witnesses: "ObservedEvidence | None" = None
+    probability: float = float("nan")
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"
@@ -215,7 +236,7 @@ class Diagnosis:
     @property
     def faults(self) -> tuple[Finding, ...]:
         """The findings without what is only a habit of the laboratory."""
-        return tuple(one for one in self.findings if one.effect not in HABITS)
+        return tuple(one for one in self.findings if not one.cause.habit)
 
     @property
     def told(self) -> str:

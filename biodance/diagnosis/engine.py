@@ -21,7 +21,7 @@ from biodance.diagnosis.adequacy import (
     verdict,
     with_strides_once,
 )
-from biodance.diagnosis.consequence import matters, unit_at
+from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.doubt import doubt_reasons, only_resembled
 from biodance.diagnosis.model import Model, NamedCause
@@ -34,7 +34,7 @@ from biodance.diagnosis.size_dependence import changes_wrench, significant_depen
 from biodance.diagnosis.transient_contact import with_transient_contact
 from biodance.diagnosis.unusual_body import robust_causes
 from biodance.discovery import Chosen
-from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck
+from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck, unit_at
 from biodance.effects import effects as family
 from biodance.records import Sip
 from biodance.threads import one_thread
@@ -250,7 +250,8 @@ def _finding(one: NamedCause, found: Round, known: Tolerances, case: Case) -> Fi
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(one.theta[units == unit]) for unit in units])
     sd = np.hypot(np.maximum(np.sqrt(np.diag(one.covariance)), alike), known.model_error(one.effect.name) * length)
-    reported = one.effect.reported(one.theta + one.effect.origin(case), sd)
-    parameters = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
-    advice = f"{one.effect.advice} {in_plate_axes(one.effect.target, case.trial.plates)}".strip()
-    return Finding(one.effect.name, one.effect.target, parameters, found.set, found.suspects[0].visible, advice=advice)
+    reported = one.effect.reported(case, one.theta, sd)
+    place = one.effect.target
+    parameters = tuple(Estimate(name, size, own, unit_at(unit, place)) for name, size, own, unit in reported)
+    advice = f"{one.effect.advice} {in_plate_axes(place, case.trial.plates)}".strip()
+    return Finding(one.effect.name, place, parameters, found.set, found.suspects[0].visible, advice=advice)

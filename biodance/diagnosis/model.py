@@ -39,7 +39,7 @@ this share.
 class NamedCause:
     """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the force while it
     acts, and per trial the
-    ``course`` of its parameters, as in `Effect.local`.
+    ``course`` of its parameters, as in `Transient.local`.
     """
 
     effect: Effect

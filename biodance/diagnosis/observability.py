@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, bases_of, changes
-from biodance.diagnosis.consequence import least, unit_at
+from biodance.diagnosis.consequence import least
 from biodance.diagnosis.diagnosis import Unobservable
 from biodance.diagnosis.evidence import smallest_detectable
 from biodance.diagnosis.model import Model
+from biodance.effects import unit_at
+from biodance.effects.joint_centre import JointCentre
 from biodance.motion.ik.functional_joints import fixed_point
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.records import Array
@@ -154,7 +156,7 @@ def after_calibration(seen: Visibility, body: Body) -> Visibility:
     at = {
         one.effect.target: cut
         for one, cut in zip(seen.causes, seen.cuts, strict=True)
-        if one.names[0] == "joint_centre"
+        if one.names[0] == JointCentre.name
     }
     picks = np.concatenate(
         [np.arange(at[joint].start, at[joint].stop) for joint in left if joint in at] or [np.zeros(0, dtype=int)]
@@ -188,7 +190,7 @@ def detection_limits(seen: Visibility, body: Body, threshold: float) -> tuple[Un
         first = one.effect.parameters[one.silent.index(False)]
         limit = max(limit, least(one.effect).get(first.name, 0.0), here.felt(i))
         sizes = [one.effect.reported_size(size) for size in (limit, max(limit, here.told(i)), first.typical)]
-        rows.append(Unobservable(*one.names, sizes[0], unit_at(one.effect, first.unit), *sizes[1:]))
+        rows.append(Unobservable(*one.names, sizes[0], unit_at(first.unit, one.effect.target), *sizes[1:]))
     return tuple(rows)
 
 

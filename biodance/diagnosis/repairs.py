@@ -16,22 +16,13 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DOUBTS
 from biodance.discovery import Chosen
 from biodance.effects import Case, DiscreteEffect, Effect, QualityCheck, effects
+from biodance.effects.joint_centre import JointCentre
+from biodance.effects.labels_swapped import LabelsSwapped
+from biodance.effects.marker_misplaced import MarkerMisplaced
 from biodance.motion.ik.joint_unknowns import centre_sd
 from biodance.motion.kinematics import chains
 from biodance.uncertainty.tolerances import Tolerances, key_of
 
-_ALIKE = {
-    "hip": (("segment_length", "thigh"), ("joint_centre", "knee")),
-    "knee": (("segment_length", "thigh"), ("segment_length", "shank"), ("joint_centre", "hip")),
-    "ankle": (("segment_length", "shank"), ("joint_centre", "knee")),
-    "shoulder": (("segment_length", "upper_arm"), ("joint_centre", "elbow")),
-    "elbow": (("segment_length", "upper_arm"), ("joint_centre", "shoulder")),
-}  # fmt: skip
-"""What else looks like a joint that lies elsewhere."""
-_PLACED_BY = {"knee": "KNE", "ankle": "ANK", "shoulder": "SHO", "elbow": "ELB"}
-"""The marker by which the static trial places a joint: wrong there and in all trials, it is that joint elsewhere."""
-
-_EXCHANGED = "labels_swapped"
 _EXPLAINS = 0.5
 """Share of the way that a joint seemed to have gone by which a marker beside it must have moved, to explain it."""
 
@@ -43,7 +34,7 @@ def with_repairs(
     ``known`` and limited to ``chosen`` effects; as it is where more is wrong that nobody can name, or where markers
     carry each other's names: that body was placed by wrong ones.
     """
-    exchanged, family = any(one.effect == _EXCHANGED for one in diagnosis.findings), effects(chosen)
+    exchanged, family = any(one.effect == LabelsSwapped.name for one in diagnosis.findings), effects(chosen)
     carried = frozenset(
         joint for one in diagnosis.findings if one.effect in family for joint in family[one.effect].carries
     )
@@ -69,10 +60,10 @@ def repairs(
     for error in cases[0].body.joint_errors:
         if error.joint in carried:
             continue
-        if error.spared and "marker_misplaced" in family:
-            yield from _marker(family["marker_misplaced"], error, cases, known)
-        elif error.contradicted and "joint_centre" in family:
-            found = _joint(family["joint_centre"], error, cases[0].body.markers.names)
+        if error.spared and MarkerMisplaced.name in family:
+            yield from _marker(family[MarkerMisplaced.name], error, cases, known)
+        elif error.contradicted and JointCentre.name in family:
+            found = _joint(family[JointCentre.name], error, cases[0].body.markers.names)
             if any(one.known for one in found.parameters):
                 yield found
 
@@ -112,10 +103,7 @@ def _joint(effect: Effect, error: JointError, markers: tuple[str, ...]) -> Findi
     far, shown = (error.reach, error.reach_sd) if error.reach else (error.moved, error.centre)
     sd = float(np.hypot(centre_sd(error.joint), shown))
     found = _named(replace(effect, target=error.joint), [("shift", far)], sd)
-    side, _, joint = error.joint.partition("_")
-    alike = [Alias(kind, f"{side}_{name}", float("inf")) for kind, name in _ALIKE.get(joint, ())]
-    own = f"{side[:1].upper()}{_PLACED_BY.get(joint, '')}"
-    alike += [Alias("marker_misplaced", name, float("inf")) for name in markers if name == own]
+    alike = (Alias(*names, float("inf")) for names in JointCentre.looks_like(error.joint, markers))
     return replace(found, set=(*found.set, *alike))
 
 
@@ -126,27 +114,23 @@ def _named(effect: Effect, sizes: list[tuple[str, float]], sd: float) -> Finding
     return Finding(effect.name, effect.target, parameters, (cause,), 1.0, advice=effect.advice)
 
 
-def by_checks(
-    checks: tuple[QualityCheck, ...], left: Diagnosis | None = None, *, suspicious: bool = False
-) -> Diagnosis:
-    """Return the diagnosis of a session in which a check failed: what it found, and nothing built on unmended
-    recordings: of what the statistics ``left``, with something ``suspicious`` or not, no findings are taken.
+def with_failed(failed: tuple[QualityCheck, ...], left: Diagnosis) -> Diagnosis:
+    """Return the diagnosis of a session in which checks ``failed``: what they found, and nothing that the simulation of
+    unmended recordings would say; what feet, clocks and weights show stays.
     """
-    findings = tuple(failed_check(quality) for quality in checks if not quality.ok)
     note = (
         "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
         "recordings that are wrong."
     )
-    clean = left is not None and left.verdict == "named, complete" and not suspicious
-    return Diagnosis(
-        verdict="named, complete" if clean else "named, incomplete",
-        findings=findings,
-        checks=checks,
-        adequacy=left.adequacy if left else (),
-        unobservable=left.unobservable if left else (),
-        limits=left.limits if left else (),
-        notes=(note, *(left.notes if left else ())),
-        why={reason: about for reason, about in left.why.items() if reason not in DOUBTS} if left else {},
+    known = {(one.effect, one.target) for one in map(failed_check, failed)}
+    rest = tuple(one for one in left.findings if (one.effect, one.target) not in known)
+    return replace(
+        left,
+        verdict="named, complete" if left.verdict in ("nothing wrong", "named, complete") else "named, incomplete",
+        findings=(*map(failed_check, failed), *rest),
+        notes=(note, *left.notes),
+        why={reason: about for reason, about in left.why.items() if reason not in DOUBTS},
+        probability=1.0,
     )
 
 

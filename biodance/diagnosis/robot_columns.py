@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.effects import unit_of
 from biodance.identification.robot import RobotMotion
 from biodance.identification.robot_errors import (
     GIVE,
@@ -19,11 +20,12 @@ from biodance.identification.robot_errors import (
     slow_wrench,
 )
 from biodance.identification.statistics import layout_for, standing_point
+from biodance.lab.plates.faults import DELAY, OFFSET
 from biodance.motion.grounded import ground_again
-from biodance.records import CHANNELS, Array, Wrench
+from biodance.records import Array, Wrench
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.noise import Noise
-from biodance.uncertainty.plates import Plates, plate_errors, plate_sources
+from biodance.uncertainty.plates import SOURCES, Plates, plate_errors, plate_sources, source_sizes
 
 _WIDE = 10.0
 """Standard deviation of a cause that is there, over the usual error of its kind."""
@@ -122,26 +124,12 @@ def _both(names: list[str], some: tuple[int, ...]) -> str:
 
 def _plate_causes() -> list[RobotCause]:
     """Return the causes of `plate_sources`, in its order."""
-    plates = plate_sources()
-    rows, columns = np.divmod(np.arange(36), 6)
     out = []
-    for k, (r, c) in enumerate(zip(rows, columns, strict=True)):
-        per, where = float(plates.mixing[k, r, c]), CHANNELS[c] if r == c else f"{CHANNELS[c]} to {CHANNELS[r]}"
-        out.append(RobotCause("plate_gain" if r == c else "plate_crosstalk", where, per, ""))
-    out += [
-        RobotCause("plate_rotation", axis, float(np.abs(plates.mixing[36 + i]).max()), "rad")
-        for i, axis in enumerate("xyz")
-    ]
-    out += [
-        RobotCause("plate_position", axis, float(np.abs(plates.mixing[39 + i]).max()), "m")
-        for i, axis in enumerate("xyz")
-    ]
-    units = ("N",) * 3 + ("N·m",) * 3
-    out += [
-        RobotCause("plate_offset", channel, float(plates.offset[42 + i, i]), unit)
-        for i, (channel, unit) in enumerate(zip(CHANNELS, units, strict=True))
-    ]
-    return [*out, RobotCause("time_delay", "plate", float(plates.delay[48]), "s")]
+    for (fault, place), size in zip(SOURCES, source_sizes(), strict=True):
+        where = "plate" if fault is DELAY else place.replace("->", " to ")
+        unit = unit_of(place) if fault is OFFSET else fault.unit.replace("1", "")
+        out.append(RobotCause(fault.name, where, float(size), unit))
+    return out
 
 
 def motion_changes(body: Body, one: RobotMotion, causes: tuple[RobotCause, ...]) -> Array:

@@ -22,7 +22,7 @@ from biodance.diagnosis.model import Model, NamedCause
 from biodance.diagnosis.naming import Naming, Round, is_significant, required_evidence
 from biodance.diagnosis.screening import ScoredCandidate
 from biodance.discovery import Chosen
-from biodance.effects import Effect, effects
+from biodance.effects import Effect, Transient, effects
 from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)
@@ -47,7 +47,7 @@ class _TransientContact:
     ``log_bayes_factor`` at the best ``size``, and the ``length`` of the columns (`Model.length`).
     """
 
-    effect: Effect
+    effect: Transient
     white: ByTrial
     score: Array
     information: Array
@@ -90,7 +90,8 @@ def with_transient_contact(naming: Naming, chosen: Chosen[Effect] = None) -> Nam
 
 def _log_bayes_factor_of_contact(base: Model, naming: Naming) -> float:
     """Return the log Bayes factor of the contact named last, against the model ``base`` without it."""
-    sized = _best_size(base, naming.accepted[-1].suspects[0].effect)
+    contact = naming.accepted[-1].suspects[0].effect
+    sized = _best_size(base, contact) if isinstance(contact, Transient) else None
     return sized.log_bayes_factor if sized else -np.inf
 
 
@@ -100,7 +101,8 @@ def _with(
     """Return the naming of ``base`` with the most probable transient contact; None if its evidence is below the
     threshold or below the log Bayes factor ``than`` of the causes it replaces.
     """
-    kinds = [one for effect in effects(chosen).values() for one in effect.at_all_targets(base.problem.cases[0])]
+    every = (one for effect in effects(chosen).values() for one in effect.at_all_targets(base.problem.cases[0]))
+    kinds = [one for one in every if isinstance(one, Transient)]
     best, suspects = _screened(base, kinds)
     if best is None:
         return None
@@ -123,7 +125,7 @@ def _with(
     return Naming(naming.first, model, (*accepted, Round(suspects)), naming.screening, naming.first_causes, naming.bare)
 
 
-def _screened(base: Model, kinds: Sequence[Effect]) -> tuple[_TransientContact | None, tuple[ScoredCandidate, ...]]:
+def _screened(base: Model, kinds: Sequence[Transient]) -> tuple[_TransientContact | None, tuple[ScoredCandidate, ...]]:
     """Return the most probable transient contact (None if there is none), and the evidence of all of them, most
     probable first; columns are kept only for the best.
     """
@@ -174,7 +176,7 @@ def one_sided(course: Array) -> bool:
     return bool(min(sides) <= OTHER_SIDE * sum(sides))
 
 
-def _best_size(base: Model, effect: Effect) -> _TransientContact | None:
+def _best_size(base: Model, effect: Transient) -> _TransientContact | None:
     """Return a transient contact with its most probable size; None for effects that are not transient."""
     columns = local_basis(base.problem, effect)
     if columns is None:
@@ -192,7 +194,7 @@ def _log_bayes_factor(s: Array, G: Array, size: float) -> float:
     return float(0.5 * along @ along - np.sum(np.log(np.diag(factor))))
 
 
-def _placed(base: Model, one: _TransientContact) -> tuple[Effect, ByTrial]:
+def _placed(base: Model, one: _TransientContact) -> tuple[Transient, ByTrial]:
     """Return the contact at the point of its segment that explains most, with its whitened unit columns, by
     Gauss-Newton steps of the point and the time course together. An error of a hand's length changes the moment by
     several newton metres.
@@ -201,13 +203,11 @@ def _placed(base: Model, one: _TransientContact) -> tuple[Effect, ByTrial]:
     for _ in range(_STEPS):
         wide = white.scaled(SIZES[-1])
         slopes = _slopes(base, effect, place, SIZES[-1] * _posterior_mean(base, wide, np.zeros(wide.width)))
-        if slopes is None:
-            break
         here = np.append(np.zeros(wide.width), place / _BESIDE)
         place = _BESIDE * _posterior_mean(base, wide.beside(_BESIDE * slopes), here)[-3:]
         there = effect.at_full_rate().beside(place)
-        columns = None if there is None else local_basis(base.problem, there)
-        if there is not None and columns is not None:
+        columns = local_basis(base.problem, there)
+        if columns is not None:
             effect, white = there, base.white_by_trial(columns)
     return effect, white
 
@@ -220,16 +220,15 @@ def _posterior_mean(base: Model, Z: ByTrial, there: Array) -> Array:
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 
-def _slopes(base: Model, effect: Effect, place: Array, course: Array) -> Array | None:
+def _slopes(base: Model, effect: Transient, place: Array, course: Array) -> Array:
     """Return the whitened derivatives (r, 3) of a contact of ``course`` (k,) with respect to its ``place``, per metre
-    and axis (the wrench is linear in it); None for a cause without a point of action.
+    and axis (the wrench is linear in it).
     """
-    spots = [effect.beside(place + step) for step in np.eye(4, 3, -1)]
-    here, *there = (_touch(base, spot, course) for spot in spots if spot is not None)
-    return base.white(np.stack([one - here for one in there], axis=1)) if there else None
+    here, *there = (_touch(base, effect.beside(place + step), course) for step in np.eye(4, 3, -1))
+    return base.white(np.stack([one - here for one in there], axis=1))
 
 
-def _touch(base: Model, effect: Effect, course: Array) -> Array:
+def _touch(base: Model, effect: Transient, course: Array) -> Array:
     """Return (r,): the rows of a contact with time course ``course`` (k,), split by trial."""
     samples, put = [], base.problem
     for case in put.cases:
@@ -240,7 +239,7 @@ def _touch(base: Model, effect: Effect, course: Array) -> Array:
     return put.padded(put.spectrum.rows(tuple(samples))[:, :, 0])
 
 
-def _named(base: Model, effect: Effect, course: Array, sized: _TransientContact, steps: Array) -> NamedCause:
+def _named(base: Model, effect: Transient, course: Array, sized: _TransientContact, steps: Array) -> NamedCause:
     """Return the cause with its ``course`` (k,) cut by trials; as its size, the force while it acts: half of the
     squares of its ``steps`` (n, p), as ``sized`` sees them, belong to larger ones (the largest of hundreds of values
     would be mostly noise).

@@ -12,6 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.effects.labels_swapped import LabelsSwapped
+from biodance.effects.marker_misplaced import MarkerMisplaced
+from biodance.effects.plate_offset import PlateOffset
 from biodance.identification.recursive import RecursivePosterior
 from biodance.records import CHANNELS, Array, Plate
 from biodance.spatial import wrench_about_point
@@ -76,9 +79,9 @@ def said_of_markers(time: float, worst: Sequence[str], pair: tuple[str, str, flo
     if pair and pair[2] < _SWAPPED:
         one, other = sorted(pair[:2])
         text = f"{one} and {other} carry each other's label: look at the labelling of the live model."
-        return LiveWarning(time, "labels_swapped", f"{one}/{other}", text)
+        return LiveWarning(time, LabelsSwapped.name, f"{one}/{other}", text)
     text = f"{worst[0]} is away from where the body has it: is it still on the skin, and rightly labelled?"
-    return LiveWarning(time, "marker_misplaced", worst[0], text)
+    return LiveWarning(time, MarkerMisplaced.name, worst[0], text)
 
 
 def _slow_variance(values: Array) -> Array:
@@ -150,7 +153,7 @@ def said_of_jump(time: float, plates: Sequence[Plate], about: Array, jump: Array
         f"{plate.name}: {CHANNELS[channel]} jumped by {jump[channel]:+.0f} {unit} and stays. Did the person pick "
         f"something up, or touch something? If not, zero the plate while nobody stands on it."
     )
-    return LiveWarning(time, "plate_offset", f"{plate.name}:{CHANNELS[channel]}", text)
+    return LiveWarning(time, PlateOffset.name, f"{plate.name}:{CHANNELS[channel]}", text)
 
 
 def silent_plates(time: float, plates: Sequence[Plate], under: Array, weight: float) -> tuple[LiveWarning, ...]:
@@ -179,4 +182,4 @@ def loaded_while_empty(time: float, plate: Plate, value: Array) -> LiveWarning |
     if not np.abs(mean[channel]) > EMPTY_LOAD:
         return None
     text = f"{plate.name} reads {mean[channel]:+.0f} N in {CHANNELS[channel]} while nobody is on it: zero it."
-    return LiveWarning(time, "plate_offset", f"{plate.name}:{CHANNELS[channel]}", text)
+    return LiveWarning(time, PlateOffset.name, f"{plate.name}:{CHANNELS[channel]}", text)

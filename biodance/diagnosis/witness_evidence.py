@@ -1,7 +1,7 @@
 """Observations of a session that need no model of the body, and what every cause adds to each of them."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
+from biodance.effects.axis_error import AxisError
 from biodance.observations import (
     ObservableCause,
     Observation,
@@ -72,6 +73,16 @@ class ObservedEvidence:
             {name: value[kept] for name, value in self.sign_reversed.items()},
             self.seconds,
             self.recorded,
+        )
+
+    def only(self, names: Collection[str]) -> "ObservedEvidence":
+        """Return the evidence of some observations alone, by the names of their observers."""
+        kept = np.array([one.observer in names for one in self.observations], dtype=bool)
+        return replace(
+            self,
+            observations=tuple(one for one in self.observations if one.observer in names),
+            sensitivities={name: column[kept] for name, column in self.sensitivities.items()},
+            sign_reversed={},
         )
 
     def columns(self, effect: str, target: str, parameters: Sequence[str]) -> Array:
@@ -193,7 +204,7 @@ def collect_evidence(
         found,
         known,
         {names: _columns(seen, found, *names, (cause.parameter,))[:, 0] for names, cause in known.items()},
-        _reversed(seen, found, norms, single=single) if "axis_error" in asked else {},
+        _reversed(seen, found, norms, single=single) if AxisError.name in asked else {},
         {one.trial.name: one.seconds for one in seen},
         seen,
     )

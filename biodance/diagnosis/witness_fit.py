@@ -14,14 +14,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from biodance.diagnosis.candidates import SCALE
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import Effect, causes
-from biodance.effects.plate_offset import USUAL_ZERO, VERTICAL_ZERO
+from biodance.effects import Effect, causes, effect
 from biodance.records import Array
 
 THRESHOLD = 2.0
 """Natural logarithm of the evidence with its prior odds (`prior_odds`) from which a cause is named."""
-_RARER = {"plate_crosstalk": 1.0}
-"""Natural logarithm: so much rarer than other faults is cross-talk that looks like a plate beside its place."""
 _MISSTEP = 3.0
 """Natural logarithm of twenty: one contact in twenty is odd, so that a cause that one contact alone tells needs as much
 more evidence."""
@@ -29,26 +26,6 @@ _TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
 _STEPS = 30
 _SURE = 2.0
-_USUAL = {
-    ("plate_position", "m"): 0.006,
-    ("plate_rotation", "rad"): 0.03,
-    ("plate_gain", "1"): 0.02,
-    ("plate_offset", "N"): USUAL_ZERO,
-    ("plate_offset", "N·m"): 2.0,
-    ("plate_crosstalk", "m"): 0.006,
-    ("time_delay", "s"): 0.008,
-    ("body_mass", "kg"): 0.7,
-}
-"""Sizes up to which laboratories have a cause without calling it a fault: plates 2 to 5 mm off (Collins 2009), zeros of
-public recordings to 6 N, clocks within a frame, clothes and shoes."""
-ALIKE = {
-    "plate_position": 0.005,
-    "plate_crosstalk": 0.005,
-    "plate_rotation": 0.01,
-    "plate_gain": 0.004,
-    "time_delay": 0.002,
-}
-"""Standard deviation of what careful laboratories have (same units): no size is surer against "as the file says"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +99,7 @@ def prior_odds(evidence: ObservedEvidence) -> dict[tuple[str, str], float]:
     count = Counter(names[0] for names in evidence.causes if evidence.detected_by(names))
     return {
         names: -float(np.log(max(1, count[names[0]])))
-        - _RARER.get(names[0], 0.0)
+        - effect(names[0]).rarer
         - (_MISSTEP if evidence.contacts(names) == 1 else 0.0)
         for names in evidence.causes
     }
@@ -144,8 +121,13 @@ def is_beyond_usual(evidence: ObservedEvidence, names: tuple[str, str], size: fl
     have it without a fault.
     """
     cause = evidence.causes[names]
-    usual = _USUAL.get((cause.effect, cause.unit), 0.0)
-    if cause.effect == "plate_offset" and cause.target.endswith("Fz"):
-        usual = VERTICAL_ZERO
-    whole = float(np.hypot(sd, ALIKE.get(cause.effect, 0.0)))
+    usual = effect(cause.effect).parameters[0].usual_at(cause.target)
+    whole = no_surer(sd, cause.effect)
     return abs(size) > usual + whole and abs(size) > _SURE * whole
+
+
+def no_surer(sd: float, name: str) -> float:
+    """Return the standard deviation of a size against "as the file says": none is surer than careful laboratories are
+    alike (`Parameter.alike`).
+    """
+    return float(np.hypot(sd, effect(name).parameters[0].alike))

@@ -16,13 +16,13 @@ from biodance.diagnosis.candidates import TOGETHER
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.diagnosis.witness_evidence import ObservedEvidence, undo_causes
 from biodance.diagnosis.witness_fit import (
-    ALIKE,
     THRESHOLD,
     LaplaceFit,
     explain,
     fit_known,
     is_beyond_usual,
     is_told,
+    no_surer,
     prior_odds,
     typical_size,
 )
@@ -163,7 +163,7 @@ def _findings(
             size, sd = float(last.theta[i]), float(last.covariance[i, i] ** 0.5)
             if not is_beyond_usual(evidence, one.names, size, sd):
                 continue
-            whole = float(np.hypot(sd, ALIKE.get(cause.effect, 0.0)))
+            whole = no_surer(sd, cause.effect)
             estimates = (Estimate(cause.parameter, size, whole, cause.unit),)
             visible = _visible_share(evidence, one.names)
         found.append(
@@ -185,7 +185,7 @@ def size_from_witnesses(evidence: ObservedEvidence, names: tuple[str, str]) -> t
         _disagreement(counting, names, value - counting.sensitivities[names] * one.theta[0])
         * one.covariance[0, 0] ** 0.5
     )
-    return float(one.theta[0]), float(np.hypot(sd, ALIKE.get(names[0], 0.0)))
+    return float(one.theta[0]), no_surer(float(sd), names[0])
 
 
 def _disagreement(evidence: ObservedEvidence, names: tuple[str, str], left: Array) -> float:

@@ -15,23 +15,35 @@ from types import MappingProxyType
 from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
-from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, unit_of
+from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
+from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.transient import Transient
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.errors import UnknownName
 from biodance.records import Session
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
 __all__ = [
+    "About",
     "Case",
+    "Cause",
+    "CauseWords",
+    "CheckKind",
+    "Checked",
     "DiscreteEffect",
     "Effect",
     "Parameter",
     "QualityCheck",
+    "Quantity",
     "Recorded",
+    "Transient",
     "causes",
     "check_quality",
     "discrete_effects",
     "effect",
     "effects",
+    "known_cause",
+    "unit_at",
     "unit_of",
     "wrench_about_origin",
     "wrench_about_point",
@@ -65,6 +77,11 @@ def causes(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, Cause]:
     """
     found = FAMILY.choose(chosen)
     return MappingProxyType({name: kind() if isinstance(kind, type) else kind for name, kind in found.items()})
+
+
+def known_cause(name: str) -> Cause | Checked:
+    """Return what is known of a cause by its name: its member of the family, or the defaults where it has no file."""
+    return causes().get(name, Checked())
 
 
 def effects(chosen: Chosen[Cause | type[Cause]] = None) -> Mapping[str, Effect]:

@@ -1,15 +1,12 @@
 """A channel or an axis of a force plate points the other way, or axes are exchanged: cabling, corners counted from
 another one.
-
-Signature: one channel is the mirror image of what the motion needs; or only a quarter turn of the plate puts the load
-under the feet. Look-alikes: a rotation of the plate by 90 or 180 degrees, which is the same thing. Separated by pushing
-the plate forwards and to the left.
 """
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
+from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_point
 
@@ -39,6 +36,21 @@ class AxisError(DiscreteEffect):
         "Check cabling, polarity of the channels and the order of FORCE_PLATFORM:CORNERS; push the plate in "
         "known directions."
     )
+    about = About(
+        what=(
+            "A channel or an axis of a force plate points the other way, or axes are exchanged: cabling, corners "
+            "counted from another one."
+        ),
+        signature=(
+            "One channel is the mirror image of what the motion needs; or only a quarter turn of the plate puts the "
+            "load under the feet."
+        ),
+        look_alikes="A rotation of the plate by 90 or 180 degrees, which is the same thing.",
+        settled_by="Pushing the plate forwards and to the left.",
+    )
+    words = CauseWords("the sign or order of {it} is wrong", RECORD_AGAIN, "a wrong axis")
+    explains = (CheckKind.FORCES,)
+    raw = True
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

@@ -1,18 +1,18 @@
-"""The declared body mass is wrong: clothes, shoes, an old entry, another scale.
-
-Signature: the whole residual is a share of the whole wrench, in all channels alike. Look-alikes: all six gains together
-(exactly), a load near the body's centre (pelvis, trunk, thighs), another value of gravity. Separated by weighing the
-person on the plate and on a scale.
-"""
+"""The declared body mass is wrong: clothes, shoes, an old entry, another scale."""
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.records import Array
 
 _WRONG = 0.3
 """Share of the mass by which a declared one may be wrong: more is a unit, another person, or no mass at all."""
+_LEAST = 0.3
+"""kg that matter: clinic scale and clothes, 0.2 kg."""
+_USUAL = 0.7
+"""kg up to which laboratories have it without calling it a fault: clothes and shoes."""
 
 
 class BodyMass(Effect):
@@ -20,9 +20,27 @@ class BodyMass(Effect):
 
     name = "body_mass"
     prior = 0.1
-    parameters = (Parameter("error", "kg", 1.5, "1-4 % of body mass for clothes and shoes"),)
+    parameters = (
+        Parameter("error", "kg", 1.5, "1-4 % of body mass for clothes and shoes", least=_LEAST, usual=_USUAL),
+    )
     separated_by = "Weigh the person on the plate and on a scale, as dressed for the recording."
     advice = "Enter the mass of the day, with clothes and shoes."
+    about = About(
+        what="The declared body mass is wrong: clothes, shoes, an old entry, another scale.",
+        signature="The whole residual is a share of the whole wrench, in all channels alike.",
+        look_alikes=(
+            "All six gains together (exactly), a load near the body's centre (pelvis, trunk, thighs), another value "
+            "of gravity."
+        ),
+        settled_by="Weighing the person on the plate and on a scale.",
+    )
+    words = CauseWords(
+        "the person weighs {size} {more} than declared{between}",
+        f"Weigh again, {ACCEPT}",
+        "a wrong body mass",
+        ("more", "less"),
+    )
+    explains = (CheckKind.WEIGHT, CheckKind.FORCES)
 
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""

@@ -1,20 +1,18 @@
-"""Something lifts the person: a harness on a rope, a bungee to the ceiling, a helper who holds under the arms.
-
-Signature: Fz lacks a part of the weight, less of it the higher the person is; the horizontal force points back under
-the suspension. Look-alikes: a wrong body mass or a gain of Fz while the person stays at one height; a steady contact at
-the same segment. Separated by squats, which change the height, and by weighing the person without the support.
-"""
+"""Something lifts the person: a harness on a rope, a bungee to the ceiling, a helper who holds under the arms."""
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.motion.kinematics import poses
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
 
 ROPE, _SHORTEST = 2.0, 0.5
 """m from the harness to the hook when the person stands upright: a ceiling of about 3 m; and at least."""
+_LEAST = 2.0
+"""N that matter: as a zero of a plate, 0.3 % of an adult's weight."""
 
 
 class BodyWeightSupport(Effect):
@@ -26,7 +24,13 @@ class BodyWeightSupport(Effect):
 
     name = "body_weight_support"
     parameters = (
-        Parameter("force", "N", 100.0, "15-30 % of body weight in overground support (SciELO S1413-35552014000600572)"),
+        Parameter(
+            "force",
+            "N",
+            100.0,
+            "15-30 % of body weight in overground support (SciELO S1413-35552014000600572)",
+            least=_LEAST,
+        ),
         Parameter("stiffness", "N/m", 150.0, "constant-force systems near 0, bungees some hundred newtons per metre"),
         Parameter("high", "m", 0.1, "from the hips' belt to the shoulders' straps of a harness"),
         Parameter("aside_x", "m", 0.1, "who hangs a rope hangs it over the plates"),
@@ -37,6 +41,25 @@ class BodyWeightSupport(Effect):
     advice = (
         "Weigh the person without the support; measure the rope with a load cell, or record one trial with it slack."
     )
+    about = About(
+        what=(
+            "Something lifts the person: a harness on a rope, a bungee to the ceiling, a helper who holds under the "
+            "arms."
+        ),
+        signature=(
+            "Fz lacks a part of the weight, less of it the higher the person is; the horizontal force points back "
+            "under the suspension."
+        ),
+        look_alikes=(
+            "A wrong body mass or a gain of Fz while the person stays at one height; a steady contact at the same "
+            "segment."
+        ),
+        settled_by="Squats, which change the height, and by weighing the person without the support.",
+    )
+    words = CauseWords(
+        "something that no plate measures carries {size}{between} at the {it}", "Record again without it.", "a support"
+    )
+    explains = (CheckKind.WEIGHT,)
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

@@ -1,12 +1,9 @@
-"""An amplifier or converter is at its end: the channel stays flat where the load goes on.
-
-Signature: the highest (or lowest) value of a channel comes many times in a row, exactly. Look-alikes: an unloaded plate
-whose noise was set to zero (flat at zero, not at the top). Separated by the histogram of the raw samples.
-"""
+"""An amplifier or converter is at its end: the channel stays flat where the load goes on."""
 
 import numpy as np
 
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, unit_of
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import CHANNELS, Array, Trial
 from biodance.spatial import wrench_about_point
 
@@ -30,6 +27,17 @@ class Clipping(DiscreteEffect):
     advice = (
         "Choose a larger range of the amplifier for this channel and repeat the movement; what was cut off is lost."
     )
+    about = About(
+        what="An amplifier or converter is at its end: the channel stays flat where the load goes on.",
+        signature="The highest (or lowest) value of a channel comes many times in a row, exactly.",
+        look_alikes="An unloaded plate whose noise was set to zero (flat at zero, not at the top).",
+        settled_by="The histogram of the raw samples.",
+    )
+    words = CauseWords(
+        "{it} is cut off at its largest values", "Choose a larger range, and record again.", "a cut-off channel"
+    )
+    explains = (CheckKind.WEIGHT, CheckKind.FORCES)
+    raw = True
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

@@ -1,15 +1,15 @@
-"""The clocks of forces and markers run at different rates.
-
-Signature: a delay that grows during the session, zero in its middle. Look-alikes: a delay in one trial only; drift of
-the plate. Separated by a long session and by a trial repeated at the end.
-"""
+"""The clocks of forces and markers run at different rates."""
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.effects.time_delay import moved_in_time
 from biodance.records import Array
+
+_LEAST = 0.003
+"""s that matter: a third of a frame at 100 Hz."""
 
 
 class ClockDrift(Effect):
@@ -22,10 +22,21 @@ class ClockDrift(Effect):
             "s",
             0.01,
             "1-2.5 % rate errors of older video systems (ISBS 1723); a few ms in synchronised labs",
+            least=_LEAST,
         ),
     )
     separated_by = "The first trial repeated at the end of a long session."
     advice = "Run cameras and forces from one clock; drop a marker on the plate before and after."
+    about = About(
+        what="The clocks of forces and markers run at different rates.",
+        signature="A delay that grows during the session, zero in its middle.",
+        look_alikes="A delay in one trial only; drift of the plate.",
+        settled_by="A long session and by a trial repeated at the end.",
+    )
+    words = CauseWords(
+        "the clocks of cameras and plates drift {size}{between} apart", f"Use one clock, {ACCEPT}", "a drifting clock"
+    )
+    explains = (CheckKind.FORCES,)
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces are late by stretch times (session time - 1/2)."""

@@ -1,9 +1,4 @@
-"""The person touches something that no plate measures: a rail, a helper's hand, the floor with the second foot.
-
-Signature: a force at one moving point of the body, so that only three of the six channels are free: the moment is the
-point times the force. Look-alikes: contact at a neighbouring segment; for a steady touch, offsets. Separated by the
-video, and by the rank of the residual.
-"""
+"""The person touches something that no plate measures: a rail, a helper's hand, the floor with the second foot."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.transient import Transient
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import Array
 from biodance.spatial import wrench_of_force
 
@@ -19,10 +16,12 @@ _STEP, _FINE = 0.4, 0.15
 """s between the values of its course, to look for it and to size it: a hand comes and goes within about a second, and
 takes hold within half of one.
 """
+_LEAST = 2.0
+"""N that matter: as a zero of a plate, 0.3 % of an adult's weight."""
 
 
 @dataclass(frozen=True)
-class ExternalContact(Effect):
+class ExternalContact(Transient):
     """A steady ``force`` (x, y, z: N, lab axes) ON the person at the far end of segment ``target``, or ``place`` (m,
     segment axes) from it, which the plates lack.
     """
@@ -33,10 +32,29 @@ class ExternalContact(Effect):
     name = "external_contact"
     prior = 0.02
     parameters = tuple(
-        Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)") for axis in "xyz"
+        Parameter(f"force_{axis}", "N", 10.0, "light touch of 1 N to tens of newtons (IJmker 2015)", least=_LEAST)
+        for axis in "xyz"
     )
     separated_by = "The video: what is touched, and when."
     advice = "Repeat the trial without touching anything; or measure the rail with a plate of its own."
+    about = About(
+        what=(
+            "The person touches something that no plate measures: a rail, a helper's hand, the floor with the second "
+            "foot."
+        ),
+        signature=(
+            "A force at one moving point of the body, so that only three of the six channels are free: the moment is "
+            "the point times the force."
+        ),
+        look_alikes="Contact at a neighbouring segment; for a steady touch, offsets.",
+        settled_by="The video, and by the rank of the residual.",
+    )
+    words = CauseWords(
+        "something that no plate measures pushes the {it} with {size}{between}",
+        "Record again, touching nothing.",
+        "a touch",
+    )
+    explains = (CheckKind.WEIGHT, CheckKind.FORCES)
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

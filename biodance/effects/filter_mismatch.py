@@ -1,21 +1,19 @@
-"""Forces went through a lower low-pass than the markers: in the amplifier, in the recording software, in an export.
-
-Signature: the quick part of every channel is missing in proportion to the fourth power of its frequency; holds are
-untouched. Look-alikes: a wobbling mass, a delay (where the other filter ran one way only), the inertia of skin under
-the markers. Separated by faster movements, and by the settings of the recording software.
-"""
+"""Forces went through a lower low-pass than the markers: in the amplifier, in the recording software, in an export."""
 
 import numpy as np
 from scipy.fft import dct, idct
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import Array
 
 REFERENCE = 10.0
 """Hz: the cut-off that a lower one is compared with."""
 STRENGTH = 4.0 / REFERENCE**5
 """1/Hz⁵: growth of 1/cutoff⁴ per Hz by which the cut-off lies under the reference."""
+_LEAST = 0.5
+"""Hz that matter, below the filter that is assumed."""
 
 
 class FilterMismatch(Effect):
@@ -25,11 +23,35 @@ class FilterMismatch(Effect):
 
     name = "filter_mismatch"
     parameters = (
-        Parameter("cutoff", "Hz", 4.0, "6 Hz against 10 or 45 Hz are in common use (forceandmotion.org abstracts)"),
+        Parameter(
+            "cutoff",
+            "Hz",
+            4.0,
+            "6 Hz against 10 or 45 Hz are in common use (forceandmotion.org abstracts)",
+            least=_LEAST,
+        ),
     )
     screened_at = (76.0,)  # 3 Hz: at 4 Hz, cameras of 0.3 mm look like a filter of the forces (log evidence 200 to 300)
     separated_by = "Fast alternating movements (arms at 2-3 Hz) against slow ones."
     advice = "Look up the filters of the amplifier and of the recording software; export forces unfiltered."
+    about = About(
+        what=(
+            "Forces went through a lower low-pass than the markers: in the amplifier, in the recording software, in "
+            "an export."
+        ),
+        signature=(
+            "The quick part of every channel is missing in proportion to the fourth power of its frequency; holds are"
+            " untouched."
+        ),
+        look_alikes=(
+            "A wobbling mass, a delay (where the other filter ran one way only), the inertia of skin under the markers."
+        ),
+        settled_by="Faster movements, and by the settings of the recording software.",
+    )
+    words = CauseWords(
+        "markers and forces were filtered differently, at {size}{between}", "Filter both alike.", "another filter"
+    )
+    explains = (CheckKind.FORCES,)
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces lack what the lower low-pass took."""
@@ -37,7 +59,7 @@ class FilterMismatch(Effect):
             case.trial.plates[0], _passed(case, case.predicted, float(np.ravel(theta)[0])) - case.predicted
         )
 
-    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the cut-off itself, Hz; its standard deviation to first order."""
         inverse = 1 / REFERENCE**4 + STRENGTH * max(float(theta[0]), 0.0)
         cutoff = inverse**-0.25

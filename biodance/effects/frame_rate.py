@@ -1,16 +1,11 @@
-"""Time is wrong: a declared rate that was not the true one, frames that the cameras lost without saying so.
-
-Signature: at a wrong rate the accelerations, and with them the moving part of all forces, are too large by the square
-of the ratio, while weight is right; lost frames make forces late from one instant on. Look-alikes: a load (gravity
-grows with it, too, so it is fitted beside the clock); gains of all channels (which touch the weight, too); a delay
-(from the start on). Separated by a jump on the plate: flight time against height, and by a clock in the picture.
-"""
+"""Time is wrong: a declared rate that was not the true one, frames that the cameras lost without saying so."""
 
 import numpy as np
 from scipy.fft import dct
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
 from biodance.effects.clipping import clipped
 from biodance.identification.posterior import prior_factor
 from biodance.lab.filters import LowPass, low_pass
@@ -55,6 +50,23 @@ class FrameRate(DiscreteEffect):
         "Compare the declared rates with the cameras' setting; look for dropped frames in the recording "
         "software and record again."
     )
+    about = About(
+        what=(
+            "Time is wrong: a declared rate that was not the true one, frames that the cameras lost without saying so."
+        ),
+        signature=(
+            "At a wrong rate the accelerations, and with them the moving part of all forces, are too large by the "
+            "square of the ratio, while weight is right; lost frames make forces late from one instant on."
+        ),
+        look_alikes=(
+            "A load (gravity grows with it, too, so it is fitted beside the clock); gains of all channels (which "
+            "touch the weight, too); a delay (from the start on)."
+        ),
+        settled_by="A jump on the plate: flight time against height, and by a clock in the picture.",
+    )
+    words = CauseWords("the cameras' frames are not those that the file declares", RECORD_AGAIN, "a wrong frame rate")
+    explains = (CheckKind.MARKERS,)
+    raw = True
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

@@ -1,11 +1,8 @@
-"""A marker stands still to the last bit while the others move: a gap that a program filled with the last value.
-
-Signature: the same three numbers in frame after frame, then a jump to where the marker really is. Look-alikes: a foot
-on the ground (its camera noise goes on), a recording that hung (all markers stand still). Separated by the last digits.
-"""
+"""A marker stands still to the last bit while the others move: a gap that a program filled with the last value."""
 
 from biodance.effects._base.marker_faults import marker_checks
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import About, CauseWords
 from biodance.lab.markers.signals import MarkerFault
 
 
@@ -18,6 +15,16 @@ class FrozenMarkers(DiscreteEffect):
         "Undo this filling of gaps in the recording software and export again, or leave the gap; "
         "these frames are not used here."
     )
+    about = About(
+        what=(
+            "A marker stands still to the last bit while the others move: a gap that a program filled with the last "
+            "value."
+        ),
+        signature="The same three numbers in frame after frame, then a jump to where the marker really is.",
+        look_alikes="A foot on the ground (its camera noise goes on), a recording that hung (all markers stand still).",
+        settled_by="The last digits.",
+    )
+    words = CauseWords("{pairs} stood still to the last bit for a while", "Leave gaps open instead.", "frozen markers")
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

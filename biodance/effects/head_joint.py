@@ -1,9 +1,4 @@
-"""The head moves on the trunk; the model has trunk and head in one piece.
-
-Signature: five kilograms that follow the head markers instead of the trunk: mostly Mx and My, and Mz when the head
-turns; the head markers leave the model together. Look-alikes: skin that slides under C7, a centre of mass of the trunk
-that is too high or low. Separated by nodding and turning the head alone, and by asking the person to look at one point.
-"""
+"""The head moves on the trunk; the model has trunk and head in one piece."""
 
 import numpy as np
 
@@ -13,9 +8,12 @@ from biodance.body.human.optional_joints import neck_and_vertex, share_of_body
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint
+from biodance.effects._base.words import About, CauseWords, CheckKind
 
 _AXES = {"neck_flexion": -np.eye(3)[2], "neck_bending": np.eye(3)[0], "neck_rotation": np.eye(3)[1]}
 _MARKERS = 3
+_LEAST = 0.05
+"""rad that matter: as much as everybody moves it anyway (`natural`)."""
 
 
 class HeadJoint(MissingJoint):
@@ -23,13 +21,34 @@ class HeadJoint(MissingJoint):
 
     name = "head_joint"
     parameters = (
-        Parameter("angle", "rad", 0.10, "5-15 deg rms of head movement in whole-body tasks (laboratory experience)"),
         Parameter(
-            "beyond", "rad", 0.05, "half the angle: where the joint lies and what hangs on it is known to a half"
+            "angle",
+            "rad",
+            0.10,
+            "5-15 deg rms of head movement in whole-body tasks (laboratory experience)",
+            least=_LEAST,
+        ),
+        Parameter(
+            "beyond",
+            "rad",
+            0.05,
+            "half the angle: where the joint lies and what hangs on it is known to a half",
+            least=_LEAST,
         ),
     )
     separated_by = "Nodding and turning the head alone, standing still."
     advice = "Accept a body with a neck, or ask the person to look at one point straight ahead."
+    about = About(
+        what="The head moves on the trunk; the model has trunk and head in one piece.",
+        signature=(
+            "Five kilograms that follow the head markers instead of the trunk: mostly Mx and My, and Mz when the head"
+            " turns; the head markers leave the model together."
+        ),
+        look_alikes="Skin that slides under C7, a centre of mass of the trunk that is too high or low.",
+        settled_by="Nodding and turning the head alone, and by asking the person to look at one point.",
+    )
+    words = CauseWords("the head turns {size}{between} where the model is stiff", "Accept it.", "a turning head")
+    explains = (CheckKind.MARKERS,)
     natural = 0.045
     """Root mean square of thirty virtual sessions, whose head nods by 2.5 deg on two axes."""
 

@@ -1,24 +1,39 @@
-"""The laboratory's vertical, as the cameras were calibrated, is not gravity's.
-
-Signature: a constant horizontal force of body weight times the tilt, and its moment, which follows the height of the
-centre of mass. Look-alikes: offset of Fx with My, or Fy with Mx; pitch or roll of the plate. Separated by squats (the
-centre of mass changes height) and by a plumb line with two markers.
-"""
+"""The laboratory's vertical, as the cameras were calibrated, is not gravity's."""
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter, axis_vector
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.records import Array
+
+_LEAST = 0.005
+"""rad that matters: laboratories that check have 2 to 5 mm and 0.2 degrees (Collins 2009,
+doi:10.1016/j.gaitpost.2008.10.060)."""
 
 
 class LabTilt(Effect):
     """An ``angle`` (rad) about lab axis ``target`` ("x" or "y") by which gravity is turned in the lab frame."""
 
     name = "lab_tilt"
-    parameters = (Parameter("angle", "rad", 0.005, "0.1-1 deg after an L-frame calibration on an uneven floor"),)
+    parameters = (
+        Parameter("angle", "rad", 0.005, "0.1-1 deg after an L-frame calibration on an uneven floor", least=_LEAST),
+    )
     separated_by = "Squats: the centre of mass changes its height, an offset does not."
     advice = "Hang a plumb line with two markers; set the cameras' vertical by it."
+    about = About(
+        what="The laboratory's vertical, as the cameras were calibrated, is not gravity's.",
+        signature=(
+            "A constant horizontal force of body weight times the tilt, and its moment, which follows the height of "
+            "the centre of mass."
+        ),
+        look_alikes="Offset of Fx with My, or Fy with Mx; pitch or roll of the plate.",
+        settled_by="Squats (the centre of mass changes height) and by a plumb line with two markers.",
+    )
+    words = CauseWords(
+        "the laboratory is tilted {size}{between} about {it}", f"Calibrate the cameras, {ACCEPT}", "a tilted floor"
+    )
+    explains = (CheckKind.PRESSURE,)
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

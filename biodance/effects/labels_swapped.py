@@ -1,10 +1,5 @@
 """Two markers carry each other's names: left and right, front and back of the wrist, for a whole session, from one
 trial on, or for a part of a trial.
-
-Signature: distances within a segment, or to the joint above it, that are those of the static trial under other names;
-where they cannot tell it, a left marker on the right side of pelvis and trunk, a wrist that is no mirror image of the
-other or turns the finger's marker to the palm, a head, pelvis or foot that points backwards. Look-alikes: a marker that
-fell off or jumps (one of the two is right then). Separated by exchanging the two names: only then do the distances fit.
 """
 
 from collections.abc import Mapping
@@ -16,6 +11,7 @@ from biodance.body.body import Body
 from biodance.effects._base.exchange_spans import Pair, Spans, renamed_markers
 from biodance.effects._base.exchanged_labels import arms_hang, exchanged_labels, set_of
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import canonical
 from biodance.motion.ik.inverse_kinematics import solve_ik
@@ -38,6 +34,22 @@ class LabelsSwapped(DiscreteEffect):
     name = "labels_swapped"
     separated_by = "Exchange the two names: the distances on the segment fit, or they do not."
     advice = "Exchange the two labels in the recording software, in every trial named, and export again."
+    about = About(
+        what=(
+            "Two markers carry each other's names: left and right, front and back of the wrist, for a whole session, "
+            "from one trial on, or for a part of a trial."
+        ),
+        signature=(
+            "Distances within a segment, or to the joint above it, that are those of the static trial under other "
+            "names; where they cannot tell it, a left marker on the right side of pelvis and trunk, a wrist that is "
+            "no mirror image of the other or turns the finger's marker to the palm, a head, pelvis or foot that "
+            "points backwards."
+        ),
+        look_alikes="A marker that fell off or jumps (one of the two is right then).",
+        settled_by="Exchanging the two names: only then do the distances fit.",
+    )
+    words = CauseWords("{pairs} carry each other's names", f"Exchange them, {ACCEPT}", "exchanged labels")
+    explains = (CheckKind.PRESSURE, CheckKind.MARKERS)
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

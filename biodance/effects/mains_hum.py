@@ -1,13 +1,9 @@
-"""The mains hum in a channel: 50 or 60 Hz from a missing earth, a broken screen, a lamp.
-
-Signature: a narrow line at 50 or 60 Hz that is there when nobody moves. Look-alikes: vibration of a treadmill motor or
-a building, at other frequencies. Separated by a recording of the empty plate. After the low-pass nothing is left of it,
-unless it was sampled so slowly that it was folded into the movement.
-"""
+"""The mains hum in a channel: 50 or 60 Hz from a missing earth, a broken screen, a lamp."""
 
 import numpy as np
 
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, unit_of
+from biodance.effects._base.words import About, CauseWords
 from biodance.records import CHANNELS, Array, Trial
 from biodance.spatial import wrench_about_point
 
@@ -28,6 +24,16 @@ class MainsHum(DiscreteEffect):
         "Check earth and screens of the cables; keep them away from mains cables and lamps. Forces below 10 Hz "
         "are not touched."
     )
+    about = About(
+        what="The mains hum in a channel: 50 or 60 Hz from a missing earth, a broken screen, a lamp.",
+        signature="A narrow line at 50 or 60 Hz that is there when nobody moves.",
+        look_alikes="Vibration of a treadmill motor or a building, at other frequencies.",
+        settled_by=(
+            "A recording of the empty plate. After the low-pass nothing is left of it, unless it was sampled so "
+            "slowly that it was folded into the movement."
+        ),
+    )
+    words = CauseWords("the mains hum in {it}, {size}", "Ground the amplifier, and record again.", "hum")
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

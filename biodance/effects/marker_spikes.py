@@ -1,12 +1,8 @@
-"""A marker jumps away and back within three frames: a reflection, or another marker, was taken for it.
-
-Signature: one to three frames that lie off the way of the frames on both sides by more than skin and wands swing, and
-that no body can reach and leave so fast. Look-alikes: the impact of a heel (millimetres), labels that are exchanged for
-longer (`labels_swapped`). Separated by the marker's path.
-"""
+"""A marker jumps away and back within three frames: a reflection, or another marker, was taken for it."""
 
 from biodance.effects._base.marker_faults import marker_checks
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import About, CauseWords
 from biodance.lab.markers.signals import MarkerFault
 
 
@@ -19,6 +15,16 @@ class MarkerSpikes(DiscreteEffect):
         "Correct these frames in the recording software (a reflection was taken for the marker), or leave a gap; "
         "these frames are not used here."
     )
+    about = About(
+        what="A marker jumps away and back within three frames: a reflection, or another marker, was taken for it.",
+        signature=(
+            "One to three frames that lie off the way of the frames on both sides by more than skin and wands swing, "
+            "and that no body can reach and leave so fast."
+        ),
+        look_alikes="The impact of a heel (millimetres), labels that are exchanged for longer (`labels_swapped`).",
+        settled_by="The marker's path.",
+    )
+    words = CauseWords("some frames of {pairs} lie far off their way", "Fill these frames again.", "spikes")
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

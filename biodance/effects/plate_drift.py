@@ -1,13 +1,13 @@
-"""The zero of a force-plate channel wanders during the session.
-
-Signature: an offset that grows from trial to trial, minus half at the start, plus half at the end. Look-alikes: a
-posture that changes with fatigue; a drifting clock. Separated by repeating the first trial at the end and by unloaded
-recordings before and after.
-"""
+"""The zero of a force-plate channel wanders during the session."""
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.records import Array
+
+_LEAST = {"N": 2.0, "N·m": 1.0}
+"""N, N·m that matter: what a spot check before a session tolerates (2 N are 0.3 % of an adult's weight, 1 N·m is
+1.4 mm of its centre of pressure)."""
 
 
 class PlateDrift(ChannelEffect):
@@ -22,10 +22,21 @@ class PlateDrift(ChannelEffect):
             "N or N·m",
             3.0,
             "a few newtons per session (laboratory experience; acceptance limit 1 N of one lab)",
+            least=_LEAST,
         ),
     )
     separated_by = "The first trial repeated at the end, and the empty plate before and after."
     advice = "Let the plate warm up, zero it before each trial."
+    about = About(
+        what="The zero of a force-plate channel wanders during the session.",
+        signature="An offset that grows from trial to trial, minus half at the start, plus half at the end.",
+        look_alikes="A posture that changes with fatigue; a drifting clock.",
+        settled_by="Repeating the first trial at the end and by unloaded recordings before and after.",
+    )
+    words = CauseWords(
+        "{it} drifts by {size}{between} over the session", f"Zero the plate before each trial, {ACCEPT}", "a drift"
+    )
+    explains = (CheckKind.FORCES,)
 
     def in_channel(self, case: Case) -> Array:
         """Return session time minus one half; zero in a trial that saw the plate empty: there its reading was taken

@@ -1,10 +1,4 @@
-"""A channel of a force plate reads a constant factor too much.
-
-Signature: the residual of one channel follows that channel itself. Look-alikes: all six gains together are a wrong body
-mass, exactly; the gain of Fz alone re-fits into the segment masses and leaves the fit as good as before. Separated by
-the scale's weight and by differences between channels. Where one of several plates reads too little in all channels,
-the pressure of all lies beside the body, on the other plate's side: so large a gain is found before any statistics.
-"""
+"""A channel of a force plate reads a constant factor too much."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,9 +7,13 @@ import numpy as np
 
 from biodance.effects._base.carried import Carried, carried_by_plates
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import ChannelEffect, Parameter
+from biodance.effects._base.effect import Parameter
+from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.words import CALIBRATE, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.effects.body_mass import BodyMass
+from biodance.lab.plates.faults import GAIN
 from biodance.records import Array, Trial, Wrench
 from biodance.spatial import wrench_shift
 
@@ -34,27 +32,55 @@ _LASTS = 1.0
 _NAMED, _TOLD = 4.0, 9.0
 """Differences of squared deviations: two in natural logarithm of the evidence for a name, as everywhere
 (`witness_inference.THRESHOLD`); three standard deviations from which two causes are told apart."""
+_LEAST = 0.005
+"""Gain that matters: makers' accuracy, 0.2 to 0.5 % of full scale."""
+_USUAL = 0.02
+"""Gain up to which laboratories have it without calling it a fault."""
+_ALIKE = 0.004
+"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
 
-class PlateGain(ChannelEffect):
+class PlateGain(InstalledPlate):
     """A relative ``gain`` (0.04: reads 4 % too much) of channel ``target`` about the plate's centre."""
 
     name = "plate_gain"
+    fault = GAIN
     by_load = True
     prior = 0.04
     parameters = (
-        Parameter("gain", "1", 0.02, "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)"),
+        Parameter(
+            "gain",
+            "1",
+            0.02,
+            "3-5 N under dead loads of some hundred newtons (Cappello 2011, PMID 21392999)",
+            least=_LEAST,
+            usual=_USUAL,
+            alike=_ALIKE,
+        ),
     )
     separated_by = "Squats against standing: the channel's own size must change."
     advice = "Check the channel with dead weights; correct sensitivity or calibration matrix."
-
-    def in_channel(self, case: Case) -> Array:
-        """Return the predicted channel itself."""
-        return case.predicted_on(self.plate_of(case))[:, self.channel]
+    about = About(
+        what="A channel of a force plate reads a constant factor too much.",
+        signature="The residual of one channel follows that channel itself.",
+        look_alikes=(
+            "All six gains together are a wrong body mass, exactly; the gain of Fz alone re-fits into the segment "
+            "masses and leaves the fit as good as before."
+        ),
+        settled_by=(
+            "The scale's weight and by differences between channels. Where one of several plates reads too little in "
+            "all channels, the pressure of all lies beside the body, on the other plate's side: so large a gain is "
+            "found before any statistics."
+        ),
+    )
+    words = CauseWords("{it} reads {size} too {more}{between}", CALIBRATE, "a wrong gain", TOO_MUCH)
+    explains = (CheckKind.WEIGHT, CheckKind.FORCES)
+    followed = (Quantity("gain", "1", name, "Fz", 0.003, 0.01, 0.1),)
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md)."""
 
     def in_proportion(self, case: Case, theta: Array) -> Array:
         """Return the gain of its channel about the plate's centre."""
-        there, only = wrench_shift(self.plate_of(case).centre), np.diag(np.eye(6)[self.channel])
+        there, only = wrench_shift(self.plate_of(case).centre), self.fault.slope(self.place)
         return np.asarray(theta[0] * np.linalg.inv(there) @ only @ there)
 
     @classmethod

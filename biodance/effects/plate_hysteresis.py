@@ -1,15 +1,12 @@
 """A force plate does not forget: after loading it reads less than after unloading to the same load (friction, glue, a
 loose top plate).
-
-Signature: a step of the residual in one channel wherever that channel turns round, of the same size for small and large
-turns. Look-alikes: a delay (whose residual follows the speed of change), drift, a gain. Separated by loading and
-unloading in steps with the person standing still between them.
 """
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
+from biodance.effects._base.words import ACCEPT, About, CauseWords
 from biodance.records import Array
 from biodance.spatial import wrench_about_point
 
@@ -17,6 +14,8 @@ REVERSAL = np.array([5.0, 5.0, 20.0, 5.0, 5.0, 2.0])
 """N, N·m by which a channel must turn back until the loop is crossed (to 63 %)."""
 _WIDEST = 0.02
 """Share of the largest load of its channel that a loop can be wide: four times the worst of makers' sheets."""
+_LEAST = {"N": 1.0, "N·m": 0.3}
+"""N, N·m that matter: what is left in one band and alarms nobody (`consequence.LEAST_FORCE`)."""
 
 
 class PlateHysteresis(ChannelEffect):
@@ -27,10 +26,27 @@ class PlateHysteresis(ChannelEffect):
     name = "plate_hysteresis"
     by_load = True
     parameters = (
-        Parameter("width", "N or N·m", 3.0, "0.2-0.5 % of full scale in makers' sheets of strain-gauge plates"),
+        Parameter(
+            "width", "N or N·m", 3.0, "0.2-0.5 % of full scale in makers' sheets of strain-gauge plates", least=_LEAST
+        ),
     )
     separated_by = "Weights put on and taken off one after the other, or slow squats with holds on the way down and up."
     advice = "Load and unload the plate with dead weights; look for a loose top plate, cable or screw."
+    about = About(
+        what=(
+            "A force plate does not forget: after loading it reads less than after unloading to the same load "
+            "(friction, glue, a loose top plate)."
+        ),
+        signature=(
+            "A step of the residual in one channel wherever that channel turns round, of the same size for small and "
+            "large turns."
+        ),
+        look_alikes="A delay (whose residual follows the speed of change), drift, a gain.",
+        settled_by="Loading and unloading in steps with the person standing still between them.",
+    )
+    words = CauseWords(
+        "{it} comes back late after a load, by {size}{between}", f"Have the plate repaired, {ACCEPT}", "a slow plate"
+    )
 
     def in_channel(self, case: Case) -> Array:
         """Return minus the memory of the channel."""

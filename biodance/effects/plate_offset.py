@@ -1,11 +1,4 @@
-"""A channel of a force plate does not read zero when nobody stands on it.
-
-Signature: a constant in one channel, whatever the movement and whatever its speed. Look-alikes: for Fz a wrong body
-mass (which scales all channels), for moments a shifted plate or a CoM that is off in the trunk (which follow Fz), for
-Fx a tilted plate. Separated by movements that change Fz (squats) and by an unloaded recording: rows in which nobody is
-on the plate, and flights, are zeros of every channel, whoever read the file; what they read is found before any
-statistics and taken off.
-"""
+"""A channel of a force plate does not read zero when nobody stands on it."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,6 +8,8 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import ChannelEffect, Parameter
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.words import ACCEPT, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.records import CHANNELS, Array, Plate, Session, Trial, Wrench, runs
 from biodance.spatial import wrench_about_origin, wrench_about_point
 
@@ -29,6 +24,10 @@ lasts 0.08 s."""
 _QUIET = 3.0
 """N: scatter of the stretches of a trial, and difference of trials, up to which they read one zero (83 flights of a
 runner scatter by 0.5 N; feet that rest lightly on a plate by 1 to 8)."""
+_LEAST = {"N": 2.0, "N·m": 1.0}
+"""N, N·m that matter: what a spot check before a session tolerates (2 N are 0.3 % of an adult's weight, 1 N·m is
+1.4 mm of its centre of pressure)."""
+_USUAL = {"N": USUAL_ZERO, "N·m": 2.0, "Fz": VERTICAL_ZERO}
 
 
 class PlateOffset(ChannelEffect):
@@ -36,9 +35,43 @@ class PlateOffset(ChannelEffect):
 
     name = "plate_offset"
     prior = 0.04
-    parameters = (Parameter("offset", "N or N·m", 5.0, "re-zeroing rule of +-5 N in laboratory guides (Codamotion)"),)
+    parameters = (
+        Parameter(
+            "offset",
+            "N or N·m",
+            5.0,
+            "re-zeroing rule of +-5 N in laboratory guides (Codamotion)",
+            least=_LEAST,
+            usual=_USUAL,
+        ),
+    )
     separated_by = "Postures of different weight on the plate: squats, one leg, sitting down beside it."
     advice = "Record the empty plate before and after, and re-zero it."
+    about = About(
+        what="A channel of a force plate does not read zero when nobody stands on it.",
+        signature="A constant in one channel, whatever the movement and whatever its speed.",
+        look_alikes=(
+            "For Fz a wrong body mass (which scales all channels), for moments a shifted plate or a CoM that is off "
+            "in the trunk (which follow Fz), for Fx a tilted plate."
+        ),
+        settled_by=(
+            "Movements that change Fz (squats) and by an unloaded recording: rows in which nobody is on the plate, "
+            "and flights, are zeros of every channel, whoever read the file; what they read is found before any "
+            "statistics and taken off."
+        ),
+    )
+    words = CauseWords(
+        "{it} reads {size} too {more}{between} all the time", f"Zero the plate, {ACCEPT}", "a wrong zero", TOO_MUCH
+    )
+    explains = (CheckKind.WEIGHT, CheckKind.PRESSURE, CheckKind.FORCES)
+    followed = (
+        Quantity("offset_x", "N", name, "Fx", 0.5, 2.0, 0.05),
+        Quantity("offset_y", "N", name, "Fy", 0.5, 2.0, 0.05),
+        Quantity("offset_z", "N", name, "Fz", 0.5, 2.0, 0.05),
+    )
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md) and the re-zeroing rules of
+    laboratory guides (+-5 N).
+    """
 
     def in_channel(self, case: Case) -> Array:
         """Return one; zero in a trial that saw the plate empty: there its reading was taken off."""

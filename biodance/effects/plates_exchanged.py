@@ -1,9 +1,4 @@
-"""Two plates carry each other's channels: cables or channel lists are exchanged.
-
-Signature: the pressure of each lies where no foot stands, and under the feet once the two are exchanged; the total
-force is right. Look-alikes: a plate that lies elsewhere (its pressure is off alone), exchanged left and right feet
-(which stand on their plates all the same). Separated by standing on one plate only.
-"""
+"""Two plates carry each other's channels: cables or channel lists are exchanged."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import ACCEPT, About, CauseWords
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.prepare import prepare
@@ -40,6 +36,19 @@ class PlatesExchanged(DiscreteEffect):
     name = "plates_exchanged"
     separated_by = "Stand on one plate only: the other one must read nothing."
     advice = "Exchange the cables, or the channels in FORCE_PLATFORM:CHANNEL, and export again."
+    about = About(
+        what="Two plates carry each other's channels: cables or channel lists are exchanged.",
+        signature=(
+            "The pressure of each lies where no foot stands, and under the feet once the two are exchanged; the total"
+            " force is right."
+        ),
+        look_alikes=(
+            "A plate that lies elsewhere (its pressure is off alone), exchanged left and right feet (which stand on "
+            "their plates all the same)."
+        ),
+        settled_by="Standing on one plate only.",
+    )
+    words = CauseWords("{it} carry each other's signals", f"Exchange them, {ACCEPT}", "exchanged plates")
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

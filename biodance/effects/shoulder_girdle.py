@@ -1,9 +1,4 @@
-"""The shoulders move on the trunk: shrugging, reaching; the model has them fixed.
-
-Signature: the arm's weight moves by centimetres against the model, mostly in Mx and My; the shoulder markers leave the
-trunk's. Look-alikes: a misplaced shoulder marker (which does not come back), a centre of mass that is off in the upper
-arm. Separated by shrugging alone, with hanging arms.
-"""
+"""The shoulders move on the trunk: shrugging, reaching; the model has them fixed."""
 
 import numpy as np
 
@@ -13,11 +8,14 @@ from biodance.body.human.optional_joints import shoulders, sternoclavicular
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, doubting
+from biodance.effects._base.words import About, CauseWords, CheckKind
 
 SHOULDERS = ("RSHO", "LSHO")
 """Skin over the acromion follows the collar bone in part only, and how far is what is asked: the arm's markers show
 where the joint is.
 """
+_LEAST = 0.06
+"""rad that matter: as much as everybody moves it anyway (`natural`)."""
 
 
 class ShoulderGirdle(MissingJoint):
@@ -27,13 +25,32 @@ class ShoulderGirdle(MissingJoint):
 
     name = "shoulder_girdle"
     parameters = (
-        Parameter("angle", "rad", 0.10, "2-5 cm of the shoulder joint on the thorax (laboratory experience)"),
         Parameter(
-            "beyond", "rad", 0.05, "half the angle: where the joint lies and what hangs on it is known to a half"
+            "angle", "rad", 0.10, "2-5 cm of the shoulder joint on the thorax (laboratory experience)", least=_LEAST
+        ),
+        Parameter(
+            "beyond",
+            "rad",
+            0.05,
+            "half the angle: where the joint lies and what hangs on it is known to a half",
+            least=_LEAST,
         ),
     )
     separated_by = "Shrugging alone, with hanging arms."
     advice = "Accept a body with collar bones; keep the shoulder markers on the acromion, not on the deltoid."
+    about = About(
+        what="The shoulders move on the trunk: shrugging, reaching; the model has them fixed.",
+        signature=(
+            "The arm's weight moves by centimetres against the model, mostly in Mx and My; the shoulder markers leave"
+            " the trunk's."
+        ),
+        look_alikes=(
+            "A misplaced shoulder marker (which does not come back), a centre of mass that is off in the upper arm."
+        ),
+        settled_by="Shrugging alone, with hanging arms.",
+    )
+    words = CauseWords("the shoulders move {size}{between} on the trunk", "Accept it.", "moving shoulders")
+    explains = (CheckKind.MARKERS,)
     carries = ("right_shoulder", "left_shoulder")
     natural = 0.058
     """Root mean square of thirty virtual sessions (0.033 to 0.08), whose collar bones follow the arms."""

@@ -1,15 +1,11 @@
-"""A load whose contents move is carried: a bottle, a water bag, a rucksack that swings.
-
-Signature: a carried mass, and beside it a horizontal force that goes on swinging at its own slow frequency when the
-person stops. Look-alikes: a rigid load on the same segment while the person moves slowly; drift of posture. Separated
-by a sudden stop followed by five seconds of standing still: what rings down there is not the person.
-"""
+"""A load whose contents move is carried: a bottle, a water bag, a rucksack that swings."""
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.oscillator import oscillator_wrench, point_motion, relative_motion
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.records import Array
 from biodance.spatial import point_mass
 
@@ -19,6 +15,8 @@ _RANGE = (0.7, 3.0)
 """Hz: from a bath to a cup."""
 _DAMPING = 0.08
 _CARRIERS = ("pelvis", "trunk_head", "right_forearm_hand", "left_forearm_hand")
+_LEAST = 0.1
+"""kg that matter: as an added mass."""
 
 
 class SloshingLoad(Effect):
@@ -29,12 +27,13 @@ class SloshingLoad(Effect):
 
     name = "sloshing_load"
     parameters = (
-        Parameter("mass", "kg", 2.0, "1-4 kg: hydration bags, bottles, shopping"),
+        Parameter("mass", "kg", 2.0, "1-4 kg: hydration bags, bottles, shopping", least=_LEAST),
         Parameter(
             "sloshing",
             "kg",
             1.0,
             "about half of the liquid in a half-filled vessel moves (first mode of a rectangular tank)",
+            least=_LEAST,
         ),
         Parameter(
             "frequency",
@@ -47,6 +46,19 @@ class SloshingLoad(Effect):
     distinguished_by = "sloshing"
     separated_by = "A sudden stop and five seconds of standing still: the load goes on swinging, the person does not."
     advice = "Take the load off, or empty it, and repeat one trial."
+    about = About(
+        what="A load whose contents move is carried: a bottle, a water bag, a rucksack that swings.",
+        signature=(
+            "A carried mass, and beside it a horizontal force that goes on swinging at its own slow frequency when "
+            "the person stops."
+        ),
+        look_alikes="A rigid load on the same segment while the person moves slowly; drift of posture.",
+        settled_by="A sudden stop followed by five seconds of standing still: what rings down there is not the person.",
+    )
+    words = CauseWords(
+        "a load of {size}{between} sloshes at the {it}", "Take it off, or declare it.", "a sloshing load"
+    )
+    explains = (CheckKind.WEIGHT,)
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
@@ -79,9 +91,9 @@ class SloshingLoad(Effect):
         level = np.array([1.0, 1.0, 0.0])
         return rigid, oscillator_wrench(place, acceleration, (x * level, relative * level), gravity=case.body.gravity)
 
-    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return the frequency itself instead of its difference."""
-        mass, sloshing, _, high = super().reported(theta, sd)
+        mass, sloshing, _, high = super().reported(case, theta, sd)
         return mass, sloshing, ("frequency", _frequency(theta), float(sd[2]), "Hz"), high
 
     def possible(self, theta: Array) -> bool:

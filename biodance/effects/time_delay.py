@@ -1,9 +1,4 @@
-"""Forces and markers are not recorded at the same instant.
-
-Signature: the residual is the time derivative of the wrench: large where forces change fast, nothing in holds.
-Look-alikes: another filter on forces than on markers. Separated by fast alternating movements and by dropping a marker
-on the plate.
-"""
+"""Forces and markers are not recorded at the same instant."""
 
 from dataclasses import replace
 
@@ -13,6 +8,8 @@ from scipy.interpolate import make_interp_spline
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.quality_check import QualityCheck, Recorded
+from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass
 from biodance.records import Array, Trial, Wrench
 
@@ -32,6 +29,14 @@ def moved_in_time(time: Array, value: Array, delay: Array) -> Array:
     return np.asarray(spline(np.clip(time - delay, time[0], time[-1])))
 
 
+_LEAST = 0.003
+"""s that matter: a third of a frame at 100 Hz."""
+_USUAL = 0.008
+"""s up to which laboratories have it without calling it a fault: clocks within a frame."""
+_ALIKE = 0.002
+"""Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
+
+
 class TimeDelay(Effect):
     """A ``delay`` (s) of all forces against the markers; forces late = positive."""
 
@@ -39,12 +44,36 @@ class TimeDelay(Effect):
     prior = 0.04
     parameters = (
         Parameter(
-            "delay", "s", 0.005, "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)"
+            "delay",
+            "s",
+            0.005,
+            "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)",
+            least=_LEAST,
+            usual=_USUAL,
+            alike=_ALIKE,
         ),
     )
     screened_at = (-4.0, 4.0, 12.0)  # -20, 20, 60 ms: seen from none, the evidence of 20 ms is 169 instead of 16,000
     separated_by = "Fast alternating movements (arms at 2-3 Hz) in every direction."
     advice = "Drop a marker on the plate: its stop and the force must come in one frame; correct the trigger."
+    about = About(
+        what="Forces and markers are not recorded at the same instant.",
+        signature=(
+            "The residual is the time derivative of the wrench: large where forces change fast, nothing in holds."
+        ),
+        look_alikes="Another filter on forces than on markers.",
+        settled_by="Fast alternating movements and by dropping a marker on the plate.",
+    )
+    words = CauseWords(
+        "{forces} {size} {more}{between}",
+        f"Shift the forces, {ACCEPT}",
+        "a delay",
+        ("late", "early"),
+        ("forces late", "forces early"),
+    )
+    explains = (CheckKind.FORCES,)
+    followed = (Quantity("delay", "s", name, "", 0.002, 0.004, 0.15, 0.003),)
+    """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md)."""
 
     def transform(self, case: Case, theta: Array) -> Case:
         """Return the case whose forces come ``theta[0]`` seconds late."""

@@ -1,12 +1,7 @@
-"""The markers of the feet sit elsewhere than on the second ray and the heel: a habit of a laboratory, on both feet.
-
-Signature: the pressure lies outwards (or inwards) of the line from heel to toe marker in BOTH feet, half as far early
-in stance, or ahead of the heel marker in both. Look-alikes: with the right foot on one plate and the left foot on
-another, two plates that lie elsewhere in opposite directions, or one that does. Separated by the same foot on two
-plates, walks both ways, and two toe markers, on the first and the fifth ray.
-"""
+"""The markers of the feet sit elsewhere than on the second ray and the heel: a habit of a laboratory, on both feet."""
 
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import About, CauseWords
 
 
 class ToeLandmark(DiscreteEffect):
@@ -20,6 +15,27 @@ class ToeLandmark(DiscreteEffect):
         "Nothing is broken: put a second marker on the fifth ray of each foot, or walk over the plates both ways, so "
         "that feet and plates are told apart."
     )
+    about = About(
+        what=(
+            "The markers of the feet sit elsewhere than on the second ray and the heel: a habit of a laboratory, on "
+            "both feet."
+        ),
+        signature=(
+            "The pressure lies outwards (or inwards) of the line from heel to toe marker in BOTH feet, half as far "
+            "early in stance, or ahead of the heel marker in both."
+        ),
+        look_alikes=(
+            "With the right foot on one plate and the left foot on another, two plates that lie elsewhere in opposite"
+            " directions, or one that does."
+        ),
+        settled_by="The same foot on two plates, walks both ways, and two toe markers, on the first and the fifth ray.",
+    )
+    words = CauseWords(
+        "the toe markers sit {size}{between} from the line of the foot",
+        "Check where they sit.",
+        "a toe marker elsewhere",
+    )
+    habit = True
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

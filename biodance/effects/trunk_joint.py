@@ -1,10 +1,4 @@
-"""The trunk bends in two places; the model bends it in one.
-
-Signature: the thorax leans and bends on the loins: half the body's mass moves by centimetres against the model, in Mx
-and My; the trunk markers stand away from where the pelvis would have them. Look-alikes: skin that slides over the
-spine, a trunk joint in the wrong place (which follows the trunk's angle only). Separated by rounding and arching the
-back alone, and by markers on the loins.
-"""
+"""The trunk bends in two places; the model bends it in one."""
 
 import numpy as np
 
@@ -14,6 +8,7 @@ from biodance.body.human.optional_joints import share_of_body, shoulders
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.missing_joint import MissingJoint, doubting
+from biodance.effects._base.words import About, CauseWords, CheckKind
 
 XIPHION = 0.61
 """Height of the xiphion between the trunk's joint and the shoulders (de Leva 1996, from the omphalion: 0.58 men,
@@ -28,6 +23,8 @@ _MARKERS = 4
 
 ELSEWHERE = ("HD", "SHO", "UPA", "ELB", "FRM", "WRA", "WRB", "FIN")
 """Markers that follow the neck, the shoulder blades and the arms as well as the thorax."""
+_LEAST = 0.05
+"""rad that matter: as much as everybody moves it anyway (`natural`)."""
 
 
 class TrunkJoint(MissingJoint):
@@ -37,13 +34,32 @@ class TrunkJoint(MissingJoint):
 
     name = "trunk_joint"
     parameters = (
-        Parameter("angle", "rad", 0.06, "5-10 deg rms between lumbar and thoracic spine (laboratory experience)"),
         Parameter(
-            "beyond", "rad", 0.03, "half the angle: where the joint lies and what hangs on it is known to a half"
+            "angle", "rad", 0.06, "5-10 deg rms between lumbar and thoracic spine (laboratory experience)", least=_LEAST
+        ),
+        Parameter(
+            "beyond",
+            "rad",
+            0.03,
+            "half the angle: where the joint lies and what hangs on it is known to a half",
+            least=_LEAST,
         ),
     )
     separated_by = "Rounding and arching the back alone, standing still."
     advice = "Accept a body with a thorax, and put two more markers on the loins (L1, L3)."
+    about = About(
+        what="The trunk bends in two places; the model bends it in one.",
+        signature=(
+            "The thorax leans and bends on the loins: half the body's mass moves by centimetres against the model, in"
+            " Mx and My; the trunk markers stand away from where the pelvis would have them."
+        ),
+        look_alikes=(
+            "Skin that slides over the spine, a trunk joint in the wrong place (which follows the trunk's angle only)."
+        ),
+        settled_by="Rounding and arching the back alone, and by markers on the loins.",
+    )
+    words = CauseWords("the trunk bends {size}{between} where the model is stiff", "Accept it.", "a bending trunk")
+    explains = (CheckKind.MARKERS,)
     natural = 0.040
     """Root mean square of thirty virtual sessions, whose thorax moves by 1.2 deg on two axes."""
 

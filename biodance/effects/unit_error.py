@@ -1,13 +1,9 @@
-"""Numbers stand in another unit than the file says: pounds for newtons, millimetres for metres, N·mm for N·m.
-
-Signature: every channel of a plate, or all moments, or all markers, are one of a few well-known factors too large or
-too small. Look-alikes: none; no person weighs 4.45 times as much. A foot beside the plate makes the weight too small,
-but by no fixed factor. Separated by the scale's weight and by the size of the person and the plates.
-"""
+"""Numbers stand in another unit than the file says: pounds for newtons, millimetres for metres, N·mm for N·m."""
 
 import numpy as np
 
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
+from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
 from biodance.records import Trial
 from biodance.settings import STANDARD_GRAVITY
 
@@ -41,6 +37,24 @@ class UnitError(DiscreteEffect):
     advice = (
         "Correct the unit in the recording software (C3D: POINT:UNITS, ANALOG:UNITS, FORCE_PLATFORM) and export again."
     )
+    about = About(
+        what=(
+            "Numbers stand in another unit than the file says: pounds for newtons, millimetres for metres, N·mm for "
+            "N·m."
+        ),
+        signature=(
+            "Every channel of a plate, or all moments, or all markers, are one of a few well-known factors too large "
+            "or too small."
+        ),
+        look_alikes=(
+            "None; no person weighs 4.45 times as much. A foot beside the plate makes the weight too small, but by no"
+            " fixed factor."
+        ),
+        settled_by="The scale's weight and by the size of the person and the plates.",
+    )
+    words = CauseWords("a unit is mistaken{factor}", RECORD_AGAIN, "a mistaken unit")
+    explains = (CheckKind.WEIGHT, CheckKind.MARKERS, CheckKind.FORCES)
+    raw = True
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

@@ -1,15 +1,10 @@
-"""Something that no plate measures carries a part of the person for a while: a chair, a rail, a helper.
-
-Signature: by Newton the ground carries weight (1 + a / g), with a the acceleration of pelvis and trunk; the plates lack
-a good part of it for a while, and nothing of it at all other times. Look-alikes: a foot beside the plates, which the
-markers of the feet show; late forces, which have too much as often as too little. Separated by the markers of what is
-held still.
-"""
+"""Something that no plate measures carries a part of the person for a while: a chair, a rail, a helper."""
 
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import About, CauseWords
 from biodance.motion.contact.contact import ground_contact
 from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.contact.support import share_lacking
@@ -30,6 +25,19 @@ class UnmeasuredContact(DiscreteEffect):
         "Stand the chair on a plate, or record the movement without it. The frames in which it carries are left out of "
         "everything; the others count."
     )
+    about = About(
+        what="Something that no plate measures carries a part of the person for a while: a chair, a rail, a helper.",
+        signature=(
+            "By Newton the ground carries weight (1 + a / g), with a the acceleration of pelvis and trunk; the plates"
+            " lack a good part of it for a while, and nothing of it at all other times."
+        ),
+        look_alikes=(
+            "A foot beside the plates, which the markers of the feet show; late forces, which have too much as often "
+            "as too little."
+        ),
+        settled_by="The markers of what is held still.",
+    )
+    words = CauseWords("something that no plate measures carries the {it}", "Record again without it.", "a support")
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

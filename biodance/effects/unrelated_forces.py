@@ -1,9 +1,4 @@
-"""The forces do not belong to the movement: another trial's file, a trigger that missed, a clock that ran away.
-
-Signature: most frames need another force than the plates show, and no shift in time makes the total force go with the
-trunk. Look-alikes: a late clock (goes with the trunk once shifted), something that carries beside the plates (chair,
-rail: forces go with the trunk while it does not). Separated by recording again with the trigger checked.
-"""
+"""The forces do not belong to the movement: another trial's file, a trigger that missed, a clock that ran away."""
 
 from dataclasses import replace
 
@@ -11,6 +6,7 @@ import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
+from biodance.effects._base.words import About, CauseWords
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit, believable, standing_point
 from biodance.motion.newton import TELLS, LagAndMass, trunk_of
@@ -30,6 +26,24 @@ class UnrelatedForces(DiscreteEffect):
     name = "unrelated_forces"
     separated_by = "Record the trial again, with the trigger checked."
     advice = "Look whether the force file is that of another trial, and whether both systems started together."
+    about = About(
+        what=(
+            "The forces do not belong to the movement: another trial's file, a trigger that missed, a clock that ran "
+            "away."
+        ),
+        signature=(
+            "Most frames need another force than the plates show, and no shift in time makes the total force go with "
+            "the trunk."
+        ),
+        look_alikes=(
+            "A late clock (goes with the trunk once shifted), something that carries beside the plates (chair, rail: "
+            "forces go with the trunk while it does not)."
+        ),
+        settled_by="Recording again with the trigger checked.",
+    )
+    words = CauseWords(
+        "{forces} not those of the movement", "Look whether they are another trial's.", "unrelated forces"
+    )
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

@@ -1,14 +1,9 @@
-"""Soft tissue swings on the bones: viscera in the trunk, muscle and fat on the thighs.
-
-Signature: part of the segment's mass follows the bone as a damped spring does: the residual is the change of the
-segment's acceleration, largest at the fast ends of movements and in landings, nothing in holds and slow movements.
-Look-alikes: another filter on forces than on markers; a delay; an error of that segment's mass. Separated by hops and
-heel drops, which excite more than 5 Hz; below that even ten kilograms hardly show.
-"""
+"""Soft tissue swings on the bones: viscera in the trunk, muscle and fat on the thighs."""
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.oscillator import oscillator_wrench, point_motion, relative_motion
+from biodance.effects._base.words import About, CauseWords
 from biodance.records import Array
 
 _FREQUENCY = {"trunk_head": 5.0}
@@ -20,6 +15,8 @@ LIMBS = 10.0
 10.1152/jappl.2001.90.2.412).
 """
 _DAMPING = 0.3
+_LEAST = 0.5
+"""kg that matter, by judgement."""
 
 
 class WobblingMass(Effect):
@@ -29,10 +26,27 @@ class WobblingMass(Effect):
 
     name = "wobbling_mass"
     parameters = (
-        Parameter("mass", "kg", 4.0, "a third to a half of trunk and thigh swings (Masters & Challis 2022, running)"),
+        Parameter(
+            "mass",
+            "kg",
+            4.0,
+            "a third to a half of trunk and thigh swings (Masters & Challis 2022, running)",
+            least=_LEAST,
+        ),
     )
     separated_by = "Hops, heel drops and sudden stops: only content above 5 Hz shows it."
     advice = "Add three heel drops to the session and read them with a cut-off of 20 Hz or more."
+    about = About(
+        what="Soft tissue swings on the bones: viscera in the trunk, muscle and fat on the thighs.",
+        signature=(
+            "Part of the segment's mass follows the bone as a damped spring does: the residual is the change of the "
+            "segment's acceleration, largest at the fast ends of movements and in landings, nothing in holds and slow"
+            " movements."
+        ),
+        look_alikes="Another filter on forces than on markers; a delay; an error of that segment's mass.",
+        settled_by="Hops and heel drops, which excite more than 5 Hz; below that even ten kilograms hardly show.",
+    )
+    words = CauseWords("{size}{between} of soft tissue swing at the {it}", "Accept it.", "soft tissue")
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:

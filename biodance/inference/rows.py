@@ -116,7 +116,11 @@ def observed_causes(evidence: ObservedEvidence, family: Mapping[str, object]) ->
     """Return the causes that only observations judge, with no simulated rows."""
     kinds = {name: one for name, one in family.items() if isinstance(one, Effect)}
     return tuple(
-        Candidate(replace(kinds[name], target=target), np.zeros((0, kinds[name].typical.size), np.float32), (False,) * kinds[name].typical.size)
+        Candidate(
+            replace(kinds[name], target=target),
+            np.zeros((0, kinds[name].typical.size), np.float32),
+            (False,) * kinds[name].typical.size,
+        )
         for name, target in evidence.counting.causes
         if name in kinds
     )
@@ -140,7 +144,17 @@ def rows_of(
     if seen is not None:
         X, y, names = _with_observations(X, y, names, units, seen)
     groups = tuple(dict.fromkeys(names))
-    return Rows(problem, tolerances, seen, X, y, np.array([groups.index(name) for name in names], dtype=int), _blocks(problem, len(y)), groups, units)
+    return Rows(
+        problem,
+        tolerances,
+        seen,
+        X,
+        y,
+        np.array([groups.index(name) for name in names], dtype=int),
+        _blocks(problem, len(y)),
+        groups,
+        units,
+    )
 
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]

@@ -97,6 +97,11 @@ class Fit:
         half = solve_triangular(self.lower, unit, lower=True, check_finite=False)
         return self.u[len(self.u) - count :], half.T @ half
 
+    def variance(self, row: Array) -> float:
+        """Return the posterior variance of ``row`` (K,) times the scaled coefficients."""
+        half = solve_triangular(self.lower, row, lower=True, check_finite=False)
+        return float(half @ half)
+
     @cached_property
     def coefficients(self) -> Array:
         """(K,) posterior mean per unit of the unscaled columns."""
@@ -154,7 +159,15 @@ def prior_sd(rows: Rows) -> Array:
     return np.array([SPREAD if name == BODY or name in SOFT else TOLERANCE for name in rows.groups])
 
 
-def fit(found: Products, sd: Array, start: Scales, *, known: Curvature | None = None, steps: int = _STEPS, least: float = -np.inf) -> Fit:
+def fit(
+    found: Products,
+    sd: Array,
+    start: Scales,
+    *,
+    known: Curvature | None = None,
+    steps: int = _STEPS,
+    least: float = -np.inf,
+) -> Fit:
     """Return the posterior at the most probable scales, whose logarithms have prior standard deviations ``sd`` (G,),
     searched for from ``start``; their curvature is computed in every step if it is not ``known``.
     """

@@ -22,7 +22,6 @@ from biodance.effects import Effect
 from biodance.inference.rows import Rows
 from biodance.inference.scales import Curvature, Fit, Products, Scales, fit, nominal, prior_sd, products, widened
 from biodance.records import Array
-from biodance.uncertainty.bands import BANDS
 
 P_UNKNOWN = 0.1
 """Probability of an unknown cause in a session, before any data; those of causes stand in their effects
@@ -76,7 +75,11 @@ class Hypothesis:
     def phi(self) -> Array:
         """(10N,) posterior mean of the body's parameters; empty where only observations judge."""
         found = self.rows.problem
-        return np.empty(0) if found is None else found.prior.phi + found.factor @ self.fit.coefficients[: found.factor.shape[1]]
+        return (
+            np.empty(0)
+            if found is None
+            else found.prior.phi + found.factor @ self.fit.coefficients[: found.factor.shape[1]]
+        )
 
     def whole(self, one: NamedCause) -> Array:
         """Return the size (p,) of a cause with what its own tolerance has taken of it: both look alike, and the sum is
@@ -145,7 +148,7 @@ class Search:
     @classmethod
     def of(cls, rows: Rows, causes: Sequence[Candidate]) -> "Search":
         """Return the search for ``causes``."""
-        Z, cuts = bases_of(causes)
+        Z, cuts = bases_of(causes) if causes else (np.zeros((rows.simulated, 0)), ())
         below = np.zeros((len(rows.y) - len(Z), Z.shape[1]))
         for one, cut in zip(causes, cuts, strict=True):
             loud = np.flatnonzero(~np.array(one.silent))
@@ -172,11 +175,10 @@ class Search:
         return self.start.curvature(len(self.rows.groups))
 
 
-def infer(rows: Rows, causes: Sequence[Candidate]) -> Posterior:
-    """Return the posterior over sets of ``causes``. Where an unknown cause is more probable than none, the simulation
+def infer(search: Search) -> Posterior:
+    """Return the posterior over sets of causes. Where an unknown cause is more probable than none, the simulation
     is as far off everywhere as it is there: names are then sought at that noise.
     """
-    search = Search.of(rows, causes)
     found = _searched(search)
     for _ in range(_AGAIN):
         best = found.best
@@ -200,7 +202,9 @@ def _searched(search: Search) -> Posterior:
             for scored in (first if depth == 0 else screen(search, one))[:_REFINED]:
                 names = one.names | {(scored.effect.name, scored.effect.target)}
                 if scored.gain >= _LEAST and names not in known:
-                    known[names] = hypothesis(search, (*one.causes, NamedCause(scored.effect, scored.start, np.empty((0, 0)))), one.fit.scales)
+                    known[names] = hypothesis(
+                        search, (*one.causes, NamedCause(scored.effect, scored.start, np.empty((0, 0)))), one.fit.scales
+                    )
                     new.append(known[names])
         best = max(one.log_posterior for one in known.values())
         new.sort(key=lambda one: -one.log_posterior)
@@ -225,7 +229,9 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
         errors = [_model_errors(rows, one, own) for one, own in zip(causes, taken, strict=True)]
-        Z = np.concatenate([*errors, *(rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes)], axis=1)
+        Z = np.concatenate(
+            [*errors, *(rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes)], axis=1
+        )
         p = u0.size
         y = rows.y - np.sum(taken, axis=0) + Z[:, Z.shape[1] - p :] @ u0
         inner = widened(search.inner, rows, rows.X, Z, y)
@@ -307,7 +313,9 @@ def with_unknown(one: Hypothesis) -> Hypothesis:
     away = np.full(square.size, -np.inf)
     away[there] = np.maximum(0.5 * np.log(np.maximum(square[there], 1e-12)), 0.0)
     own, wide = OWN**2 + 0.5 / np.maximum(count, 1), EXCESS**2 + 0.5 / np.maximum(count, 1)
-    each = np.where(there, 0.5 * np.where(there, away, 0.0) ** 2 * (1 / own - 1 / wide) - 0.5 * np.log(wide / own), -np.inf)
+    each = np.where(
+        there, 0.5 * np.where(there, away, 0.0) ** 2 * (1 / own - 1 / wide) - 0.5 * np.log(wide / own), -np.inf
+    )
     price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / there.sum())
     at = int(np.argmax(each))
     return replace(one, log_unknown=one.log_posterior + float(logsumexp(each)) + price, where_unknown=divmod(at, 6))

@@ -4,6 +4,7 @@ Each plate weighs the same person while one foot stands alone on it: the two mas
 plates' gains, whatever the person weighs.
 """
 
+from biodance.effects.plate_gain import PlateGain
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations.stride_force import StrideForce
 
@@ -17,7 +18,7 @@ class DoubleSupport(Observer):
     """
 
     name = "double_support"
-    responds_to = ("plate_gain",)
+    responds_to = (PlateGain.name,)
     needs = "Two steps one after the other on two plates; pelvis markers."
     source = "20 pairs of steps of 9 persons of public laboratories"
 

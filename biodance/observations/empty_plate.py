@@ -6,6 +6,8 @@ told all the same, because a trial in which the plate is never empty keeps it.
 
 import numpy as np
 
+from biodance.effects.plate_drift import PlateDrift
+from biodance.effects.plate_offset import PlateOffset
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._causes import was_zeroed
 from biodance.observations._recording import ONSET
@@ -24,7 +26,7 @@ class EmptyPlate(Observer):
     """Force (N) that the empty plate read and that was taken off, and its change from before to after the steps."""
 
     name = "empty_plate"
-    responds_to = ("plate_offset", "plate_drift")
+    responds_to = (PlateOffset.name, PlateDrift.name)
     needs = "A trial that begins or ends with nobody on the plate."
     source = "An empty plate reads zero; 35 empty plates of 8 public laboratories were zeroed to 0-6 N (horizontal)."
 

@@ -4,6 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from biodance.effects.plate_drift import PlateDrift
+from biodance.effects.plate_offset import PlateOffset
 from biodance.observations import FootPath, Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import Array, runs
@@ -22,7 +24,7 @@ class Flight(Observer):
     """Mean force (N) of every plate while both feet are in the air."""
 
     name = "flight"
-    responds_to = ("plate_offset", "plate_drift")
+    responds_to = (PlateOffset.name, PlateDrift.name)
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 

@@ -7,6 +7,10 @@ tell it from where the laboratory puts its toe marker. A turned plate shows as a
 from collections.abc import Mapping
 from dataclasses import replace
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_position import PlatePosition
+from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
 from biodance.observations._landmark import landmark_across
 from biodance.observations._stance import step_course
@@ -28,7 +32,7 @@ class FootAcross(Observer):
     """Centre of pressure outwards of the line from the heel marker to the front of the foot, m, by phase of stance."""
 
     name = "foot_across"
-    responds_to = ("plate_position", "plate_rotation", "plate_crosstalk", "axis_error")
+    responds_to = (PlatePosition.name, PlateRotation.name, PlateCrosstalk.name, AxisError.name)
     needs = "A step with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -6,6 +6,9 @@ plates, tell plate from foot.
 
 from dataclasses import replace
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_position import PlatePosition
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
 from biodance.observations._landmark import landmark_along
 from biodance.observations._stance import step_course
@@ -25,7 +28,7 @@ class FootAlong(Observer):
     """Centre of pressure ahead of the heel marker along the foot, m, early and late in stance."""
 
     name = "foot_along"
-    responds_to = ("plate_position", "plate_crosstalk", "axis_error")
+    responds_to = (PlatePosition.name, PlateCrosstalk.name, AxisError.name)
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_position import PlatePosition
 from biodance.motion.contact.over import distance_to_hull
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
@@ -19,7 +21,7 @@ class FootOutline(Observer):
     """Median distance (m) of the centre of pressure outside the sole that stands there; 0 inside."""
 
     name = "foot_outline"
-    responds_to = ("plate_position", "axis_error")
+    responds_to = (PlatePosition.name, AxisError.name)
     needs = "A step with one whole foot on one plate; heel and toe markers."
     source = "Pressure cannot act where nothing touches; soles by Winter 2009 and ANSUR II 2012."
 

@@ -6,6 +6,7 @@ that runs, has no such instant: its largest acceleration is anywhere (40 ms apar
 
 import numpy as np
 
+from biodance.effects.time_delay import TimeDelay
 from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity
 from biodance.observations._stance import crossing, steps, walks
@@ -24,7 +25,7 @@ class ForceEnd(Observer):
     """
 
     name = "force_end"
-    responds_to = ("time_delay",)
+    responds_to = (TimeDelay.name,)
     needs = "Walking steps that leave an empty plate and swing off; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 

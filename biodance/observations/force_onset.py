@@ -6,6 +6,7 @@ swing: only the peaks near the ground count, and of these the one that is highes
 
 import numpy as np
 
+from biodance.effects.time_delay import TimeDelay
 from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity
 from biodance.observations._stance import crossing, steps
@@ -24,7 +25,7 @@ class ForceOnset(Observer):
     """Onset of the vertical force (20 N) less the peak of the heel marker's upward acceleration, s."""
 
     name = "force_onset"
-    responds_to = ("time_delay",)
+    responds_to = (TimeDelay.name,)
     needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 

@@ -8,6 +8,10 @@ import math
 
 import numpy as np
 
+from biodance.effects.body_mass import BodyMass
+from biodance.effects.plate_gain import PlateGain
+from biodance.effects.plate_offset import PlateOffset
+from biodance.effects.time_delay import TimeDelay
 from biodance.motion.newton import LagAndMass, slopes_of
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity
@@ -29,7 +33,7 @@ class Newton(Observer):
     """Lag (s) of the total vertical force behind the trunk, and the mass (kg) that it weighs."""
 
     name = "newton"
-    responds_to = ("time_delay", "body_mass", "plate_gain", "plate_offset")
+    responds_to = (TimeDelay.name, BodyMass.name, PlateGain.name, PlateOffset.name)
     needs = "Movement up and down with both feet on the plates (walking, squats); markers of pelvis or trunk, and feet."
     source = "Newton's second law; 13 public laboratories"
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.effects.axis_error import AxisError
+from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity, by_plate
 from biodance.observations._stance import StepCourse, step_course
@@ -35,7 +37,7 @@ class Shear(Observer):
     """
 
     name = "shear"
-    responds_to = ("plate_rotation", "axis_error")
+    responds_to = (PlateRotation.name, AxisError.name)
     needs = "A walking step with one whole foot on one plate; foot and pelvis markers."
     source = "65 steps of 20 persons of 12 public laboratories; Winter 2009, chapter 5"
 

@@ -1,5 +1,6 @@
 """Left against right: the pressure's path in one foot mirrors the other's, wherever the laboratory puts its markers."""
 
+from biodance.effects.plate_position import PlatePosition
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._stance import step_course
 
@@ -12,7 +13,7 @@ class Sides(Observer):
     """Centre of pressure outwards in the right foot less that in the left one, m, in each pair of steps."""
 
     name = "sides"
-    responds_to = ("plate_position",)
+    responds_to = (PlatePosition.name,)
     needs = "A step of each foot, each alone on a plate; heel and toe markers."
     source = "6.7 mm between visits of adults, 18 pairs of steps of 9 persons of public laboratories"
 

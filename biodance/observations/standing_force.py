@@ -3,6 +3,12 @@
 import numpy as np
 
 from biodance.body.tables.error_sizes import error_size
+from biodance.effects.body_mass import BodyMass
+from biodance.effects.lab_tilt import LabTilt
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_gain import PlateGain
+from biodance.effects.plate_offset import PlateOffset
+from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._recording import ONSET
 from biodance.observations._sensitivity import Sensitivity, of_mean
@@ -23,7 +29,7 @@ class StandingForce(Observer):
     """
 
     name = "standing_force"
-    responds_to = ("body_mass", "plate_gain", "plate_offset")
+    responds_to = (BodyMass.name, PlateGain.name, PlateOffset.name)
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 
@@ -63,8 +69,8 @@ def _level(axis: int) -> float:
     alike: its vertical and its plate lean about the other axis, and Fz leaks into the channel.
     """
     about, channel = "yx"[axis], ("Fx", "Fy")[axis]
-    lean = error_size("lab_tilt", about), error_size("plate_rotation", about)
-    return float(np.linalg.norm([*lean, error_size("plate_crosstalk", f"Fz->{channel}")]))
+    lean = error_size(LabTilt.name, about), error_size(PlateRotation.name, about)
+    return float(np.linalg.norm([*lean, error_size(PlateCrosstalk.name, f"Fz->{channel}")]))
 
 
 def _known(plate: Plate) -> Array:

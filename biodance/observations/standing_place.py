@@ -6,6 +6,8 @@ the back of the pelvis stands for it: from side to side within some millimetres,
 
 import numpy as np
 
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_position import PlatePosition
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
 from biodance.observations.standing_force import mean_force
@@ -26,7 +28,7 @@ class StandingPlace(Observer):
     """Centre of pressure to the left of the middle of the pelvis, and ahead of it, in quiet standing, m."""
 
     name = "standing_place"
-    responds_to = ("plate_position", "plate_crosstalk")
+    responds_to = (PlatePosition.name, PlateCrosstalk.name)
     needs = "Standing still with both feet wholly on the plates; pelvis and foot markers."
     source = (
         "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"

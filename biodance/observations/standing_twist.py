@@ -6,6 +6,7 @@ is the zero of Mz; horizontal forces, which are small, hardly enter.
 
 import numpy as np
 
+from biodance.effects.plate_offset import PlateOffset
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
 from biodance.settings import COP_FORCE
@@ -19,7 +20,7 @@ class StandingTwist(Observer):
     """Mean moment (N·m) of all plates about the vertical through the mean centre of pressure in quiet standing."""
 
     name = "standing_twist"
-    responds_to = ("plate_offset",)
+    responds_to = (PlateOffset.name,)
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still does not turn; 11 static trials of 3 public laboratories"
 

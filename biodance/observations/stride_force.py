@@ -13,6 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.effects.body_mass import BodyMass
+from biodance.effects.clipping import Clipping
+from biodance.effects.plate_gain import PlateGain
 from biodance.motion.newton import fading
 from biodance.observations import FootStep, Observation, Observer, SeenTrial
 from biodance.observations._recording import ONSET
@@ -41,7 +44,7 @@ class StrideForce(Observer):
     """
 
     name = "stride_force"
-    responds_to = ("plate_gain", "body_mass", "clipping")
+    responds_to = (PlateGain.name, BodyMass.name, Clipping.name)
     needs = "Two steps one after the other on two plates, or one step while the other foot swings; pelvis markers."
     source = "21 whole steps and 40 single supports of 10 persons of 5 public laboratories"
 

@@ -6,37 +6,24 @@ What is left of the forces may be its own. So nothing is told beside it while an
 from dataclasses import replace
 
 from biodance.body.body import Body
-from biodance.diagnosis.engine import Examined, without_name, without_names
 from biodance.diagnosis.reasons import Reason
-from biodance.diagnosis.repairs import unplaced_markers
-from biodance.effects.marker_misplaced import MarkerMisplaced
+from biodance.inference.decision import Inferred
 
 _LEFT = ("unexplained", "named, incomplete")
 """Verdicts beside which something is left."""
 
 
-def beside_another_body(examined: Examined, body: Body, joints: tuple[str, ...]) -> Examined:
+def beside_another_body(found: Inferred, body: Body, joints: tuple[str, ...]) -> Inferred:
     """Return a diagnosis of ``body`` that says why it cannot tell what is left, where that may be the body's own, with
     its names as no more than what is resembled; ``joints`` are those that it moves at beside the usual ones.
     """
-    doubt = _doubt(body, joints)
-    if not doubt or examined.diagnosis.verdict not in _LEFT or examined.diagnosis.doubted:
-        return examined
-    found = without_names(examined, examined.diagnosis.checks) if examined.diagnosis.findings else examined
-    return replace(found, diagnosis=replace(found.diagnosis, why={**found.diagnosis.why, **doubt}))
-
-
-def without_unplaced_markers(examined: Examined, body: Body) -> Examined:
-    """Return a diagnosis of ``body`` that says of no marker that it moved since a static trial which contradicts itself
-    beside it (`unplaced_markers`): it is only resembled, and what is left is judged without it.
-    """
-    unsure = unplaced_markers(body)
-    while True:
-        names = [(one.effect, one.target) for one in examined.diagnosis.findings]
-        found = next((i for i, (kind, at) in enumerate(names) if kind == MarkerMisplaced.name and at in unsure), None)
-        if found is None:
-            return examined
-        examined = without_name(examined, found)
+    doubt, one = _doubt(body, joints), found.diagnosis
+    if not doubt or one.verdict not in _LEFT or one.doubted or found.search.rows.problem is None:
+        return found
+    told = replace(
+        one, verdict="unexplained", findings=(), resembles=(*one.findings, *one.resembles), why={**one.why, **doubt}
+    )
+    return replace(found, diagnosis=told, named=())
 
 
 def _doubt(body: Body, joints: tuple[str, ...]) -> dict[Reason, tuple[str, ...]]:

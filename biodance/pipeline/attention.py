@@ -5,11 +5,11 @@ first; what a session ends with beside all of that. Page, terminal and JSON show
 from collections.abc import Sequence
 from dataclasses import replace
 
-from biodance.diagnosis.diagnosis import HABITS, Diagnosis, Finding
+from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import QualityCheck
+from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.cause_words import alternatives, spoken
 from biodance.pipeline.finding_words import LOAD, cause_of, explained
@@ -22,12 +22,10 @@ from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, L
 
 _WEIGHED = "kg are declared: check the mass"
 """What a reader says of a weight that is not the declared one; the check of it points to the cause that was found."""
-_WEIGHT = "mass on the plates"
-"""Beginning of the name of the check of the weight."""
 _BROKEN = {
-    "force difference": "forces and simulation of {} differ by {}",
-    "marker distance": "markers of {} lie {} from the body",
-    _WEIGHT: "the weight on the plates in {} is {} from the declared one",
+    CheckKind.FORCES: "forces and simulation of {} differ by {}",
+    CheckKind.MARKERS: "markers of {} lie {} from the body",
+    CheckKind.WEIGHT: "the weight on the plates in {} is {} from the declared one",
 }
 """Beginnings of the names of checks beside which nothing is "nothing wrong", unless a finding explains them, and what
 is said of them.
@@ -123,8 +121,8 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     found += [line for lines in said for line in lines]
     told = any(_WEIGHED in line.text for lines in said for line in lines)
     outside = [check for check in result.all_checks if not check.inside]
-    found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(_WEIGHT))]
-    found += [_habit(one) for one in findings if one.effect in HABITS]
+    found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(CheckKind.WEIGHT))]
+    found += [_habit(one) for one in findings if one.cause.habit]
     return strongest_first([*found, *_load(result, findings)])
 
 
@@ -141,7 +139,7 @@ def _of_trial(trial: TrialResult, findings: Sequence[Finding]) -> list[Attention
     level: Level = "fail" if trial.status == "refused" else "warn"
     if trial.trial.role == "static" and not trial.trial.warnings:
         level = "note" if all(step.status == "done" or step.name in _ON_PLATES for step in trial.steps) else level
-    said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of(_WEIGHT, findings))]
+    said = [text for text in trial.reasons if not (_WEIGHED in text and cause_of(CheckKind.WEIGHT, findings))]
     return [Attention(level, text.removeprefix(f"Trial {trial.name}: "), trial.name) for text in said]
 
 

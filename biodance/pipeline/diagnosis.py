@@ -2,30 +2,30 @@
 and gains elsewhere.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.combine_witnesses import SimulatedSize
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
-from biodance.diagnosis.engine import Examined, diagnose_trials, without_names
 from biodance.diagnosis.gain import Gain
-from biodance.diagnosis.naming import Naming, required_evidence
+from biodance.diagnosis.of_family import of_family
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
 from biodance.diagnosis.reasons import Reason
-from biodance.diagnosis.repairs import by_checks, named_first, with_repairs
+from biodance.diagnosis.repairs import named_first, with_failed, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.discovery import Chosen
-from biodance.effects import DiscreteEffect, Effect, QualityCheck, causes, check_quality
+from biodance.effects import Cause, DiscreteEffect, Effect, causes, check_quality
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
-from biodance.pipeline.another_body import beside_another_body, without_unplaced_markers
+from biodance.inference.decision import Inferred
+from biodance.inference.session import Seen, judge, see
+from biodance.pipeline.another_body import beside_another_body
 from biodance.pipeline.attention import reconcile_with_checks
-from biodance.pipeline.gains import accepted, combined_with_witnesses, noted
+from biodance.pipeline.gains import accepted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
@@ -38,6 +38,8 @@ from biodance.uncertainty.tolerances import Tolerances, shipped
 if TYPE_CHECKING:
     import pandas as pd
 
+_ANYWAY = ("standing_twist",)
+"""Observations to which other channels hardly matter: believed beside one that is wrong."""
 _COPY = (
     "What is named first was undone in a copy, and everything else was found in that copy. "
     "The recordings themselves are as they were."
@@ -52,8 +54,8 @@ class SessionDiagnosis:
     ----------
     diagnosis : Diagnosis
         Verdict and findings.
-    examined : Examined or None
-        What the engine looked at; None where a check stopped it.
+    inferred : Inferred or None
+        The posterior; None where there was nothing to judge by.
     before, accepted : Identification or None
         What is identified without the findings and once they are accepted; None without findings.
     left : tuple or None
@@ -65,6 +67,8 @@ class SessionDiagnosis:
         was found; None where nothing was undone.
     gain : Gain or None
         Of all findings together on the kept trials; each has its own.
+    looked_at : frozenset of str
+        Trials whose forces were compared with a body.
 
     Examples
     --------
@@ -73,13 +77,14 @@ class SessionDiagnosis:
     """
 
     diagnosis: Diagnosis
-    examined: Examined | None = None
+    inferred: Inferred | None = None
     before: Identification | None = None
     accepted: Identification | None = None
     left: tuple[Residuals, Residuals] | None = None
     failures: Mapping[str, str] = field(default_factory=dict)
     mended: MendedCopy | None = None
     gain: Gain | None = None
+    looked_at: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
         return f"SessionDiagnosis({self.diagnosis.told})"
@@ -133,86 +138,89 @@ def diagnose_session(
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     tell("looking for faults too large for statistics")
-    mended = with_faults_undone(result, mended, causes(effects), reference=reference, tell=tell)
+    family = causes(effects)
+    mended = with_faults_undone(result, mended, family, reference=reference, tell=tell)
     result = result if mended is None else mended.result
-    found = _diagnosed(result, reference=reference, tolerances=tolerances, effects=effects, tell=tell)
-    tell("observing feet on plates, clocks, weights")
-    evidence = collect_evidence(result.session, effects, (tolerances or shipped()).norms)
-    naming = found.examined.naming if found.examined else None
-    measured = _measured(naming, found.diagnosis.why) if naming else {}
-    whole = combined_with_witnesses(result, found.diagnosis, found.examined, evidence, measured)
-    if naming:
-        whole = with_repairs(whole, naming.found.problem.cases, tolerances or shipped(), effects)
+    found = _judged(result, family, reference=reference, tolerances=tolerances, tell=tell)
+    whole = of_family(found.diagnosis, family)
+    cases = found.inferred.search.rows.problem.cases if found.inferred and found.inferred.search.rows.problem else ()
+    if cases:
+        whole = with_repairs(whole, cases, tolerances or shipped(), effects)
     whole = named_first(whole, tuple(quality for quality in whole.checks if quality.mended and not quality.ok))
     if mended is not None:
         whole, found = named_first(whole, mended.checks, _COPY), replace(found, mended=mended)
         whole = replace(whole, checks=(*mended.checks, *whole.checks))
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
-    whole = replace(whole, findings=with_plate_axes(whole.findings, plates))
-    looked_at = found.examined.naming.found.problem.looked_at if found.examined else frozenset[str]()
+    whole = of_family(replace(whole, findings=with_plate_axes(whole.findings, plates)), family)
     result = with_weighed_load(result, whole)
     whole = with_load(whole, result.identification.search if result.identification else None)
-    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, looked_at)))
+    return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, found.looked_at)))
 
 
-def _measured(naming: Naming, reasons: Collection[Reason]) -> dict[tuple[str, str], SimulatedSize]:
-    """Return what the simulation tells of every cause, by effect and target, before any is named; nothing where it
-    looked for none, or its tolerances do not hold.
-    """
-    if not {Reason.ONLY_STANDING, Reason.BODY_NOT_SCALED, Reason.TOLERANCES_DO_NOT_HOLD}.isdisjoint(reasons):
-        return {}
-    return {
-        one.names: SimulatedSize(float(one.start[0]), one.sd, required_evidence(naming.first, one.visible) - one.score)
-        for one in naming.screening.suspects
-    }
-
-
-def _diagnosed(
+def _judged(
     result: SessionResult,
+    asked: Mapping[str, Cause],
     *,
     reference: SessionIdentification | None,
     tolerances: Tolerances | None,
-    effects: Chosen[Effect | DiscreteEffect],
     tell: Callable[[str], None],
 ) -> SessionDiagnosis:
     """Return what was found; `reconcile_with_checks` says it."""
     fitted = chosen_windows(result.trials)
     tell("checking units, signs, labels and clocks")
-    asked = causes(effects)
     checks = check_quality(result.session, cases_of(result.body, all_windows(result.trials)), chosen=asked)
     failed = tuple(quality for quality in checks if not quality.ok and not quality.mended)
+    tell("observing feet on plates, clocks, weights")
+    known = tolerances or shipped()
+    evidence = collect_evidence(result.session, asked, known.norms)
+    if any(asked[quality.effect].raw for quality in failed if quality.effect in asked):
+        evidence = evidence.only(_ANYWAY)
+    bare = Diagnosis(
+        "unexplained", (), checks=checks, notes=result.doubts, witnesses=evidence if evidence.observations else None
+    )
+    tell("looking for causes")
+    seen, own, looked_at, simulate = None, None, frozenset[str](), not failed
     if result.body is None or not fitted:
         why = f"No movement could be compared with a body. {result.body_source} {_reasons(result)}".strip()
-        return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, why, *result.doubts))
-    tell("looking for causes")
-    own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
-    try:
-        examined = diagnose_trials(
-            result.body,
-            fitted,
-            checks=checks,
-            tolerances=own.tolerances,
-            prior=_prior(reference, result),
-            effects=asked,
-            search=not failed,
+        bare = replace(bare, notes=(why, *bare.notes))
+    else:
+        own = own_tolerances(result.body, fitted, result.session.trials, known=tolerances)
+        try:
+            seen = see(result.body, fitted, own.tolerances, asked, _prior(reference, result))
+        except TrialRefused as why:
+            bare = replace(bare, notes=(str(why), *bare.notes))
+        else:
+            notes = (
+                *_reference_note(reference),
+                *bare.notes,
+                *standing_notes(result),
+                *left_out(result.trials),
+                *own.notes,
+            )
+            unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
+            why = {reason: () for reason, holds in unsure.items() if holds}
+            bare, looked_at = replace(bare, notes=notes, why=why), seen.problem.looked_at if seen.problem else looked_at
+            simulate = simulate and not why
+    found = judge(seen, evidence, own.tolerances if own else known, asked, bare, simulate=simulate)
+    one = _unsimulated(found.diagnosis if found else bare, seen)
+    if found is not None:
+        joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
+        found = replace(found, diagnosis=one)
+        found = (
+            beside_another_body(found, result.body, joints) if result.body is not None and seen is not None else found
         )
-    except TrialRefused as why:
-        return SessionDiagnosis(by_checks(checks) if failed else _cannot_tell(checks, str(why), *result.doubts))
-    notes = (*_reference_note(reference), *result.doubts, *standing_notes(result), *left_out(result.trials), *own.notes)
-    examined = noted(examined, *notes)
-    if failed:
-        return SessionDiagnosis(
-            by_checks(checks, examined.diagnosis, suspicious=bool(examined.passes_threshold)), examined
-        )
-    unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
-    if any(unsure.values()):
-        reasons = {**examined.diagnosis.why, **{reason: () for reason, holds in unsure.items() if holds}}
-        examined = replace(examined, diagnosis=replace(examined.diagnosis, why=reasons))
-        return SessionDiagnosis(_only_resembled(without_names(examined).diagnosis), examined)
-    joints = tuple(one.name for one in result.shown_joints.gains if one.taken)
-    examined = without_unplaced_markers(beside_another_body(examined, result.body, joints), result.body)
-    tell("measuring what the findings change")
-    return _with_gains(result, examined)
+        tell("measuring what the findings change")
+        told = _with_gains(result, found)
+        told = replace(told, looked_at=looked_at)
+        return told if not failed else replace(told, diagnosis=with_failed(failed, told.diagnosis))
+    return SessionDiagnosis(with_failed(failed, one) if failed else one, looked_at=looked_at)
+
+
+def _unsimulated(one: Diagnosis, seen: Seen | None) -> Diagnosis:
+    """Return the diagnosis of a session of which no movement was compared with a body: nothing found is not nothing
+    wrong.
+    """
+    return replace(one, verdict="unexplained") if seen is None and one.verdict == "nothing wrong" else one
 
 
 def standing_notes(result: SessionResult) -> tuple[str, ...]:
@@ -242,21 +250,6 @@ def diagnosed(
         return None
 
 
-def _cannot_tell(checks: tuple[QualityCheck, ...], *notes: str) -> Diagnosis:
-    """Return the diagnosis of a session of which nothing could be judged: its checks, and why."""
-    return Diagnosis(verdict="unexplained", findings=(), checks=checks, notes=notes)
-
-
-def _only_resembled(one: Diagnosis) -> Diagnosis:
-    """Return the diagnosis without its names, which are only resembled: the tolerances under which they were found do
-    not hold here.
-    """
-    alike = ", ".join(f"{finding.effect} {finding.target}".strip() for finding in one.resembles)
-    if not alike:
-        return one
-    return replace(one, notes=(*one.notes, f"What is left resembles {alike}, which is not believed."))
-
-
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:
     """Return what an earlier session lets expect of the body, or the body that the session started from; None without
     either.
@@ -282,14 +275,13 @@ def _reasons(result: SessionResult) -> str:
     )
 
 
-def _with_gains(result: SessionResult, examined: Examined) -> SessionDiagnosis:
+def _with_gains(result: SessionResult, found: Inferred) -> SessionDiagnosis:
     """Return the diagnosis with what accepting its findings changes, where there are any and movement to identify
     from.
     """
     before = result.identification.identification if result.identification else None
-    if not examined.diagnosis.findings or before is None:
-        return SessionDiagnosis(examined.diagnosis, examined, before)
-    found = accepted(result, examined, before)
-    return SessionDiagnosis(
-        found.examined.diagnosis, found.examined, before, found.identified, found.left, found.failures, gain=found.gain
-    )
+    if not found.named or before is None:
+        return SessionDiagnosis(found.diagnosis, found, before)
+    told = accepted(result, found, before)
+    one = told.inferred
+    return SessionDiagnosis(one.diagnosis, one, before, told.identified, told.left, told.failures, gain=told.gain)

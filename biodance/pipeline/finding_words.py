@@ -7,29 +7,6 @@ from biodance.display import digits, shown_unit
 from biodance.effects.added_mass import AddedMass
 
 LOAD = AddedMass.name
-CAUSES_OF_WEIGHT = (
-    "plate_gain", "plate_offset", "body_mass", LOAD, "body_weight_support", "external_contact", "sloshing_load",
-    "unit_error", "clipping",
-)  # fmt: skip
-"""Causes that add or take weight, so that one of them and a load are two words for what the plates carry."""
-EXPLAINS: dict[str, tuple[str, ...]] = {
-    "mass on the plates": CAUSES_OF_WEIGHT,
-    "centre of mass off the centre of pressure": (
-        "plate_position", "plate_rotation", "plate_crosstalk", "plate_offset", "lab_tilt", "marker_misplaced",
-        "labels_swapped", "joint_centre",
-    ),
-    "marker distance": (
-        "labels_swapped", "marker_misplaced", "segment_length", "joint_centre", "trunk_joint", "head_joint",
-        "shoulder_girdle", "frame_rate", "unit_error",
-    ),
-    "force difference": (
-        "plate_gain", "plate_offset", "plate_drift", "plate_rotation", "plate_crosstalk", "time_delay", "clock_drift",
-        "filter_mismatch", "axis_error", "unit_error", "clipping", "added_mass", "body_mass", "external_contact",
-    ),
-}  # fmt: skip
-"""Causes that a check outside its limit may come from, by the beginning of the check's name."""
-SIGNS = {"time_delay": ("forces late", "forces early")}
-"""What a positive and a negative size of a cause's first parameter mean, where the number alone does not say it."""
 
 
 def in_words(finding: Finding) -> str:
@@ -43,7 +20,8 @@ def in_words(finding: Finding) -> str:
     known = [p.known for p in finding.parameters if p.sd == p.sd]
     if not known:
         return name
-    sure = SIGNS.get(finding.effect, ("", ""))[told[0].value < 0] if any(known) else "its size is hardly known"
+    signs = finding.cause.words.signs if finding.cause.words else ("", "")
+    sure = signs[told[0].value < 0] if any(known) else "its size is hardly known"
     return f"{name} ({', '.join(map(_size, told))}{sure and f'; {sure}'})"
 
 
@@ -66,8 +44,7 @@ def _size(one: Estimate) -> str:
 
 def cause_of(checked: str, findings: Sequence[Finding]) -> str:
     """Return the first finding that may explain a check of that name; "" for none."""
-    mine = next((causes for what, causes in EXPLAINS.items() if checked.startswith(what)), ())
-    found = next((one for one in findings if one.effect in mine), None)
+    found = next((one for one in findings if checked.startswith(one.cause.explains)), None)
     return f"{cause_in_words(found.effect, found.target)}{_elsewhere(found)}" if found else ""
 
 

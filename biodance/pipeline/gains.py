@@ -13,19 +13,16 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
-from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
-from biodance.diagnosis.diagnosis import Diagnosis, Finding
-from biodance.diagnosis.engine import Examined, without_name
+from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import cause_key
-from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.diagnosis.witness_inference import infer_causes
 from biodance.effects import Case
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
-from biodance.lab.corrections import PARAMETER_OF, PlateCorrection, corrected_trial
+from biodance.inference.decision import Inferred
+from biodance.lab.corrections import PlateCorrection
+from biodance.lab.plates.faults import PLATE_FAULTS
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.judged_trials import cases_of, windows
 from biodance.pipeline.results import SessionResult
@@ -37,12 +34,12 @@ _Fits = tuple[Fit, ...]
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A diagnosis whose findings were accepted: ``examined`` with the gain of each of them, the body ``identified``
+    """A diagnosis whose findings were accepted: ``inferred`` with the gain of each of them, the body ``identified``
     then (None without findings), what the body in use and this one ``left`` of the data not used, the ``gain`` of all
     together, and what could not be computed (``failures``).
     """
 
-    examined: Examined
+    inferred: Inferred
     identified: Identification | None = None
     left: tuple[Residuals, Residuals] | None = None
     gain: Gain | None = None
@@ -64,33 +61,34 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
     """Return the ``findings`` that can be corrected in recordings, found in ``source``."""
     out = []
     for one in findings:
-        size = {p.name: p for p in one.parameters}.get(PARAMETER_OF.get(one.effect, ""))
+        fault = PLATE_FAULTS.get(one.effect)
+        size = {p.name: p for p in one.parameters}.get(fault.parameter) if fault else None
         if size is not None and np.isfinite(size.value):
             out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
     return tuple(out)
 
 
-def accepted(result: SessionResult, examined: Examined, before: Identification) -> Accepted:
+def accepted(result: SessionResult, inferred: Inferred, before: Identification) -> Accepted:
     """Return what accepting the findings changes against the identification ``before``. A finding whose own gain lies
     wholly at or below zero is taken back, the worst first, and the rest accepted again.
     """
-    while examined.diagnosis.findings:
+    while inferred.diagnosis.findings:
         try:
-            found = _accepted(result, examined, before)
+            found = _accepted(result, inferred, before)
         except TrialRefused as why:  # named in standing, and no movement to identify from
-            return Accepted(noted(examined, f"What accepting the findings changes is not known. {why}"))
+            return Accepted(noted(inferred, f"What accepting the findings changes is not known. {why}"))
         except NotSolved as why:
-            return Accepted(examined, failures={"what accepting changes": str(why)})
-        worst = _worthless(found.examined.diagnosis.findings)
+            return Accepted(inferred, failures={"what accepting changes": str(why)})
+        worst = _worthless(found.inferred.diagnosis.findings)
         if worst is None:
             return found
-        examined = _taken_back(found.examined, worst)
-    return Accepted(examined)
+        inferred = _taken_back(found.inferred, worst)
+    return Accepted(inferred)
 
 
-def noted(examined: Examined, *notes: str) -> Examined:
+def noted(inferred: Inferred, *notes: str) -> Inferred:
     """Return the same with more ``notes`` for the reader."""
-    return replace(examined, diagnosis=replace(examined.diagnosis, notes=(*examined.diagnosis.notes, *notes)))
+    return replace(inferred, diagnosis=replace(inferred.diagnosis, notes=(*inferred.diagnosis.notes, *notes)))
 
 
 def _worthless(findings: tuple[Finding, ...]) -> int | None:
@@ -99,9 +97,16 @@ def _worthless(findings: tuple[Finding, ...]) -> int | None:
     return min(gains, key=lambda k: sum(gains[k])) if gains else None
 
 
-def _taken_back(examined: Examined, index: int) -> Examined:
+def _phi(result: SessionResult, found: Inferred) -> Array:
+    """Return the parameters (10N,) in use: those of the posterior, the table's where only observations judge."""
+    assert result.body is not None
+    phi = found.phi
+    return phi if phi.size else result.body.sip.phi
+
+
+def _taken_back(inferred: Inferred, index: int) -> Inferred:
     """Return the diagnosis without one finding, which is only resembled, and say so."""
-    return noted(without_name(examined, index), _taken_back_words(examined.diagnosis.findings[index]))
+    return noted(inferred.without(index), _taken_back_words(inferred.diagnosis.findings[index]))
 
 
 def _taken_back_words(gone: Finding) -> str:
@@ -112,28 +117,28 @@ def _taken_back_words(gone: Finding) -> str:
     return f"{said} was taken back: accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
 
 
-def _accepted(result: SessionResult, examined: Examined, before: Identification) -> Accepted:
+def _accepted(result: SessionResult, inferred: Inferred, before: Identification) -> Accepted:
     """Return what accepting the findings changes, with all gains."""
-    phi, every = examined.naming.found.phi, examined.named
+    phi, every = _phi(result, inferred), inferred.named
     found = _corrected(result, partial(accept, named=every), phi)
     as_is = _corrected(result, partial(accept, named=()), phi, before)
-    findings = tuple(replace(one, changes=_changes(before, found.identified)) for one in examined.diagnosis.findings)
+    findings = tuple(replace(one, changes=_changes(before, found.identified)) for one in inferred.diagnosis.findings)
     single = len(findings) == 1
     gains = [
-        _gain(as_is if single else _without(result, examined, k), found) if _acts(result, every[k]) else None
+        _gain(as_is if single else _without(result, inferred, k), found) if _acts(result, every[k]) else None
         for k in range(len(findings))
     ]
     findings = tuple(replace(one, gain=gain) for one, gain in zip(findings, gains, strict=True))
-    told = replace(examined, diagnosis=replace(examined.diagnosis, findings=findings))
+    told = replace(inferred, diagnosis=replace(inferred.diagnosis, findings=findings))
     left = (as_is.kept, found.kept) if as_is.kept and found.kept else None
     return Accepted(told, found.identified, left, _gain(as_is, found))
 
 
-def _without(result: SessionResult, examined: Examined, index: int) -> _Corrected | None:
+def _without(result: SessionResult, inferred: Inferred, index: int) -> _Corrected | None:
     """Return the session corrected for all findings but one, their sizes fitted again; None where no body fits."""
-    rest = without_name(examined, index)
+    rest = inferred.without(index)
     try:
-        return _corrected(result, partial(accept, named=rest.named), rest.naming.found.phi)
+        return _corrected(result, partial(accept, named=rest.named), _phi(result, rest))
     except NotSolved:
         return None
 
@@ -144,58 +149,6 @@ def _acts(result: SessionResult, one: NamedCause) -> bool:
     """
     judged = windows(result.trials, KEPT_ROLES) or windows(result.trials, FITTED_ROLES)
     return not one.course or any(window.trial.name in one.course for window in judged)
-
-
-def combined_with_witnesses(
-    result: SessionResult,
-    one: Diagnosis,
-    examined: Examined | None,
-    evidence: ObservedEvidence,
-    measured: Mapping[tuple[str, str], SimulatedSize],
-) -> Diagnosis:
-    """Return the diagnosis with what the witnesses name (`combine_findings`), every correction of a plate or a clock
-    with its gain; one that only makes worse what was not used is taken back, the worst first.
-    """
-    said, notes = infer_causes(evidence), one.notes
-    while True:
-        told = replace(one, notes=notes)
-        whole = combine_findings(told, said, evidence, judged=examined is not None, measured=measured)
-        findings = whole.findings if examined is None else _with_gains(result, examined, whole.findings)
-        worst = _worthless(findings)
-        gone = None if worst is None else findings[worst]
-        rest = tuple(f for f in said.findings if gone is None or (f.effect, f.target) != (gone.effect, gone.target))
-        if gone is None or len(rest) == len(said.findings):
-            return replace(whole, findings=findings)
-        said, notes = replace(said, findings=rest), (*notes, _taken_back_words(gone))
-
-
-def _with_gains(result: SessionResult, examined: Examined, findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Return the findings with the gain of those that nobody has judged yet and that a recording can be corrected for
-    (`accepted_corrections`): all corrections made, against all but this one.
-    """
-    asked = [k for k, one in enumerate(findings) if one.gain is None and accepted_corrections((one,), "")]
-    corrections = accepted_corrections(findings, "")
-    taken = {(one.effect, one.target) for one in corrections}
-    named = tuple(one for one in examined.named if cause_key(one) not in taken)
-
-    def left(without: tuple[str, str] | None = None) -> _Corrected:
-        made = tuple(one for one in corrections if (one.effect, one.target) != without)
-
-        def mend(case: Case) -> Case:
-            case = accept(case, named)
-            return replace(case, trial=corrected_trial(case.trial, made))
-
-        return _corrected(result, mend, examined.naming.found.phi)
-
-    told = list(findings)
-    try:
-        every = left() if asked else None
-        for k in asked:
-            gain = None if every is None else _gain(left((findings[k].effect, findings[k].target)), every)
-            told[k] = replace(findings[k], gain=gain)
-    except (TrialRefused, NotSolved):
-        return findings
-    return tuple(told)
 
 
 def _gain(before: _Corrected | None, after: _Corrected) -> Gain | None:

@@ -102,7 +102,7 @@ def _named(one: Diagnosis) -> Iterator[str]:
 
 def _together(first: Finding, rest: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return the findings that are told in one breath with the first: markers with the same fault."""
-    return tuple(one for one in rest if one.effect == first.effect and names_markers(first.effect))
+    return tuple(one for one in rest if one.effect == first.effect and names_markers(first))
 
 
 def _either(names: Sequence[str]) -> str:

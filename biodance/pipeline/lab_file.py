@@ -6,7 +6,6 @@ from pathlib import Path
 from biodance.cycles.curves import NormalCurve, normal_of
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.corrections import (
-    LASTING,
     PlateCorrection,
     corrected_session,
     corrections_text,
@@ -65,5 +64,5 @@ def lab_text(earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrecti
     """Return the lab.toml that holds what was corrected ``earlier`` and what lasts of what was ``accepted``; "" for
     nothing.
     """
-    lasting = tuple(one for one in accepted if one.effect in LASTING)
+    lasting = tuple(one for one in accepted if one.fault.lasting)
     return corrections_text(joined_corrections(earlier, lasting))

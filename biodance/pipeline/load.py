@@ -6,10 +6,11 @@ from dataclasses import replace
 
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD
+from biodance.effects import CheckKind
 from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
 from biodance.pipeline.checks import load_doubts
-from biodance.pipeline.finding_words import CAUSES_OF_WEIGHT, LOAD, cause_of, explained
+from biodance.pipeline.finding_words import LOAD, cause_of, explained
 from biodance.pipeline.results import SessionResult
 
 
@@ -63,7 +64,7 @@ def with_load(one: Diagnosis, search: LoadSearch | None) -> Diagnosis:
     load = _finding(search, mine[0] if mine else None)
     if mine:
         return _with(one, mine[0], load)
-    alike = next((finding for finding in one.findings if finding.effect in CAUSES_OF_WEIGHT), None)
+    alike = next((finding for finding in one.findings if CheckKind.WEIGHT in finding.cause.explains), None)
     if alike is not None:
         return _with(one, alike, replace(alike, set=(*alike.set, *load.set)))
     told: Verdict = one.verdict if one.faults else "named, incomplete"

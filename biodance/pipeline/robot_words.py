@@ -4,6 +4,9 @@ import numpy as np
 
 from biodance.diagnosis.robot import RobotFinding
 from biodance.diagnosis.robot_columns import RobotCause
+from biodance.effects.plate_crosstalk import PlateCrosstalk
+from biodance.effects.plate_gain import PlateGain
+from biodance.effects.time_delay import TimeDelay
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.identification import SessionIdentification
@@ -35,7 +38,7 @@ def attention_of(trials: list[MatchedTrial]) -> list[Attention]:
             f"What the encoders show at t the plate shows at t {late:+.3f} s; brought together by the motion "
             f"(correlation {one.plate.correlation:.3f})."
         )
-        out.append(Attention("warn" if abs(late) > _APART else "note", clocks, name, "time_delay"))
+        out.append(Attention("warn" if abs(late) > _APART else "note", clocks, name, TimeDelay.name))
         if one.innovation > ODD:
             words = (
                 f"The plate differs from the drawing by {one.innovation:.1f} times what its masses may be off by: look "
@@ -84,9 +87,9 @@ def _finding_sentence(one: RobotFinding) -> str:
             return f"Ground or sole give {where} under a standing foot: {angle} per N·m."
         case "backlash":
             return f"{where} {'have' if several else 'has'} play: {angle} between the two sides."
-        case "plate_gain":
+        case PlateGain.name:
             return f"The plate reads {where} {100 * abs(value):.1f} ± {100 * reach:.1f} % too {_size(value)}."
-        case "plate_crosstalk":
+        case PlateCrosstalk.name:
             return f"The plate's crosstalk from {where} is {100 * value:.1f} ± {100 * reach:.1f} %."
         case _:
             return f"The {_named(one.cause)} is {value:.3g} ± {reach:.2g} {one.cause.unit}."

@@ -16,6 +16,7 @@ from biodance.diagnosis.model import model
 from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.effects import Case
 from biodance.lab.markers.sets import landmark, read_marker_set
+from biodance.lab.plates.faults import DELAY, POSITION, ROTATION
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.over import inside
 from biodance.motion.contact.soles import Soles
@@ -149,7 +150,7 @@ def together(pulls: Iterable[PoseEvidence]) -> tuple[Array, Array]:
     return covariance @ np.sum([one.vector for one in some], axis=0), covariance
 
 
-_SOUGHT = ("plate_position x", "plate_position y", "plate_rotation z", "time_delay")
+_SOUGHT = (f"{POSITION.name} x", f"{POSITION.name} y", f"{ROTATION.name} z", DELAY.name)
 """Tolerances of an installed plate that are no tolerances here: they are what is looked for."""
 _SHORTEST = 0.25
 """s: of walks over two plates no more than 0.3 to 0.9 s are fully measured."""

@@ -7,7 +7,7 @@ from biodance.body.body_file import body_text
 from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
-from biodance.lab.corrections import APPLIED, LASTING, PlateCorrection
+from biodance.lab.corrections import APPLIED, PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, Written, write_corrected, write_mended
 from biodance.pipeline.attention import identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -161,7 +161,7 @@ def _accepted(
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
     if made and (text := lab_text(earlier, made)):
         files[LAB] = text
-        lasting = "; ".join(str(one) for one in made if one.effect in LASTING)
+        lasting = "; ".join(str(one) for one in made if one.fault.lasting)
         written = (*written, Written(LAB, f"to be taken off other sessions: {lasting or 'as before'}"))
     rewritten = (*(one.text for one in undone if one.effect != LabelsSwapped.name), *map(str, made))
     trials, refused = write_corrected(result.session, earlier, made, folder / CORRECTED) if rewritten else ((), ())

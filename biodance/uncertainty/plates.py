@@ -6,12 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, POSITION, ROTATION, PlateFault
 from biodance.records import CHANNELS, Array
-from biodance.spatial import skew
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.tolerances import shipped
 
-PLATE_SOURCES = 49
+SOURCES: tuple[tuple[PlateFault, str], ...] = (
+    *((GAIN, to) if at == to else (CROSSTALK, f"{at}->{to}") for to in CHANNELS for at in CHANNELS),
+    *((fault, axis) for fault in (ROTATION, POSITION) for axis in "xyz"),
+    *((OFFSET, channel) for channel in CHANNELS),
+    (DELAY, ""),
+)
+"""Fault and place of each elementary error."""
+PLATE_SOURCES = len(SOURCES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,20 +36,21 @@ def plate_sources() -> Plates:
     """Return plates with one fault of one standard deviation each: 36 gains and cross-talks, 3 turns, 3 shifts, 6
     offsets, a delay.
     """
-    mixing, offset, delay = np.zeros((PLATE_SOURCES, 6, 6)), np.zeros((PLATE_SOURCES, 6)), np.zeros(PLATE_SOURCES)
-    rows, columns = np.divmod(np.arange(36), 6)
-    mixing[np.arange(36), rows, columns] = [
-        _share(CHANNELS[c], CHANNELS[r]) for r, c in zip(rows, columns, strict=True)
-    ]
-    turn, shift = (
-        skew(np.diag([around_zero(f"{name} {axis}") for axis in "xyz"]))
-        for name in ("plate_rotation", "plate_position")
+    sizes = source_sizes()
+    mixing = np.stack([size * fault.slope(place) for (fault, place), size in zip(SOURCES, sizes, strict=True)])
+    offset = np.stack([size * fault.zero(place) for (fault, place), size in zip(SOURCES, sizes, strict=True)])
+    return Plates(mixing, offset, np.where([fault is DELAY for fault, _ in SOURCES], sizes, 0.0))
+
+
+def source_sizes() -> Array:
+    """Return (m,) one standard deviation of each of `SOURCES`, in the unit of its fault."""
+    means = {OFFSET, DELAY}  # whose mean in sessions without fault is known
+    return np.array(
+        [
+            around_zero(f"{fault.name} {place}".strip(), fault.parameter if fault in means else "")
+            for fault, place in SOURCES
+        ]
     )
-    mixing[36:39, :3, :3] = mixing[36:39, 3:, 3:] = turn
-    mixing[39:42, 3:, :3] = shift
-    offset[42:48] = np.diag([around_zero(f"plate_offset {channel}", "offset") for channel in CHANNELS])
-    delay[48] = around_zero("time_delay", "delay")
-    return Plates(mixing, offset, delay)
 
 
 def around_zero(key: str, parameter: str = "") -> float:
@@ -63,8 +71,3 @@ def plate_errors(wrench: Array, rate: float, noise: Noise, plates: Plates) -> Ar
         np.linalg.inv(noise.shift)
         @ (np.tensordot(near, plates.mixing, axes=(1, 2)).swapaxes(1, 2) + plates.offset.T - late)
     )
-
-
-def _share(source: str, target: str) -> float:
-    """Return how much of one channel shows in another, or errs in itself."""
-    return around_zero(f"plate_gain {source}" if source == target else f"plate_crosstalk {source}->{target}")

@@ -7,62 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from biodance.effects import Quantity
+from biodance.effects.plate_gain import PlateGain
+from biodance.effects.plate_offset import PlateOffset
+from biodance.effects.plate_position import PlatePosition
+from biodance.effects.time_delay import TimeDelay
 from biodance.errors import UnknownName
 
-
-@dataclass(frozen=True)
-class Quantity:
-    """One thing about a plate that is followed over time.
-
-    Parameters
-    ----------
-    name, unit : str
-        ``place_x`` and its unit.
-    effect, target : str
-        Name in `biodance.effects` of the cause of a wrong value, and where on the plate.
-    typical : float
-        Usual standard deviation from visit to visit in a laboratory without fault: where an archive of few visits
-        starts from.
-    matters : float
-        Smaller changes are listed, but are no finding.
-    share : float
-        Of the alarms that chance may raise: more where evidence is thin.
-    norm : float
-        Standard deviation of what is expected of a plate without fault, the same in all visits of a laboratory (where
-        it puts its toe marker): it blurs the level, not a change.
-    """
-
-    name: str
-    unit: str
-    effect: str
-    target: str
-    typical: float
-    matters: float
-    share: float
-    norm: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.typical <= 0:
-            raise ValueError(f"Quantity {self.name}: typical = {self.typical} must be positive.")
-
-
 PLATE_QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
-    {
-        one.name: one
-        for one in (
-            Quantity("place_x", "m", "plate_position", "x", 0.002, 0.003, 0.3, 0.004),
-            Quantity("place_y", "m", "plate_position", "y", 0.002, 0.003, 0.3, 0.004),
-            Quantity("gain", "1", "plate_gain", "Fz", 0.003, 0.01, 0.1),
-            Quantity("offset_x", "N", "plate_offset", "Fx", 0.5, 2.0, 0.05),
-            Quantity("offset_y", "N", "plate_offset", "Fy", 0.5, 2.0, 0.05),
-            Quantity("offset_z", "N", "plate_offset", "Fz", 0.5, 2.0, 0.05),
-            Quantity("delay", "s", "time_delay", "", 0.002, 0.004, 0.15, 0.003),
-        )
-    }
+    {one.name: one for kind in (PlatePosition, PlateGain, PlateOffset, TimeDelay) for one in kind.followed}
 )
-"""By name; typical sizes from docs/benchmarks/plates.md (seven real visits of one laboratory) and the re-zeroing rules
-of laboratory guides (+-5 N).
-"""
+"""By name; what of each cause is followed over time stands in its own file."""
 
 
 @dataclass(frozen=True)

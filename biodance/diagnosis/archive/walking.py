@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
+from biodance.effects.plate_position import PlatePosition
 from biodance.observations import Observation, SeenTrial, observe, sensitivities
 from biodance.records import Array
 
@@ -49,7 +50,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
     for plate in dict.fromkeys(step.plate for step in seen.steps):
         own = tuple(one for one in found if one.plate == plate)
         if own:
-            shifts = [sensitivities(seen, own, "plate_position", f"{plate}:{axis}", "shift") for axis in "xy"]
+            shifts = [sensitivities(seen, own, PlatePosition.name, f"{plate}:{axis}", "shift") for axis in "xy"]
             out += [
                 StepRow(
                     labels[plate],

@@ -13,13 +13,14 @@ size by themselves). Causes that are found by a check instead of a fit (units, l
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from biodance.effects._base.case import Case
-from biodance.effects._base.quality_check import Checked
+from biodance.effects._base.quality_check import Checked, unit_at
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import CHANNELS, Array
 from biodance.spatial import wrench_about_origin
@@ -27,12 +28,34 @@ from biodance.spatial import wrench_about_origin
 
 @dataclass(frozen=True)
 class Parameter:
-    """``name``, ``unit`` as printed, ``typical`` size in that unit and the ``source`` of that size."""
+    """``name``, ``unit`` as printed, ``typical`` size in that unit and the ``source`` of that size.
+
+    Where it is known, ``least`` the smallest size that matters to a laboratory (0: every size does), ``usual`` up to
+    which size laboratories have it without calling it a fault (both by unit, or by channel, where targets differ), and
+    ``alike`` the standard deviation of what careful laboratories have, so that no size is surer than that.
+    """
 
     name: str
     unit: str
     typical: float
     source: str
+    least: float | Mapping[str, float] = 0.0
+    usual: float | Mapping[str, float] = 0.0
+    alike: float = 0.0
+
+    def least_at(self, target: str) -> float:
+        """Return the smallest size at a target that matters."""
+        return self._at(self.least, target)
+
+    def usual_at(self, target: str) -> float:
+        """Return the size at a target up to which laboratories have it without calling it a fault."""
+        return self._at(self.usual, target)
+
+    def _at(self, sizes: float | Mapping[str, float], target: str) -> float:
+        if not isinstance(sizes, Mapping):
+            return sizes
+        unit = sizes.get(unit_at(self.unit, target), 0.0)
+        return sizes.get(target.rpartition(":")[2], unit)
 
 
 @dataclass(frozen=True)
@@ -42,10 +65,7 @@ class Effect(Checked):
     """
 
     target: str = ""
-    name: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    separated_by: ClassVar[str] = ""
-    """The movement that tells this cause from its look-alikes, in words for the analyst."""
     taken_up_by_calibration: ClassVar[bool] = False
     """Whether joints that a movement placed (`motion.functional_joints`) have taken up a part of this cause before
     anybody looks.
@@ -59,6 +79,8 @@ class Effect(Checked):
     """Whether it is named only alone: several at once (cross-talks of a plate that lies elsewhere) are what a cause
     looks like that nobody described.
     """
+    rarer: ClassVar[float] = 0.0
+    """Natural logarithm: so much rarer than other faults it is."""
     screened_at: ClassVar[tuple[float, ...]] = ()
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
@@ -68,8 +90,6 @@ class Effect(Checked):
     """
     distinguished_by: ClassVar[str] = ""
     """The parameter without which it is another, simpler cause (a load in which nothing sloshes); "" for none."""
-    advice: ClassVar[str] = ""
-    """What to do in the laboratory to settle it, and how it is mended."""
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
@@ -125,22 +145,6 @@ class Effect(Checked):
         quicker.
         """
         return self.transform(case, np.asarray(theta, dtype=float)).residual - case.residual
-
-    def local(self, case: Case) -> Array | None:
-        """Return (T, 6, k): what one unit of each of k parameters of this trial alone adds, for a cause that comes and
-        goes; None for the others. The k parameters follow one another in time, as many for each of `parameters`.
-        """
-        return None
-
-    def beside(self, place: Array) -> "Effect | None":
-        """Return the cause where it acts ``place`` (3,) m from its usual point, in the axes of its segment; None for
-        one that acts at no point.
-        """
-        return None
-
-    def at_full_rate(self) -> "Effect":
-        """Return the cause with the finest allowed time course (`local`)."""
-        return self
 
     def marker_columns(self, case: Case) -> Array | None:
         """Return (K, 3, p) m per unit: what one unit adds to ``case.marker_residual``; None where the markers say
@@ -198,17 +202,11 @@ class Effect(Checked):
         """Return whether a cause of size ``theta`` (p,) can be in the person and laboratory of ``case``."""
         return self.possible(theta)
 
-    def reported(self, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
+    def reported(self, case: Case, theta: Array, sd: Array) -> tuple[tuple[str, float, float, str], ...]:
         """Return name, value, standard deviation and unit of what a report prints for ``theta`` (p,) with ``sd``
-        (p,).
+        (p,) in ``case``.
         """
         return tuple((p.name, float(t), float(s), p.unit) for p, t, s in zip(self.parameters, theta, sd, strict=True))
-
-    def origin(self, case: Case) -> Array:
-        """Return (p,) what a report adds to the parameters, so that they count from where everything else counts: a
-        place from the joint of its segment; by default nothing.
-        """
-        return np.zeros(len(self.parameters))
 
     def reported_size(self, size: float) -> float:
         """Return a detection limit in reported form, from a ``size`` of the first parameter; by default the same."""
@@ -243,11 +241,6 @@ class ChannelEffect(Effect, ABC):
         """Return what one unit adds to the channel, moved to the lab origin."""
         only = self.in_channel(case)[:, None] * np.eye(6)[self.channel]
         return wrench_about_origin(only, self.plate_of(case).centre)[:, :, None]
-
-
-def plate_axis_targets(case: Case) -> tuple[str, ...]:
-    """Return the targets ``plate1:x``, ``plate1:y``, ``plate1:z`` of every plate."""
-    return tuple(f"{plate.name}:{axis}" for plate in case.trial.plates for axis in "xyz")
 
 
 def axis_vector(target: str) -> Array:

@@ -10,6 +10,8 @@ from functools import cached_property
 from typing import ClassVar
 
 from biodance.effects._base.case import Case
+from biodance.effects._base.quantity import Quantity
+from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass, newton_of
 from biodance.records import Session, Trial
 
@@ -63,7 +65,26 @@ class Recorded:
 class Checked:
     """A cause of either kind, as a look at the recordings before any statistics finds it. What is so large that gates
     would throw away the very frames that show it is found here, and undone in a copy before all else is judged.
+
+    All that is known of a cause stands in its own file: what is not said there is as below.
     """
+
+    name: ClassVar[str] = ""
+    separated_by: ClassVar[str] = ""
+    """The movement or measurement that settles it or tells it from its look-alikes, in words for the analyst."""
+    advice: ClassVar[str] = ""
+    """What to do in the laboratory to settle it, and how it is mended."""
+    about: ClassVar[About] = About()
+    words: ClassVar[CauseWords | None] = None
+    """How a person is told of it; None: by its name and its advice."""
+    explains: ClassVar[tuple[CheckKind, ...]] = ()
+    """Checks outside their limits that may come from it; one of weight adds or takes weight, as a load does."""
+    raw: ClassVar[bool] = False
+    """Whether it spoils the raw channels: what feet, clocks and weights measure in such recordings has no size."""
+    followed: ClassVar[tuple[Quantity, ...]] = ()
+    """What is followed of it from visit to visit in an archive."""
+    habit: ClassVar[bool] = False
+    """Whether it is no fault of an instrument: told as a finding, and nothing is wrong with it alone."""
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
@@ -86,12 +107,6 @@ class DiscreteEffect(Checked, ABC):
     when it is found.
     """
 
-    name: ClassVar[str] = ""
-    separated_by: ClassVar[str] = ""
-    """The movement or measurement that settles it, in words for the analyst."""
-    advice: ClassVar[str] = ""
-    """How it is mended."""
-
     @classmethod
     @abstractmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
@@ -101,6 +116,17 @@ class DiscreteEffect(Checked, ABC):
 def unit_of(target: str) -> str:
     """Return the unit of the channel that a target names last: N or N·m."""
     return "N·m" if target.rpartition(":")[2].startswith("M") else "N"
+
+
+def unit_at(unit: str, target: str) -> str:
+    """Return a parameter's ``unit`` at a target, where it is another one at each (``N or N·m``)."""
+    if " or " not in unit:
+        return unit
+    source, arrow, channel = target.rpartition("->")
+    if not arrow:
+        return unit_of(target)
+    first, second = unit_of(source), unit_of(channel)
+    return "1" if first == second else "m" if first == "N" else "1/m"
 
 
 Found = tuple[str, str, str]

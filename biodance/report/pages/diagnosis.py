@@ -2,8 +2,6 @@
 what changes.
 """
 
-import sys
-from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -15,7 +13,6 @@ from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Unobservable
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY
-from biodance.effects import discrete_effects, effects
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
@@ -111,28 +108,6 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     return f'<div class="single">{drawn}</div>'
 
 
-@dataclass(frozen=True)
-class Words:
-    """What a cause is, its signature, its look-alikes and what separates them, each a few sentences."""
-
-    what: str
-    signature: str
-    alike: str
-    separated: str
-
-
-def words_of(effect: str) -> Words:
-    """Return the words of an effect; empty ones for a cause that has no file (any more)."""
-    kind = {**effects(), **discrete_effects()}.get(effect)
-    text = " ".join(((sys.modules[kind.__module__].__doc__ if kind else "") or "").split())
-    what, _, rest = text.partition("Signature:")
-    signature, _, rest = rest.partition("Look-alikes:")
-    alike, _, separated = rest.partition("Separated by")
-    return Words(
-        what.strip(), first_upper(signature.strip()), first_upper(alike.strip()), first_upper(separated.strip())
-    )
-
-
 def first_upper(text: str) -> str:
     """Return ``text`` with a capital first letter and nothing else changed."""
     return text[:1].upper() + text[1:]
@@ -219,7 +194,6 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         scripts=[template_text("curves.js")],
         sheet=Markup(print_sheet(f"Session {result.session.folder.name}", provenance.visit, made)),
         named=named,
-        words_of=words_of,
         unseen=[(row, size) for row, size in unseen if size != NEVER],
         never=causes_by_effect((row.effect, row.target) for row, size in unseen if size == NEVER),
         result=result,

@@ -1,0 +1,46 @@
+"""What is said of a cause: what it is for the analyst's page, and how a person is told of it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+@dataclass(frozen=True)
+class About:
+    """``what`` a cause is, its ``signature``, its ``look_alikes`` and what it is ``settled_by``, each a few sentences
+    of the analyst's page.
+    """
+
+    what: str = ""
+    signature: str = ""
+    look_alikes: str = ""
+    settled_by: str = ""
+
+
+@dataclass(frozen=True)
+class CauseWords:
+    """How a cause is told: the ``fact`` about {it} with its {size} and the interval {between}, {more} where it is
+    positive; what to ``do``; its name as an ``alternative``; the two words of {more}; ``signs`` what a positive and a
+    negative size mean where the number stands alone.
+    """
+
+    fact: str
+    do: str
+    alternative: str
+    more: tuple[str, str] = ("", "")
+    signs: tuple[str, str] = ("", "")
+
+
+class CheckKind(StrEnum):
+    """Checks of a session that a cause may explain, by the beginning of their names."""
+
+    WEIGHT = "mass on the plates"
+    PRESSURE = "centre of mass off the centre of pressure"
+    MARKERS = "marker distance"
+    FORCES = "force difference"
+
+
+ACCEPT = "or accept the correction."
+CALIBRATE = f"Calibrate the plate, {ACCEPT}"
+MEASURE_CORNERS = f"Measure its corners, {ACCEPT}"
+RECORD_AGAIN = "Correct it, and run this again."
+TOO_MUCH = ("much", "little")

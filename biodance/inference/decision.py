@@ -1,0 +1,283 @@
+"""What a session ends with: the posterior and what matters, decided once.
+
+A cause is named where it, or a look-alike in its place, is there with at least the probability `NAMED`, and what it
+does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place. Its size is averaged over
+all sets of causes that hold it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from biodance.diagnosis.candidates import changes
+from biodance.diagnosis.consequence import matters, unit_at
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.model import NamedCause
+from biodance.diagnosis.reasons import Reason
+from biodance.effects.toe_landmark import ToeLandmark
+from biodance.inference.left import adequacy
+from biodance.inference.rows import BODY, Rows
+from biodance.inference.scales import SOFT, prior_sd
+from biodance.inference.sets import Hypothesis, Posterior, Search, cause_key, hypothesis
+from biodance.records import SIDES, Array
+from biodance.uncertainty.tolerances import key_of
+from biodance.observations import LANDMARK, shift_per_sd
+
+NAMED, SUGGESTED = 0.85, 0.5
+"""Probability from which a cause is named, and from which it is told as only resembled."""
+IN_SET = 0.95
+"""Share of the posterior of its place that the set of a cause holds."""
+_FAR = 3.0
+"""Standard deviations of the logarithm of a scale beyond which body or soft tissue are unlike people."""
+_HABIT = 0.010
+"""m: a marker beside the second ray, or a heel marker on a thick sole, is as anywhere."""
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """One cause of the most probable set and what may stand in its place: ``cause`` with its size averaged over all
+    sets; ``probability`` that any of them is there; ``shares`` of them, most probable first, with the log Bayes factor
+    of each against none.
+    """
+
+    cause: NamedCause
+    probability: float
+    shares: tuple[tuple[Key, float, float], ...]
+
+    @property
+    def set(self) -> tuple[Alias, ...]:
+        """The smallest set of look-alikes with `IN_SET` of the posterior, the cause first."""
+        kept, sum_ = [], 0.0
+        for name, share, bayes in self.shares:
+            if sum_ < IN_SET:
+                kept.append(Alias(*name, bayes))
+            sum_ += share
+        own = cause_key(self.cause)
+        return tuple(sorted(kept, key=lambda alias: (alias.effect, alias.target) != own))
+
+
+@dataclass(frozen=True, eq=False)
+class Inferred:
+    """A diagnosis with the posterior that it was decided from: ``named`` the causes of its findings, in their order."""
+
+    diagnosis: Diagnosis
+    search: Search
+    posterior: Posterior
+    named: tuple[NamedCause, ...] = ()
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable set of causes."""
+        return self.posterior.best
+
+    @property
+    def phi(self) -> Array:
+        """(10N,) most probable parameters of the body beside the named causes."""
+        return hypothesis(self.search, self.named).phi if self.named else self.posterior.best.phi
+
+    def without(self, index: int) -> "Inferred":
+        """Return the session without finding ``index``, the other sizes fitted again."""
+        rest = (*self.named[:index], *self.named[index + 1 :])
+        findings, gone = self.diagnosis.findings, self.diagnosis.findings[index]
+        told = replace(
+            self.diagnosis,
+            findings=(*findings[:index], *findings[index + 1 :]),
+            resembles=(*self.diagnosis.resembles, gone),
+        )
+        fitted = hypothesis(self.search, tuple(one for one in rest if not one.course)).causes if rest else ()
+        return replace(self, diagnosis=told, named=(*fitted, *(one for one in rest if one.course)))
+
+
+def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
+    """Return every cause of the most probable set, with what may stand in its place."""
+    best = posterior.best
+    total = {one.names: float(np.logaddexp(one.log_posterior, one.log_unknown)) for one in posterior.hypotheses}
+    out = []
+    for cause in best.causes:
+        rest = best.names - {cause_key(cause)}
+        here = {
+            next(iter(names - rest)): v for names, v in total.items() if len(names) == len(best.names) and rest < names
+        }
+        none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
+        shares = sorted(
+            ((name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()),
+            key=lambda one: -one[1],
+        )
+        out.append(Place(_averaged(posterior, cause), float(1 / (1 + np.exp(none - some))), tuple(shares)))
+    return tuple(out)
+
+
+def _averaged(posterior: Posterior, cause: NamedCause) -> NamedCause:
+    """Return a cause with mean and covariance of its size over all hypotheses that hold it."""
+    if cause.course:
+        return cause
+    found = [
+        (weight, one.whole(own), own.covariance)
+        for one, weight in zip(posterior.hypotheses, posterior.weights.sum(axis=1), strict=True)
+        for own in one.causes
+        if cause_key(own) == cause_key(cause) and weight > 0
+    ]
+    weight = np.array([one[0] for one in found])
+    weight /= weight.sum()
+    size = np.array([one[1] for one in found])
+    mean = weight @ size
+    spread = np.einsum("h,hi,hj->ij", weight, size - mean, size - mean)
+    return replace(cause, theta=mean, covariance=np.einsum("h,hij->ij", weight, [one[2] for one in found]) + spread)
+
+
+def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
+    """Return what a session ends with; ``bare`` its diagnosis before any judgement of causes."""
+    rows, best = search.rows, posterior.best
+    every = [(place, _finding(place, rows, best)) for place in places(posterior, search.prior)]
+    named = [(p, f) for p, f in every if p.probability >= NAMED and _told(rows, p.cause)]
+    resembled = [f for p, f in every if SUGGESTED <= p.probability < NAMED and _told(rows, p.cause)]
+    small = [f for p, f in every if p.probability >= SUGGESTED and not _told(rows, p.cause)]
+    left = adequacy(best, rows) if rows.problem is not None else ()
+    unknown = posterior.unknown >= 0.5 and any(row.matters and row.z > 0 for row in left)
+    why = dict(bare.why) | dict.fromkeys(_strange(best, rows) if unknown or named else (), ())
+    why |= {Reason.FORCES_LEFT: ()} if unknown else {}
+    verdict: Verdict = "unexplained" if unknown else "nothing wrong"
+    if named:
+        verdict = "named, incomplete" if unknown or resembled else "named, complete"
+    findings = tuple(replace(f, set=(*f.set, *_habit_alias(p, best, rows))) for p, f in named)
+    habit = _habit(best, rows, findings)
+    clean = float(posterior.weights[[not one.causes for one in posterior.hypotheses], 0].sum())
+    told = replace(
+        bare,
+        verdict=verdict,
+        why=why,
+        findings=(*findings, *habit),
+        resembles=tuple(resembled),
+        tolerated=tuple(small),
+        adequacy=left,
+        candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
+        probability=posterior.unknown
+        if verdict == "unexplained"
+        else clean
+        if not named
+        else max(p.probability for p, _ in named),
+    )
+    return Inferred(told, search, posterior, tuple(p.cause for p, _ in named))
+
+
+def _told(rows: Rows, one: NamedCause) -> bool:
+    """Return whether a cause is large enough to be told: its size matters, and what it changes in this session's wrench
+    does; one that only observations show must be larger than laboratories have without calling it a fault.
+    """
+    if not matters(one.effect, one.theta):
+        return False
+    if one.course:
+        return True
+    if rows.problem is None:
+        usual = one.effect.parameters[0].usual_at(one.effect.target)
+        return bool(abs(one.theta[0]) > usual + one.covariance[0, 0] ** 0.5)
+    felt = rows.problem.felt(changes(rows.problem, one.effect, one.theta)[:, None])[0]
+    return bool(felt >= 1.0 or (rows.observed(one.effect) != 0).any())
+
+
+def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
+    """Return a cause as a finding; no size is surer than sessions without fault are alike, nor than faults are like
+    their models.
+    """
+    one, known = place.cause, rows.tolerances
+    theta, covariance = one.theta, one.covariance
+    if rows.problem is not None and not one.course:
+        theta = one.effect.measured(theta, *rows.problem.cases)
+    alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
+    units = np.array([parameter.unit for parameter in one.effect.parameters])
+    length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
+    sd = np.hypot(np.maximum(np.sqrt(np.diag(covariance)), alike), known.model_error(one.effect.name) * length)
+    if rows.problem is None:
+        reported = tuple(
+            (p.name, float(t), float(s), p.unit) for p, t, s in zip(one.effect.parameters, theta, sd, strict=True)
+        )
+    else:
+        reported = one.effect.reported(rows.problem.cases[0], theta, sd)
+    sizes = tuple(Estimate(name, size, own, unit_at(one.effect, unit)) for name, size, own, unit in reported)
+    return Finding(
+        one.effect.name,
+        one.effect.target,
+        sizes,
+        place.set,
+        _visible(one, rows, best),
+        advice=one.effect.advice,
+        probability=place.probability,
+        kind=one.effect,
+    )
+
+
+def _visible(one: NamedCause, rows: Rows, best: Hypothesis) -> float:
+    """Return the share of a cause that is left when all that is no fault may adapt."""
+    if one.course or not one.covariance.size:
+        return 1.0
+    slope = rows.slopes(one.effect, one.theta)[:, 0]
+    slope[: rows.plates] *= np.exp(-best.fit.scales.noise)
+    known = 1 / max(one.covariance[0, 0], 1e-300) - 1 / (3 * one.effect.typical[0]) ** 2
+    return float(np.sqrt(np.clip(known / max(float(slope @ slope), 1e-300), 0.0, 1.0)))
+
+
+def _strange(best: Hypothesis, rows: Rows) -> tuple[Reason, ...]:
+    """Return what had to be unlike people or laboratories for the rest to fit."""
+    far = dict(zip(rows.groups, best.fit.scales.groups / prior_sd(rows), strict=True))
+    body = far.get(BODY, 0.0) > _FAR
+    soft = any(far.get(name, 0.0) > _FAR for name in SOFT)
+    other = any(value > _FAR for name, value in far.items() if name != BODY and name not in SOFT)
+    strange = {Reason.UNUSUAL_BODY: body, Reason.OUTSIDE_TOLERANCES: soft or other}
+    return tuple(reason for reason, holds in strange.items() if holds)
+
+
+def _landmarks(best: Hypothesis, rows: Rows) -> dict[str, tuple[float, float]]:
+    """Return by shared error how far (m) the markers of both feet lie beside where they are expected, with its standard
+    deviation.
+    """
+    if rows.evidence is None:
+        return {}
+    first = rows.X.shape[1] - len(rows.evidence.norms)
+    found = {}
+    for k, name in enumerate(rows.evidence.norms):
+        if LANDMARK in name:
+            at, per = first + k, shift_per_sd(name)
+            unit = np.zeros(len(best.fit.u))
+            unit[at] = best.fit.size[at]
+            sd = float(np.sqrt(max(best.fit.variance(unit), 0.0)))
+            found[name] = per * float(best.fit.coefficients[at]), per * sd
+    return found
+
+
+def _habit(best: Hypothesis, rows: Rows, findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Return how far the markers of both feet lie beside where they are expected, where that is clearly shown: a habit
+    of the laboratory.
+    """
+    shown = {name: (v, sd) for name, (v, sd) in _landmarks(best, rows).items() if abs(v) > max(_HABIT + sd, 2 * sd)}
+    contacts = {
+        one.contact
+        for one in (rows.evidence.observations if rows.evidence else ())
+        if any(LANDMARK in n for n in one.norms)
+    }
+    if not shown or len(contacts) < 2 or any(a.effect == ToeLandmark.name for f in findings for a in f.set):
+        return ()
+    sizes = tuple(
+        Estimate("backwards" if name.endswith("along") else "inwards", v, sd, "m") for name, (v, sd) in shown.items()
+    )
+    own = Alias(ToeLandmark.name, _feet(rows), float("inf"))
+    return (Finding(own.effect, own.target, sizes, (own,), 1.0, advice=ToeLandmark.advice),)
+
+
+def _habit_alias(place: Place, best: Hypothesis, rows: Rows) -> tuple[Alias, ...]:
+    """Return the feet's markers as a look-alike of a cause that stands on feet alone and is less sure than `IN_SET`."""
+    if place.probability >= IN_SET or rows.problem is not None or rows.evidence is None:
+        return ()
+    feet = np.array([any(LANDMARK in name for name in one.norms) for one in rows.evidence.observations])
+    seen = rows.observed(place.cause.effect).any(axis=1)
+    return (Alias(ToeLandmark.name, _feet(rows), 0.0),) if (feet & seen).any() else ()
+
+
+def _feet(rows: Rows) -> str:
+    """Return the side of the only foot seen on plates, or both."""
+    names = rows.evidence.norms if rows.evidence else ()
+    seen = [side for side in SIDES if any(name.startswith(f"person {side} ") for name in names)]
+    return seen[0] if len(seen) == 1 else "both"

@@ -1,0 +1,166 @@
+"""A session's posterior from what was recorded: which rows judge it, and the diagnosis that follows."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.diagnosis.candidates import Candidate
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
+from biodance.diagnosis.naming import build_model, causes_of
+from biodance.diagnosis.observability import detection_limits, hidden, visibility
+from biodance.diagnosis.problem import Problem, TrialWindow, problem
+from biodance.diagnosis.reasons import Reason
+from biodance.diagnosis.witness_evidence import ObservedEvidence
+from biodance.effects import Case, Cause, Effect
+from biodance.inference.decision import Inferred, decide
+from biodance.inference.left import adequacy
+from biodance.inference.rows import observed_causes, rows_of
+from biodance.inference.scales import fit, nominal, prior_sd, products
+from biodance.inference.sets import Search, hypothesis, infer, with_unknown
+from biodance.records import Sip
+from biodance.threads import one_thread
+from biodance.uncertainty.tolerances import Tolerances
+
+_SIGN = 0.005
+"""Probability that a channel of a session has the wrong sign, before any data."""
+_SURE = 0.85
+"""Probability from which it is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a session shows: the ``problem`` of its simulated trials (None without any), all ``causes`` with their
+    columns, and whether it is only quiet ``standing``, in which no cause of the simulation has a size.
+    """
+
+    problem: Problem | None
+    causes: tuple[Candidate, ...]
+    standing: bool = False
+
+
+def see(
+    body: Body, windows: tuple[TrialWindow, ...], known: Tolerances, asked: Mapping[str, Cause], prior: Sip | None
+) -> Seen:
+    """Return what the trials ``windows`` of ``body`` show.
+
+    Raises
+    ------
+    TrialRefused
+        No trial has a second of believable, fully measured frames.
+    """
+    kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
+    posed = problem(body, windows, prior=prior, chosen=kinds)
+    standing = not any(is_moving(case) for case, picks in zip(posed.cases, posed.spectrum.picks, strict=True) if picks)
+    return Seen(posed, causes_of(posed, known, kinds), standing)
+
+
+@one_thread()
+def judge(
+    seen: Seen | None,
+    evidence: ObservedEvidence,
+    known: Tolerances,
+    asked: Mapping[str, Cause],
+    bare: Diagnosis,
+    *,
+    simulate: bool = True,
+) -> Inferred | None:
+    """Return the diagnosis of a session from everything it shows; from observations alone where nothing was ``seen``,
+    it only stands, or the simulation cannot be believed (``simulate`` False). None where there is nothing at all.
+    """
+    if seen is not None and seen.problem is not None:
+        bare = _with_limits(bare, seen, known, asked)
+        if seen.standing:
+            bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()})
+    if seen is not None and seen.problem is not None and simulate and not seen.standing:
+        rows = rows_of(seen.problem, seen.causes, known, evidence)
+        causes = tuple(one for one in seen.causes if one.names[0] in asked)
+    else:
+        if not evidence.counting.observations:
+            return None
+        causes = observed_causes(evidence, asked)
+        rows = rows_of(None, causes, known, evidence)
+    search = Search.of(rows, causes)
+    found = decide(search, infer(search), bare)
+    sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
+    if sign:  # what all other causes do holds only once the sign is mended
+        told = replace(found.diagnosis, findings=sign, verdict="named, incomplete")
+        found = replace(found, diagnosis=told, named=())
+    if rows.problem is None and seen is not None and seen.problem is not None:
+        found = replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
+    return found
+
+
+def is_moving(case: Case) -> bool:
+    """Return whether the person does more than stand: the centre of mass of any segment moves by more than in quiet
+    standing (`StandingRules.still`), and the trial is not the static one.
+    """
+    place = case.poses.points(list(range(len(case.body.segments))), case.body.sip.com)
+    away = np.sqrt(np.mean(np.sum((place - place.mean(axis=0)) ** 2, axis=2), axis=0))
+    return case.trial.role != "static" and bool(away.max() > case.trial.settings.standing.still)
+
+
+def _with_limits(bare: Diagnosis, seen: Seen, known: Tolerances, asked: Mapping[str, Cause]) -> Diagnosis:
+    """Return the diagnosis with the smallest sizes of all causes that the session would show."""
+    assert seen.problem is not None
+    kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
+    first, causes = build_model(seen.problem, known, kinds, seen.causes)
+    limits = detection_limits(visibility(first, causes), seen.problem.cases[0].body, known.threshold)
+    rows = tuple(sorted(limits, key=lambda row: row.limit / row.typical))
+    return replace(bare, limits=rows, unobservable=hidden(limits), notes=(*bare.notes, *seen.problem.notes))
+
+
+def _with_rest(one: Diagnosis, seen: Seen, known: Tolerances) -> Diagnosis:
+    """Return the diagnosis with what the body leaves of the forces, where only observations were asked for causes."""
+    assert seen.problem is not None
+    rows = rows_of(seen.problem, seen.causes, known, None)
+    bare = with_unknown(hypothesis(Search.of(rows, ()), ()))
+    left = adequacy(bare, rows)
+    unknown = bare.log_unknown > bare.log_posterior and any(row.matters and row.z > 0 for row in left)
+    if not unknown:
+        return replace(one, adequacy=left)
+    verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
+    return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()})
+
+
+def _turned(
+    evidence: ObservedEvidence, known: Tolerances, causes: Sequence[Candidate], asked: Mapping[str, Cause]
+) -> tuple[Finding, ...]:
+    """Return the channel whose sign, turned back, puts the pressure under the feet and makes a step brake first and
+    push then; () where none is more probable than all signs as they are.
+    """
+    counting, found = evidence.counting, []
+    for name, turned in counting.sign_reversed.items():
+        here = np.isfinite(turned)
+        if not here.any():
+            continue
+        as_is, other = (_log_evidence(counting, here, values, known, causes) for values in (None, turned))
+        found.append((other - as_is + np.log(_SIGN / (1 - _SIGN) / len(counting.sign_reversed)), name))
+    if not found:
+        return ()
+    best, name = max(found)
+    probability = float(1 / (1 + np.exp(-best)))
+    if probability < _SURE or counting.contacts() < 2:
+        return ()
+    alike = tuple(Alias(*other, float(value)) for value, other in sorted(found, reverse=True) if best - value <= 3.0)
+    advice = f"With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then. {asked[name[0]].advice}"
+    return (Finding(*name, (), alike, 1.0, advice=advice, probability=probability, kind=asked[name[0]]),)
+
+
+def _log_evidence(
+    evidence: ObservedEvidence,
+    here: np.ndarray,
+    values: np.ndarray | None,
+    known: Tolerances,
+    causes: Sequence[Candidate],
+) -> float:
+    """Return the log evidence of some observations without any cause, with other ``values`` minus expectation."""
+    kept = [one for one, there in zip(evidence.observations, here, strict=True) if there]
+    if values is not None:
+        kept = [replace(one, value=one.expected + v) for one, v in zip(kept, values[here], strict=True)]
+    some = replace(
+        evidence, observations=tuple(kept), sensitivities={n: t[here] for n, t in evidence.sensitivities.items()}, sign_reversed={}
+    )
+    rows = rows_of(None, causes, known, some)
+    return fit(products(rows, rows.X, rows.y, rows.group), prior_sd(rows), nominal(rows)).log_evidence
