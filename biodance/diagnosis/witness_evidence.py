@@ -77,20 +77,16 @@ class ObservedEvidence:
 
     def only(self, names: Collection[str]) -> "ObservedEvidence":
         """Return the evidence of some observations alone, by the names of their observers."""
-        kept = np.array([one.observer in names for one in self.observations], dtype=bool)
-        return replace(
-            self,
-            observations=tuple(one for one in self.observations if one.observer in names),
-            sensitivities={name: column[kept] for name, column in self.sensitivities.items()},
-            sign_reversed={},
-        )
+        kept = [i for i, one in enumerate(self.observations) if one.observer in names]
+        columns = {name: column[kept] for name, column in self.sensitivities.items()}
+        found = tuple(self.observations[i] for i in kept)
+        return replace(self, observations=found, sensitivities=columns, sign_reversed={})
 
     def columns(self, effect: str, target: str, parameters: Sequence[str]) -> Array:
         """Return (n, p) what one unit of each of the ``parameters`` (p) of an effect adds to the observations; 0 where
         an observation does not respond. A row is in the unit of its observation, as ``value - expected`` is.
 
-        ``effect``, ``target`` and ``parameters`` as in the family of effects, not only of the ``causes`` that are
-        looked for.
+        ``effect``, ``target`` and ``parameters`` as in the family of effects, of others than the ``causes``, too.
         """
         return _columns(self.recorded, self.observations, effect, target, parameters)
 
