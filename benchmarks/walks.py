@@ -18,18 +18,18 @@ import numpy as np
 from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.diagnosis.witness_evidence import WitnessEvidence, collect_evidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence, collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
 from biodance.effects import check_quality
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.plates.parameters import count_plates
 from biodance.lab.session.read import read_session
+from biodance.observations import SeenTrial, observe, recording
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Session
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
-from biodance.witnesses import SeenTrial, observe, recording
 
 CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
 SESSIONS = (*CHILDREN, "adl_gait", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "pycgm",
@@ -108,7 +108,7 @@ def copied(files: list[Path], folder: Path, text: str) -> Path:
     return folder
 
 
-def named(session: Session, evidence: WitnessEvidence) -> tuple[Finding, ...]:
+def named(session: Session, evidence: ObservedEvidence) -> tuple[Finding, ...]:
     """Return what checks and witnesses name in a session."""
     checks = [
         quality for quality in check_quality(session) if not quality.ok and quality.effect in ("clipping", "axis_error")

@@ -28,7 +28,7 @@ CONTRACTS = {
     "biodance.dance.limits": {"LIMIT"},
     "biodance.lab.readers": {"NAME", "EXTENSIONS", "PREFERENCE", "FOLLOWS_TOLD", "sniff", "read"},
     "biodance.body.export": {"FORMAT", "SUFFIX", "text", "data", "beside"},
-    "biodance.witnesses": {"WITNESS"},
+    "biodance.observations": {"OBSERVER"},
 }
 """Family -> the names that every member gives because its contract asks for them."""
 FAMILIES = {*CONTRACTS, "biodance.body.tables.segment_data", "biodance.lab.markers.sets"}
@@ -239,7 +239,7 @@ APART = ("biodance.effects", "biodance.virtual_lab")
 """Rooms that name effects: their own, and the one that makes faults without their formulas."""
 
 
-SEEN = "biodance.witnesses."
+SEEN = "biodance.observations."
 """Each witness says in its own file which effects it is for, as ``Member.name``: a fact of the witness."""
 
 

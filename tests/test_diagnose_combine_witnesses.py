@@ -10,8 +10,7 @@ from biodance.diagnosis.combine_witnesses import SimulatedSize, combine_findings
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Unobservable
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_inference import WitnessFindings
-from biodance.witnesses import Observation
-from biodance.witnesses._causes import Alteration
+from biodance.observations import ObservableCause, Observation
 
 NECK = {Reason.UNDESCRIBED_JOINTS: ("neck",)}
 
@@ -23,7 +22,7 @@ def finding(effect: str, target: str, value: float, unit: str, *alike: tuple[str
 
 NAMES = ("plate_position", "plate1:y")
 
-HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
+HEARD = witness_evidence.ObservedEvidence((), {}, {}, {})
 
 LOAD = finding("added_mass", "right_forearm_hand", 2.4, "kg")
 
@@ -45,12 +44,12 @@ def test_a_witness_is_believed_where_the_simulation_is_blind_or_finds_nothing_wr
     assert [f.effect for f in one.findings] == ["body_mass"]
 
 
-def heard(names: tuple[str, str], witness: str, value: float, sd: float) -> witness_evidence.WitnessEvidence:
+def heard(names: tuple[str, str], witness: str, value: float, sd: float) -> witness_evidence.ObservedEvidence:
     """Return one observation that shows a cause of size ``value``, and its look-alike `OTHER` one to one."""
     step, unit = (0.004, "s") if names[0] == "time_delay" else (0.005, "m")
     there = Observation(witness, "somewhere", "static", value, sd, 0.0, unit)
-    causes = {one: Alteration(*one, "size", unit, step, lambda seen, size: seen) for one in (names, OTHER)}
-    return witness_evidence.WitnessEvidence((there,), causes, dict.fromkeys(causes, np.ones(1)))
+    causes = {one: ObservableCause(*one, "size", unit, step) for one in (names, OTHER)}
+    return witness_evidence.ObservedEvidence((there,), causes, dict.fromkeys(causes, np.ones(1)))
 
 
 OTHER = ("plate_position", "plate2:y")

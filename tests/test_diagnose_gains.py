@@ -13,7 +13,7 @@ from biodance.diagnosis.accept import case_fit
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.diagnosis.engine import Examined, assess, diagnose_trials
 from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effect
 from biodance.identification.identification import identify_body
@@ -99,9 +99,9 @@ def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_
     assert wrong.gain is not None
     assert wrong.gain.ci95[1] < 0
     assert set(right.gain.trials) == {window.trial.name for window in every[2 * kept :]}
-    said = WitnessFindings((RIGHT, WRONG), WitnessEvidence((), {}, {}))
+    said = WitnessFindings((RIGHT, WRONG), ObservedEvidence((), {}, {}))
     monkeypatch.setattr(gains, "infer_causes", lambda _: said)
-    told = gains.combined_with_witnesses(result, found.diagnosis, found, WitnessEvidence((), {}, {}), {})
+    told = gains.combined_with_witnesses(result, found.diagnosis, found, ObservedEvidence((), {}, {}), {})
     assert [one.effect for one in told.findings] == ["plate_gain"]
     assert any(note.startswith("plate position plate1:x was taken back: accepting it") for note in told.notes)
 

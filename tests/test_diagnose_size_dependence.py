@@ -20,9 +20,8 @@ from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import changes_wrench, size_dependences
 from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effects
+from biodance.observations import ObservableCause, Observation
 from biodance.pipeline.reason_words import reason_notes
-from biodance.witnesses import Observation
-from biodance.witnesses._causes import Alteration
 
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
 
@@ -130,7 +129,7 @@ def a_finding(value: float, varies_with: str = "") -> Finding:
     return Finding(*ZERO, (size,), (Alias(*ZERO, 30.0),), 0.5, varies_with=varies_with)
 
 
-HEARD = witness_evidence.WitnessEvidence((), {}, {}, {})
+HEARD = witness_evidence.ObservedEvidence((), {}, {}, {})
 DOUBTED = Diagnosis("unexplained", (), limits=(Unobservable(*ZERO, 2.0, "N"),), why={Reason.TOLERANCES_DO_NOT_HOLD: ()})
 
 
@@ -155,10 +154,10 @@ def weighed(value: float, sd: float, varies_with: str = "") -> Finding:
     return Finding(*MASS, (Estimate("error", value, sd, "kg"),), (Alias(*MASS, 12.0),), 0.5, varies_with=varies_with)
 
 
-def observed(witness: str) -> witness_evidence.WitnessEvidence:
+def observed(witness: str) -> witness_evidence.ObservedEvidence:
     one = Observation(witness, "mass", "stand", 66.0, 0.5, 70.0, "kg")
-    step = Alteration(*MASS, "error", "kg", 0.5, lambda seen, size: seen)
-    return witness_evidence.WitnessEvidence((one,), {MASS: step}, {MASS: np.array([1.0])})
+    step = ObservableCause(*MASS, "error", "kg", 0.5)
+    return witness_evidence.ObservedEvidence((one,), {MASS: step}, {MASS: np.array([1.0])})
 
 
 @pytest.mark.parametrize(

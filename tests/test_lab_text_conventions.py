@@ -18,9 +18,9 @@ from biodance.lab.opensim.plate_columns import plates_of
 from biodance.lab.opensim.trc import read_trc, write_trc
 from biodance.lab.plain_text import with_points
 from biodance.lab.readers.trc import beside
+from biodance.observations import recording
+from biodance.observations.empty_plate import EmptyPlate
 from biodance.records import Markers, Source, Trial
-from biodance.witnesses import recording
-from biodance.witnesses.empty_plate import EmptyPlate
 
 WALK = "opensim_models/raj_walk/walk.mot"
 

@@ -20,9 +20,9 @@ from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.opensim.trc import write_trc
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
+from biodance.observations import recording
 from biodance.pipeline.session import examine
 from biodance.records import Markers
-from biodance.witnesses import recording
 
 SUBJECT_TOML = '[subject]\nmass_kg = 62.0\nheight_m = 1.70\nsex = "F"\nage = 30\n'
 PLUG_IN_GAIT = read_marker_set("plug_in_gait")

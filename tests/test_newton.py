@@ -8,17 +8,17 @@ from two_plates import changed, late, session
 
 from biodance.diagnosis.delay_contradicted import is_contradicted
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Recorded
 from biodance.effects.plate_offset import PlateOffset
 from biodance.effects.plates_exchanged import PlatesExchanged
 from biodance.effects.time_delay import TimeDelay
 from biodance.lab.session.read import read_session
 from biodance.motion.newton import newton_of
+from biodance.observations import observe, recording
+from biodance.observations.newton import Newton
 from biodance.pipeline.weighing import WeighedBy, weigh
 from biodance.records import Wrench
-from biodance.witnesses import observe, recording
-from biodance.witnesses.newton import Newton
 
 CLEAN = {
     "biomechzoo/HC030A": ("HC030A05", "HC030A22"),
@@ -84,7 +84,7 @@ def test_who_hardly_moves_shows_no_instant():
 
 def test_the_witness_sees_a_delay_and_a_weight():
     seen = recording(changed(session(), late(0.03))["squat_1"], mass=62.0)
-    lag, mass = (one for one in observe(seen) if one.witness == "newton")
+    lag, mass = (one for one in observe(seen) if one.observer == "newton")
     assert lag.value == pytest.approx(0.03, abs=0.002)
     assert mass.value == pytest.approx(62.0, abs=3 * mass.sd)
 
@@ -95,12 +95,12 @@ def test_a_delay_that_newton_contradicts_is_none():
         return Finding("time_delay", "", (size,), (Alias("time_delay", "", 9.0),), 1.0)
 
     seen = recording(changed(session(), late(0.03))["squat_1"], mass=62.0)
-    evidence = WitnessEvidence(Newton().observe(seen), {}, {})
+    evidence = ObservedEvidence(Newton().observe(seen), {}, {})
     assert not is_contradicted(finding(0.03), evidence)
     assert not is_contradicted(finding(0.05), evidence)
     assert is_contradicted(finding(0.08), evidence)
     assert is_contradicted(finding(-0.02), evidence)
-    assert not is_contradicted(finding(-0.02), WitnessEvidence((), {}, {}))
+    assert not is_contradicted(finding(-0.02), ObservedEvidence((), {}, {}))
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,7 @@ def test_a_package_that_is_broken_is_named(
 
 @pytest.mark.parametrize(
     ("room", "family"),
-    [("effects", "effect"), ("lab.readers", "reader"), ("body.export", "model format"), ("witnesses", "witness")],
+    [("effects", "effect"), ("lab.readers", "reader"), ("body.export", "model format"), ("observations", "observer")],
 )
 def test_a_stray_file_in_a_folder_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: str, family: str

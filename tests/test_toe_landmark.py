@@ -14,8 +14,8 @@ from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.diagnosis.witness_inference import infer_causes
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.session.read import read_session
+from biodance.observations import observe, recording
 from biodance.records import SIDES, Markers, Session, Trial
-from biodance.witnesses import observe, recording
 
 
 def heard(found: Session) -> tuple[Finding, ...]:
@@ -56,7 +56,7 @@ def test_toe_markers_on_the_first_ray_of_both_feet_accuse_no_plate() -> None:
 def test_markers_on_both_edges_tell_where_the_foot_is() -> None:
     trials = [toes_moved(walk(name=name), 0.04, edges=True) for name in ("walk", "again")]
     assert heard(session(standing(), *trials)) == ()
-    values = {(one.witness, one.what): one.value for one in observe(recording(trials[0], mass=MASS), ["foot_across"])}
+    values = {(one.observer, one.what): one.value for one in observe(recording(trials[0], mass=MASS), ["foot_across"])}
     assert len(values) == 6
     assert max(map(abs, values.values())) < 0.003
 
@@ -84,7 +84,7 @@ def test_a_pressure_half_a_metre_from_the_foot_tells_no_place() -> None:
 def test_who_stands_half_beside_the_plates_weighs_nothing_there() -> None:
     whole = standing()
     assert whole.markers is not None
-    names = [one.witness for one in observe(recording(whole, mass=MASS), ["standing_force", "standing_place"])]
+    names = [one.observer for one in observe(recording(whole, mass=MASS), ["standing_force", "standing_place"])]
     assert set(names) == {"standing_force", "standing_place"}
     aside = np.array(whole.markers.xyz)
     feet = [whole.markers.names.index(name) for name in ("LHEE", "LTOE")]

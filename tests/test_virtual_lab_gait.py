@@ -16,6 +16,8 @@ from biodance.diagnosis.witness_inference import infer_causes
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
+from biodance.observations import observe
+from biodance.observations._recording import recording
 from biodance.pipeline.session import examine
 from biodance.records import Subject
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
@@ -23,8 +25,6 @@ from biodance.virtual_lab.movement.gait import GaitPerformance, perform_gait
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.person.person import make_person
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.witnesses import observe
-from biodance.witnesses._recording import recording
 
 G = 9.80665
 TIME = np.arange(1.0, 2.5, 1e-3)
@@ -151,7 +151,7 @@ def test_what_is_expected_of_walking_feet_is_not_asked_of_running_ones(recorded:
 
 def test_the_heel_strikes_when_the_force_comes_and_equal_strides_tell_no_fault(recorded: dict) -> None:
     evidence = collect_evidence(recorded["treadmill"].session, ("time_delay", "body_mass", "plate_position"))
-    onset = [one.value for one in evidence.observations if one.witness == "force_onset"]
+    onset = [one.value for one in evidence.observations if one.observer == "force_onset"]
     assert len(onset) > 5
     assert np.abs(np.median(onset)) < 0.006
     assert infer_causes(evidence).findings == ()

@@ -228,7 +228,7 @@ def test_what_cannot_be_simulated_is_refused_before_anything_is_written(tmp_path
 
 TESTED = (
     "biodance.effects",
-    "biodance.witnesses",
+    "biodance.observations",
     "biodance.diagnosis",
     "biodance.identification",
     "biodance.uncertainty",

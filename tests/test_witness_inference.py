@@ -8,7 +8,7 @@ from walking import MASS, STANCE, Wrong, session, standing, walk
 
 from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence, undo_causes
 from biodance.diagnosis.witness_inference import infer_causes, size_from_witnesses
-from biodance.witnesses import observe, recording
+from biodance.observations import observe, recording
 
 
 def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> None:
@@ -27,7 +27,7 @@ def test_clean_walks_and_standing_name_nothing() -> None:
     rows = {(row.effect, row.target): row for row in cause_visibilities(evidence)}
     assert rows["plate_position", "plate1:y"].sd < 0.005
     assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
-    assert rows["plate_gain", "plate2:Fx"].witnesses == ()
+    assert rows["plate_gain", "plate2:Fx"].observers == ()
 
 
 @pytest.mark.parametrize(("heavier", "a_load"), [(0.05, True), (-0.05, False)])
@@ -67,7 +67,7 @@ def test_putting_a_delay_right_gives_back_what_was_seen_without_it() -> None:
         for one, more in zip(late.observations, added, strict=True)
         if one.stride in clean and np.isfinite(more)
     ]
-    straight = late.traces["time_delay", ""] / [one.sd for one in late.observations]
+    straight = late.sensitivities["time_delay", ""] / [one.sd for one in late.observations]
     assert len(compared) > 20
     assert np.abs(compared).max() < 0.5 < np.abs(0.04 * straight).max()
 
@@ -98,7 +98,7 @@ def test_a_laboratory_s_own_norm_is_expected_and_a_fault_is_no_norm() -> None:
     """Its clock comes 4 ms later than elsewhere: expected then. 30 ms in all its sessions are a fault all the same."""
     late = session(standing(), walk(Wrong(late=0.004)), walk(Wrong(late=0.004), name="again"))
     before, own, fault = (
-        [one for one in collect_evidence(late, None, norms).observations if one.witness == "force_onset"]
+        [one for one in collect_evidence(late, None, norms).observations if one.observer == "force_onset"]
         for norms in ({}, {"force_onset": (0.004, 0.0001)}, {"force_onset": (0.03, 0.0001)})
     )
     assert len(before) >= 2

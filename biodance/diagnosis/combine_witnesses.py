@@ -16,7 +16,7 @@ from biodance.diagnosis.delay_contradicted import is_contradicted, without_contr
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.size_dependence import WEIGHTLESS
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.diagnosis.witness_fit import is_beyond_usual
 from biodance.diagnosis.witness_inference import UNPLACED_LOAD, WitnessFindings, size_from_witnesses
 from biodance.diagnosis.witness_landmark import with_habits
@@ -50,7 +50,7 @@ class SimulatedSize(NamedTuple):
 def combine_findings(
     one: Diagnosis,
     by_witnesses: WitnessFindings,
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     *,
     judged: bool,
     measured: Mapping[tuple[str, str], SimulatedSize] = MappingProxyType({}),
@@ -69,7 +69,7 @@ def combine_findings(
 def _with_faults(
     one: Diagnosis,
     by_witnesses: WitnessFindings,
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     judged: bool,
     measured: Mapping[tuple[str, str], SimulatedSize],
 ) -> Diagnosis:
@@ -126,7 +126,7 @@ def _same_cause(alias: Alias, one: Finding | Alias) -> bool:
     return _names(alias) == _names(one) or (_names(alias) == UNPLACED_LOAD and one.effect == alias.effect)
 
 
-def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvidence) -> bool:
+def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: ObservedEvidence) -> bool:
     """Return whether the simulation contradicts a finding of the witnesses. It does if it found something else wrong
     although it would detect a cause of this size, if it found this cause with a size that depends on what the
     witnesses observe (`_weighing_agrees`), at several targets though it is believed only alone (`Effect.single`), or
@@ -151,7 +151,7 @@ def _simulation_disagrees(finding: Finding, one: Diagnosis, evidence: WitnessEvi
     return times > 1.0
 
 
-def _weighing_agrees(finding: Finding, hanging: Finding, evidence: WitnessEvidence) -> bool:
+def _weighing_agrees(finding: Finding, hanging: Finding, evidence: ObservedEvidence) -> bool:
     """Return whether a cause that only weighing witnesses detect has the same size in the simulation, where that size
     depends only on moments and fast bands: these do not affect the mean force.
     """
@@ -165,9 +165,9 @@ def _is_believed_alone(finding: Finding) -> bool:
     return isinstance(kind, Effect) and kind.single
 
 
-def _is_shown_by(finding: Finding, evidence: WitnessEvidence, witnesses: set[str]) -> bool:
+def _is_shown_by(finding: Finding, evidence: ObservedEvidence, witnesses: set[str]) -> bool:
     """Return whether some ``witnesses`` alone see the cause of a finding."""
-    return _names(finding) in evidence.causes and set(evidence.seen_by(_names(finding))) <= witnesses
+    return _names(finding) in evidence.causes and set(evidence.detected_by(_names(finding))) <= witnesses
 
 
 def _same_size(finding: Finding, other: Finding) -> bool:
@@ -181,7 +181,7 @@ def _same_size(finding: Finding, other: Finding) -> bool:
 def _movement_shows_none(
     finding: Finding,
     one: Diagnosis,
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     measured: Mapping[tuple[str, str], SimulatedSize],
 ) -> bool:
     """Return whether a movement in which nothing is wrong, and that would show a cause of this size, measures no such
@@ -205,7 +205,7 @@ def _movement_shows_none(
 
 
 def _fits_the_movement(
-    cause: Alias, said: tuple[float, float], moved: SimulatedSize, evidence: WitnessEvidence
+    cause: Alias, said: tuple[float, float], moved: SimulatedSize, evidence: ObservedEvidence
 ) -> bool:
     """Return whether the size of a cause that the witnesses ``said`` and the one that the simulation measured are one
     size, with the evidence of both enough for a name, and more than laboratories have without a fault; a cause has only
@@ -264,7 +264,7 @@ def _with_witnesses(one: Alias, by_witnesses: Finding) -> Alias:
     return replace(one, log_bayes_factor=one.log_bayes_factor + next(said, 0.0))
 
 
-def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
+def _without_excluded(one: Diagnosis, evidence: ObservedEvidence) -> Diagnosis:
     """Return the diagnosis without findings whose size the witnesses exclude."""
     gone = tuple(f for f in one.findings if is_contradicted(f, evidence) or _excluded(f, evidence))
     if not gone:
@@ -284,7 +284,7 @@ def _without_excluded(one: Diagnosis, evidence: WitnessEvidence) -> Diagnosis:
     )
 
 
-def _excluded(finding: Finding, evidence: WitnessEvidence) -> bool:
+def _excluded(finding: Finding, evidence: ObservedEvidence) -> bool:
     """Return whether the witnesses measure the size of this cause precisely enough to exclude that of the finding."""
     measured = size_from_witnesses(evidence, (finding.effect, finding.target))
     if measured is None or not finding.parameters:

@@ -28,6 +28,8 @@ def matters(effect: Effect, theta: Array) -> bool:
     return float(np.linalg.norm([values[name] / floor for name, floor in floors.items()])) >= 1.0
 
 
+LIMIT = 3.0
+"""Standard deviations between laboratories beyond which what is left in one band of one channel is not adequate."""
 LEAST_FORCE, LEAST_MOMENT = 1.0, 0.3
 """N, N·m RMS in one band: what is left below it alarms nobody. 1 N is 0.15 % of an adult's weight, half of what
 plates are accurate to (0.2-0.5 %); 0.3 N·m are 0.4 mm of centre of pressure, where plates in place err by 2-5 mm

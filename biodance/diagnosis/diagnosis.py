@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from biodance.diagnosis.witness_evidence import WitnessEvidence
+    from biodance.diagnosis.witness_evidence import ObservedEvidence
     from biodance.effects import Cause, Checked, QualityCheck
 
 
@@ -185,7 +185,7 @@ class Diagnosis:
         What the verdict rests on.
     why : mapping of Reason to tuple of str
         Why it says no more (only standing, an unusual body), each with what it concerns.
-    witnesses : WitnessEvidence or None
+    witnesses : ObservedEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
     probability : float
         Of what the verdict says; NaN where nothing could be judged.
@@ -209,7 +209,7 @@ class Diagnosis:
     attention: tuple[Attention, ...] = ()
     judged: tuple[Judged, ...] = ()
     why: Mapping[Reason, tuple[str, ...]] = field(default_factory=dict)
-    witnesses: "WitnessEvidence | None" = None
+    witnesses: "ObservedEvidence | None" = None
     probability: float = float("nan")
 
     def __repr__(self) -> str:

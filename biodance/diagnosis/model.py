@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.by_trial import ByTrial
-from biodance.diagnosis.candidates import SCALE, Candidate, removed, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates, removed, slopes
 from biodance.diagnosis.evidence import LinearPosterior, linear_posterior
 from biodance.diagnosis.problem import Problem
-from biodance.effects import Effect
+from biodance.discovery import Chosen
+from biodance.effects import Effect, effects
 from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.joints import joint_of
@@ -276,3 +277,22 @@ def needs_rebuilding(found: Model) -> bool:
         wrench = np.stack([case.needed(found.phi - case.phi), case.predicted], axis=2)
         both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
     return bool(both[0] > _STALE**2 * both[1])
+
+
+def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
+    """Return all causes to search for, and those that are not searched for but keep their tolerance."""
+    family = effects(chosen)
+    return candidates(
+        problem, {n: one for n, one in {**effects(), **family}.items() if n in family or tolerances.knows(n)}
+    )
+
+
+def build_model(
+    problem: Problem,
+    tolerances: Tolerances,
+    chosen: Chosen[Effect],
+    every: tuple[Candidate, ...] | None = None,
+) -> tuple[Model, tuple[Candidate, ...]]:
+    """Return the model without named causes, and the causes to search for; all others keep their tolerances."""
+    family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
+    return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)

@@ -10,8 +10,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.human.scaling import tilted_joints
 from biodance.body.parts import JointError
-from biodance.diagnosis.adequacy import LIMIT
-from biodance.diagnosis.consequence import matters
+from biodance.diagnosis.consequence import LIMIT, matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DOUBTS
 from biodance.discovery import Chosen

@@ -1,7 +1,7 @@
-"""Evidence of the witnesses of a session: their observations, and the contribution of every cause to each of them."""
+"""Observations of a session that need no model of the body, and what every cause adds to each of them."""
 
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -12,23 +12,25 @@ from numpy.typing import NDArray
 from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.effects.axis_error import AxisError
-from biodance.records import Array, Session
-from biodance.witnesses import (
-    Alteration,
+from biodance.observations import (
+    ObservableCause,
     Observation,
     SeenTrial,
+    corrected,
     observe,
+    observers,
     possible_causes,
     recording,
-    traces,
-    turned_signs,
-    witnesses,
+    sensitivities,
+    sign_reversals,
+    with_changed_plate,
 )
+from biodance.records import Array, Session
 
 _FAULT = 4.0
 """A fault in steps of its cause: 16 mm, 16 ms, 8 %, 8 N, 0.08 rad, 2 kg."""
-_BLIND = 0.2
-"""Standard deviations that a usual fault adds to an observation that is blind to it."""
+_UNRESPONSIVE = 0.2
+"""Standard deviations that a usual fault adds to an observation that does not respond to it."""
 _HABIT = 3.0
 """Standard deviations of laboratories beyond which a norm is no habit of one."""
 _REPEATED = 0.5
@@ -40,48 +42,53 @@ _REACH = 0.15
 what plates are off in laboratories); what lies farther is of another foot, of plates exchanged or of a wrong sign.
 """
 _EXACT = ("empty_plate", "flight", "standing_force", "standing_twist")
-"""Witnesses of which Newton alone says what they see: plates with nobody on them; who stands still has a weight, and no
+"""Observers of which Newton alone says what they see: plates with nobody on them; who stands still has a weight, and no
 other force or turn.
 """
 
 
 @dataclass(frozen=True, eq=False)
-class WitnessEvidence:
-    """All ``observations`` (n) of a session. ``traces``: for every cause, the change of each observation per unit of
-    the cause (n,). ``turned``: for every channel, value minus expectation (n,) after its sign is reversed, NaN where
-    the observation is then missing. ``seconds``: by trial, time in single support on a plate. ``recorded``: the trials
-    that were examined.
+class ObservedEvidence:
+    """All ``observations`` (n) of a session. ``sensitivities``: for every cause, the change of each observation per
+    unit of the cause (n,). ``sign_reversed``: for every channel, value minus expectation (n,) after its sign is
+    reversed, NaN where the observation is then missing, or is only shown. ``seconds``: by trial, time in single support
+    on a plate. ``recorded``: the trials that were examined.
     """
 
     observations: tuple[Observation, ...]
-    causes: Mapping[tuple[str, str], Alteration]
-    traces: Mapping[tuple[str, str], Array]
-    turned: Mapping[tuple[str, str], Array] = field(default_factory=dict)
+    causes: Mapping[tuple[str, str], ObservableCause]
+    sensitivities: Mapping[tuple[str, str], Array]
+    sign_reversed: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     recorded: tuple[SeenTrial, ...] = ()
 
     @cached_property
-    def counting(self) -> "WitnessEvidence":
+    def counting(self) -> "ObservedEvidence":
         """Only the observations that count as evidence."""
         kept = np.array([one.counts for one in self.observations], dtype=bool)
-        return WitnessEvidence(
+        return ObservedEvidence(
             tuple(one for one in self.observations if one.counts),
             self.causes,
-            {name: trace[kept] for name, trace in self.traces.items()},
-            {name: value[kept] for name, value in self.turned.items()},
+            {name: column[kept] for name, column in self.sensitivities.items()},
+            {name: value[kept] for name, value in self.sign_reversed.items()},
             self.seconds,
             self.recorded,
         )
 
-    def only(self, names: Collection[str]) -> "WitnessEvidence":
-        """Return the evidence of some observations alone, by the names of what sees them."""
-        kept = np.array([one.witness in names for one in self.observations], dtype=bool)
-        return replace(
-            self,
-            observations=tuple(one for one in self.observations if one.witness in names),
-            traces={name: trace[kept] for name, trace in self.traces.items()},
-            turned={},
-        )
+    def only(self, names: Collection[str]) -> "ObservedEvidence":
+        """Return the evidence of some observations alone, by the names of their observers."""
+        kept = [i for i, one in enumerate(self.observations) if one.observer in names]
+        columns = {name: column[kept] for name, column in self.sensitivities.items()}
+        found = tuple(self.observations[i] for i in kept)
+        return replace(self, observations=found, sensitivities=columns, sign_reversed={})
+
+    def columns(self, effect: str, target: str, parameters: Sequence[str]) -> Array:
+        """Return (n, p) what one unit of each of the ``parameters`` (p) of an effect adds to the observations; 0 where
+        an observation does not respond. A row is in the unit of its observation, as ``value - expected`` is.
+
+        ``effect``, ``target`` and ``parameters`` as in the family of effects, of others than the ``causes``, too.
+        """
+        return _columns(self.recorded, self.observations, effect, target, parameters)
 
     @cached_property
     def norms(self) -> tuple[str, ...]:
@@ -107,126 +114,159 @@ class WitnessEvidence:
         told = np.ones(len(self.observations), dtype=bool)
         if cause is not None:
             own = np.array([one.sd for one in self.observations])
-            told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= own)
+            told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= own)
         seen = [one for one, here in zip(self.observations, told, strict=True) if here]
-        touched = {one.contact for one in seen if one.witness not in _EXACT}
-        return 2 if cause and any(one.witness in _EXACT for one in seen) else len(touched)
+        touched = {one.contact for one in seen if one.observer not in _EXACT}
+        return 2 if cause and any(one.observer in _EXACT for one in seen) else len(touched)
 
     def strongest(self, index: int) -> tuple[str, str]:
         """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""
-        size = {name: abs(c.step * self.traces[name][index]) for name, c in self.causes.items()}
+        size = {name: abs(c.step * self.sensitivities[name][index]) for name, c in self.causes.items()}
         best = max(size, key=lambda name: size[name], default=("", ""))
-        return best if size.get(best, 0.0) * _FAULT > _BLIND * self.observations[index].expected_sd else ("", "")
+        return best if size.get(best, 0.0) * _FAULT > _UNRESPONSIVE * self.observations[index].expected_sd else ("", "")
 
-    def sees(self, cause: tuple[str, str]) -> Array:
+    def detects(self, cause: tuple[str, str]) -> Array:
         """Return (n,) bool: observations that each detect the usual fault of a cause at one standard deviation."""
         expected = np.array([one.expected_sd for one in self.observations])
-        return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.traces[cause]) >= expected)
+        return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= expected)
 
-    def seen_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
-        """Return the witnesses that detect the usual fault of a cause at ``least`` standard deviations, over all their
+    def detected_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
+        """Return the observers that detect the usual fault of a cause at ``least`` standard deviations, over all their
         observations; () if none does.
         """
         size = self.causes[cause].step * _FAULT
         total: dict[str, float] = {}
-        for one, trace in zip(self.observations, self.traces[cause], strict=True):
-            total[one.witness] = total.get(one.witness, 0.0) + (size * trace / one.expected_sd) ** 2
+        for one, column in zip(self.observations, self.sensitivities[cause], strict=True):
+            total[one.observer] = total.get(one.observer, 0.0) + (size * column / one.expected_sd) ** 2
         return tuple(name for name, power in total.items() if power**0.5 >= least)
 
 
 @dataclass(frozen=True)
 class CauseVisibility:
-    """How well the witnesses of a session determine one cause: ``sd`` of its size in ``unit`` from all of them
-    (infinite if none responds), the responding ``witnesses``, the causes ``alike`` that they cannot distinguish from
-    it, and ``would``: movements or markers, in words, that would make further witnesses respond.
+    """How well the observers of a session determine one cause: ``sd`` of its size in ``unit`` from all of them
+    (infinite if none responds), the responding ``observers``, the causes ``alike`` that they cannot distinguish from
+    it, and ``would``: movements or markers, in words, that would make further observers respond.
     """
 
     effect: str
     target: str
     unit: str
     sd: float
-    witnesses: tuple[str, ...]
+    observers: tuple[str, ...]
     alike: tuple[tuple[str, str], ...]
     would: tuple[str, ...]
 
 
-def cause_visibilities(evidence: WitnessEvidence) -> tuple[CauseVisibility, ...]:
-    """Return how well each cause is determined by the witnesses, undetermined causes last."""
-    counting, family = evidence.counting, witnesses()
-    spoke = {one.witness for one in evidence.observations}
+def cause_visibilities(evidence: ObservedEvidence) -> tuple[CauseVisibility, ...]:
+    """Return how well each cause is determined by the observers, undetermined causes last."""
+    counting, family = evidence.counting, observers()
+    responded = {one.observer for one in evidence.observations}
     sd = np.array([one.sd for one in counting.observations])
     inner = np.diag(sd**2) + counting.shared @ counting.shared.T
-    white = {name: np.linalg.solve(inner, trace) if trace.size else trace for name, trace in counting.traces.items()}
-    power = {name: float(counting.traces[name] @ white[name]) for name in counting.traces}
+    white = {name: np.linalg.solve(inner, one) if one.size else one for name, one in counting.sensitivities.items()}
+    power = {name: float(counting.sensitivities[name] @ white[name]) for name in counting.sensitivities}
     found = []
     for name, cause in evidence.causes.items():
-        seen = counting.seen_by(name)
+        seen = counting.detected_by(name)
         alike = tuple(
             other
             for other in evidence.causes
             if other != name
             and seen
-            and abs(counting.traces[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
+            and abs(counting.sensitivities[other] @ white[name]) > _ALIKE * (power[other] * power[name]) ** 0.5 > 0
         )
-        silent = [one for one in family.values() if cause.effect in one.sees and one.name not in spoke]
+        missing = [one for one in family.values() if cause.effect in one.responds_to and one.name not in responded]
         size = power[name] ** -0.5 if seen else float("inf")
-        found.append(CauseVisibility(*name, cause.unit, size, seen, alike, tuple(one.needs for one in silent)))
-    return tuple(sorted(found, key=lambda one: not one.witnesses))
+        found.append(CauseVisibility(*name, cause.unit, size, seen, alike, tuple(one.needs for one in missing)))
+    return tuple(sorted(found, key=lambda one: not one.observers))
 
 
 def collect_evidence(
     session: Session,
     chosen: Chosen[Effect | DiscreteEffect] = None,
     norms: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> WitnessEvidence:
-    """Return the observations of all witnesses in all trials of a session except skipped ones. ``chosen`` restricts the
+) -> ObservedEvidence:
+    """Return the observations of all observers in all trials of a session except skipped ones. ``chosen`` restricts the
     causes; ``norms`` are those of the laboratory (`Tolerances.norms`).
     """
     asked = causes(chosen)
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    seen = [recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip"]
-    found, single = [_correlate_strides(observe(one)) for one in seen], all(len(one.trial.plates) == 1 for one in seen)
+    seen = tuple(recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip")
+    single = all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
-    parts = {name: [np.zeros(len(some)) for some in found] for name in known}
-    plainly, found = found, [tuple(_apply_norm(o, norms) for o in some) for some in found]
-    turned: dict[tuple[str, str], list[Array]] = {}
-    plain = [np.array([o.value - o.expected for o in some]) for some in found]
-    for i, (one, some) in enumerate(zip(seen, found, strict=True)):
-        for cause in possible_causes(one, single=single) if some else ():
-            if cause.names in known:
-                parts[cause.names][i] = traces(one, some, cause)
-        shift = np.array([o.expected - p.expected for o, p in zip(some, plainly[i], strict=True)])
-        for name, undo in turned_signs(one, single=single).items() if one.steps and AxisError.name in asked else ():
-            turned.setdefault(name, [value.copy() for value in plain])[i] = _observe_again(undo(one), some) - shift
-    return WitnessEvidence(
-        tuple(o for some in found for o in some),
+    by_trial = [tuple(_apply_norm(o, norms) for o in _correlate_strides(observe(one))) for one in seen]
+    found = tuple(one for some in by_trial for one in some)
+    return ObservedEvidence(
+        found,
         known,
-        {name: np.concatenate([*several, np.empty(0)]) for name, several in parts.items()},
-        {name: np.concatenate([*several, np.empty(0)]) for name, several in turned.items()},
+        {names: _columns(seen, found, *names, (cause.parameter,))[:, 0] for names, cause in known.items()},
+        _reversed(seen, found, norms, single=single) if AxisError.name in asked else {},
         {one.trial.name: one.seconds for one in seen},
-        tuple(seen),
+        seen,
     )
 
 
-def undo_causes(evidence: WitnessEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
+def _columns(
+    recorded: Sequence[SeenTrial], found: Sequence[Observation], effect: str, target: str, parameters: Sequence[str]
+) -> Array:
+    """Return (n, p) what one unit of each parameter of an effect adds to observations ``found`` in recordings."""
+    out = np.zeros((len(found), len(parameters)))
+    for seen in recorded:
+        here = [i for i, one in enumerate(found) if one.trial == seen.trial.name]
+        own = [found[i] for i in here]
+        for k, parameter in enumerate(parameters):
+            out[here, k] = sensitivities(seen, own, effect, target, parameter)
+    return out
+
+
+def _reversed(
+    recorded: Sequence[SeenTrial],
+    found: Sequence[Observation],
+    norms: Mapping[str, tuple[float, float]],
+    *,
+    single: bool,
+) -> dict[tuple[str, str], Array]:
+    """Return by channel the value minus expectation (n,) of the observations after its sign is reversed, in trials with
+    steps; NaN where an observation is then missing, or is only shown. The sign of the vertical force is gravity's, so
+    that most observations change linearly; the others are made again.
+    """
+    plain = np.array([one.value - one.expected if one.counts else np.nan for one in found])
+    out: dict[tuple[str, str], Array] = {}
+    for seen in recorded:
+        here = [i for i, o in enumerate(found) if o.trial == seen.trial.name and o.counts]
+        again = {found[i].observer for i in here if not found[i].sensitivity.linear}
+        for name, (plate, change) in sign_reversals(seen, single=single).items() if seen.steps else ():
+            value = out.setdefault(name, plain.copy())
+            right = observe(with_changed_plate(seen, plate, change), again) if again else ()
+            after = {one.key: _apply_norm(one, norms) for one in right}
+            for i in here:
+                if found[i].observer not in again:
+                    value[i] += found[i].sensitivity.to(plate, change)
+                else:
+                    one = after.get(found[i].key)
+                    value[i] = one.value - one.expected if one else np.nan
+    return out
+
+
+def undo_causes(evidence: ObservedEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
     """Return the change of each observation (n,) when causes of the given ``sizes`` are undone in the recording, NaN
-    where the observation is then missing, and the traces (n, p) in the corrected recording. They differ from the traces
-    of the original one: a step that begins 30 ms earlier covers another part of the step.
+    where the observation is then missing, and the sensitivities (n, p) in the corrected recording. They differ
+    from those of the original one: a step that begins 30 ms earlier covers another part of the step.
     """
     added = np.full(len(evidence.observations), np.nan)
     slopes = np.zeros((added.size, len(sizes)))
-    single = all(len(one.trial.plates) == 1 for one in evidence.recorded)
-    for one in evidence.recorded:
-        here = [i for i, o in enumerate(evidence.observations) if o.trial == one.trial.name]
-        found = tuple(evidence.observations[i] for i in here)
-        known = {cause.names: cause for cause in possible_causes(one, single=single) if cause.names in sizes}
-        right = one
-        for names, cause in known.items():
-            right = cause.alter(right, -sizes[names])
-        added[here] = _observe_again(right, found) - _observe_again(one, found)
+    for seen in evidence.recorded:
+        right = seen
+        for names, size in sizes.items():
+            right = corrected(right, *names, size)
+        before, after = ({one.key: one for one in observe(one)} for one in (seen, right))
+        here = [i for i, o in enumerate(evidence.observations) if o.key in after and o.key in before]
+        for i in here:
+            was, now = (some[evidence.observations[i].key] for some in (before, after))
+            added[i] = now.value - now.expected - was.value + was.expected
+        own = [after[evidence.observations[i].key] for i in here]
         for k, names in enumerate(sizes):
-            if names in known:
-                slopes[here, k] = traces(right, found, known[names])
+            slopes[here, k] = sensitivities(right, own, *names, evidence.causes[names].parameter)
     return added, slopes
 
 
@@ -258,9 +298,3 @@ def _apply_norm(one: Observation, norms: Mapping[str, tuple[float, float]]) -> O
     share = usual / (usual + sd**2)
     left = {name: size * (np.sqrt(1 - share) if name in own else 1.0) for name, size in one.norms.items()}
     return replace(one, expected=one.expected + share * value, norms=left)
-
-
-def _observe_again(altered: SeenTrial, before: tuple[Observation, ...]) -> Array:
-    """Return value minus expectation (n,) of the same observations in an altered recording; NaN where missing."""
-    values = {one.key: one.value - one.expected for one in observe(altered)}
-    return np.array([values.get(one.key, np.nan) for one in before])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from biodance.diagnosis.candidates import SCALE
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Effect, causes, effect
 from biodance.records import Array
 
@@ -61,7 +61,7 @@ def fit_laplace(value: Array, sd: Array, shared: Array, Z: Array, size: Array) -
 
 
 def explain(
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     value: Array,
     names: tuple[tuple[str, str], ...],
     known: NDArray[np.bool_] | None = None,
@@ -71,13 +71,13 @@ def explain(
     """Return the fit of values (n,) minus expectation by the causes ``names`` of their typical sizes; ``known`` (n,)
     observations only (by default those in reach), ``without`` (k,) some of the shared errors.
     """
-    Z = np.stack([evidence.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
+    Z = np.stack([evidence.sensitivities[name] for name in names], axis=1) if names else np.empty((value.size, 0))
     size = np.array([SCALE * typical_size(*name) for name in names])
     return fit_known(evidence, value, Z, size, known, without=without)
 
 
 def fit_known(
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     value: Array,
     Z: Array,
     size: Array,
@@ -92,11 +92,11 @@ def fit_known(
     return fit_laplace(value[kept], sd, shared[kept], Z[kept], size)
 
 
-def prior_odds(evidence: WitnessEvidence) -> dict[tuple[str, str], float]:
+def prior_odds(evidence: ObservedEvidence) -> dict[tuple[str, str], float]:
     """Return by cause what its evidence must make up for (natural logarithm, none above 0): the number of targets at
     which it could be seen, how rare it is, and that a single contact may be a misstep.
     """
-    count = Counter(names[0] for names in evidence.causes if evidence.seen_by(names))
+    count = Counter(names[0] for names in evidence.causes if evidence.detected_by(names))
     return {
         names: -float(np.log(max(1, count[names[0]])))
         - effect(names[0]).rarer
@@ -111,12 +111,12 @@ def typical_size(effect: str, target: str) -> float:
     return float(kind.typical[0]) if isinstance(kind, Effect) else 1.0
 
 
-def is_told(evidence: WitnessEvidence, names: tuple[str, str], found: LaplaceFit) -> bool:
+def is_told(evidence: ObservedEvidence, names: tuple[str, str], found: LaplaceFit) -> bool:
     """Return whether the last cause of a fit is significant, and larger than laboratories have it without a fault."""
     return is_beyond_usual(evidence, names, float(found.theta[-1]), float(found.covariance[-1, -1] ** 0.5))
 
 
-def is_beyond_usual(evidence: WitnessEvidence, names: tuple[str, str], size: float, sd: float) -> bool:
+def is_beyond_usual(evidence: ObservedEvidence, names: tuple[str, str], size: float, sd: float) -> bool:
     """Return whether the ``size`` of a cause with standard deviation ``sd`` is significant and larger than laboratories
     have it without a fault.
     """

@@ -14,7 +14,7 @@ import numpy as np
 
 from biodance.diagnosis.candidates import TOGETHER
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.witness_evidence import WitnessEvidence, undo_causes
+from biodance.diagnosis.witness_evidence import ObservedEvidence, undo_causes
 from biodance.diagnosis.witness_fit import (
     THRESHOLD,
     LaplaceFit,
@@ -67,13 +67,13 @@ class WitnessFindings:
     """
 
     findings: tuple[Finding, ...]
-    left: WitnessEvidence
+    left: ObservedEvidence
     first: tuple[Alias, ...] = ()
 
 
-def infer_causes(testimony: WitnessEvidence) -> WitnessFindings:
+def infer_causes(whole: ObservedEvidence) -> WitnessFindings:
     """Return the causes supported by the witnesses' evidence, at most three, with sizes and look-alikes."""
-    evidence = testimony.counting
+    evidence = whole.counting
     value = np.array([one.value - one.expected for one in evidence.observations])
     if not value.size:
         return WitnessFindings((), evidence)
@@ -90,7 +90,7 @@ def infer_causes(testimony: WitnessEvidence) -> WitnessFindings:
         near.sort(key=lambda o: o is not best)
         marker = landmark_alias(evidence, value, chosen, best.names) if best.score <= TOGETHER else ()
         named.append((best, (*(o.alias for o in near), *_load_alternatives(near), *marker)))
-        if best.names in evidence.turned:
+        if best.names in evidence.sign_reversed:
             break  # the traces of other causes hold only once the sign is mended
     found = _findings(evidence, value, named)
     sized = tuple(one.names for one, _ in named if one.names in evidence.causes)
@@ -107,31 +107,31 @@ def _load_alternatives(near: Iterable[Hypothesis]) -> tuple[Alias, ...]:
 
 
 def _ranked(
-    evidence: WitnessEvidence, value: Array, named: tuple[tuple[str, str], ...], *, signs: bool
+    evidence: ObservedEvidence, value: Array, named: tuple[tuple[str, str], ...], *, signs: bool
 ) -> list[Hypothesis]:
     """Return every further cause with its evidence, given the ``named`` ones, most probable first."""
     before = explain(evidence, value, named)
     odds, found = prior_odds(evidence), []
     for names in evidence.causes:
-        if names in named or not np.abs(evidence.traces[names]).any():
+        if names in named or not np.abs(evidence.sensitivities[names]).any():
             continue
         one = explain(evidence, value, (*named, names))
         bayes = one.log_evidence - before.log_evidence
         found.append(Hypothesis(names, bayes, bayes + odds[names], one))
-    for names, turned in evidence.turned.items() if signs else ():
+    for names, turned in evidence.sign_reversed.items() if signs else ():
         known = np.isfinite(turned)
         one = explain(evidence, turned, named, known)
         bayes = one.log_evidence - explain(evidence, value, named, known).log_evidence
-        found.append(Hypothesis(names, bayes, bayes - _RARE - float(np.log(len(evidence.turned))), one))
+        found.append(Hypothesis(names, bayes, bayes - _RARE - float(np.log(len(evidence.sign_reversed))), one))
     return sorted(found, key=lambda one: -one.score)
 
 
-def _fit_sizes(evidence: WitnessEvidence, value: Array, names: tuple[tuple[str, str], ...]) -> LaplaceFit:
+def _fit_sizes(evidence: ObservedEvidence, value: Array, names: tuple[tuple[str, str], ...]) -> LaplaceFit:
     """Return the fit of the named causes with wide priors on their sizes. The causes are undone in the recording and
     the witnesses observe again, because traces are not linear in the size.
     """
     size = np.array([_BROAD * typical_size(*name) for name in names])
-    Z = np.stack([evidence.traces[name] for name in names], axis=1) if names else np.empty((value.size, 0))
+    Z = np.stack([evidence.sensitivities[name] for name in names], axis=1) if names else np.empty((value.size, 0))
     found = fit_known(evidence, value, Z, size)
     for _ in range(_AGAIN if evidence.recorded and names else 0):
         added, slopes = undo_causes(evidence, dict(zip(names, map(float, found.theta), strict=True)))
@@ -140,7 +140,7 @@ def _fit_sizes(evidence: WitnessEvidence, value: Array, names: tuple[tuple[str, 
     return found
 
 
-def _is_told(evidence: WitnessEvidence, one: Hypothesis) -> bool:
+def _is_told(evidence: ObservedEvidence, one: Hypothesis) -> bool:
     """Return whether the last cause of a fit is told (`is_told`) by more than the only contact of a session; the sign
     of a channel has no size.
     """
@@ -150,7 +150,7 @@ def _is_told(evidence: WitnessEvidence, one: Hypothesis) -> bool:
 
 
 def _findings(
-    evidence: WitnessEvidence, value: Array, named: list[tuple[Hypothesis, tuple[Alias, ...]]]
+    evidence: ObservedEvidence, value: Array, named: list[tuple[Hypothesis, tuple[Alias, ...]]]
 ) -> tuple[Finding, ...]:
     """Return the named causes with jointly fitted sizes, if these are still more than laboratories have."""
     sized = tuple(one.names for one, _ in named if one.names in evidence.causes)
@@ -172,24 +172,27 @@ def _findings(
     return tuple(found)
 
 
-def size_from_witnesses(evidence: WitnessEvidence, names: tuple[str, str]) -> tuple[float, float] | None:
+def size_from_witnesses(evidence: ObservedEvidence, names: tuple[str, str]) -> tuple[float, float] | None:
     """Return the size of a cause and its standard deviation from the witnesses alone, inflated by their disagreement;
     None if no witness responds to it.
     """
     counting = evidence.counting
-    if names not in counting.causes or not counting.seen_by(names):
+    if names not in counting.causes or not counting.detected_by(names):
         return None
     value = np.array([one.value - one.expected for one in counting.observations])
     one = _fit_sizes(counting, value, (names,))
-    sd = _disagreement(counting, names, value - counting.traces[names] * one.theta[0]) * one.covariance[0, 0] ** 0.5
+    sd = (
+        _disagreement(counting, names, value - counting.sensitivities[names] * one.theta[0])
+        * one.covariance[0, 0] ** 0.5
+    )
     return float(one.theta[0]), no_surer(float(sd), names[0])
 
 
-def _disagreement(evidence: WitnessEvidence, names: tuple[str, str], left: Array) -> float:
+def _disagreement(evidence: ObservedEvidence, names: tuple[str, str], left: Array) -> float:
     """Return the Birge ratio (at least 1) of the residuals ``left`` (n,) of the observations that respond to a cause:
     their scatter relative to their errors (Birge 1932, doi:10.1103/PhysRev.40.207).
     """
-    sees = evidence.sees(names)
+    sees = evidence.detects(names)
     if sees.sum() < 2:
         return 1.0
     own = np.array([one.sd for one in evidence.observations])[sees]
@@ -197,17 +200,17 @@ def _disagreement(evidence: WitnessEvidence, names: tuple[str, str], left: Array
     return max(1.0, float(left[sees] @ np.linalg.solve(spread, left[sees]) / (sees.sum() - 1)) ** 0.5)
 
 
-def _visible_share(evidence: WitnessEvidence, names: tuple[str, str]) -> float:
+def _visible_share(evidence: ObservedEvidence, names: tuple[str, str]) -> float:
     """Return the share of a cause's trace that the shared errors of the expectations cannot imitate."""
     sd = np.array([one.sd for one in evidence.observations])
-    z, N = evidence.traces[names] / sd, evidence.shared / sd[:, None]
+    z, N = evidence.sensitivities[names] / sd, evidence.shared / sd[:, None]
     inner = np.linalg.solve(np.eye(N.shape[1]) + N.T @ N, N.T @ z)
     return float(np.sqrt(np.clip((z @ z - z @ N @ inner) / max(float(z @ z), 1e-300), 0.0, 1.0)))
 
 
-def _carried_by(evidence: WitnessEvidence, names: tuple[str, str]) -> str:
+def _carried_by(evidence: ObservedEvidence, names: tuple[str, str]) -> str:
     """Return a sentence that names the witnesses behind a finding."""
     if names not in evidence.causes:
         return "With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then."
-    seen = evidence.seen_by(names)
+    seen = evidence.detected_by(names)
     return f"Seen by: {', '.join(name.replace('_', ' ') for name in seen)}." if seen else ""

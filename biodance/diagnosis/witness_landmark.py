@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from biodance.diagnosis.candidates import SCALE, TOGETHER
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.diagnosis.witness_fit import THRESHOLD, explain, fit_known, is_told, prior_odds, typical_size
 from biodance.effects.toe_landmark import ToeLandmark
+from biodance.observations import LANDMARK, shift_per_sd
 from biodance.records import SIDES, Array
-from biodance.witnesses import LANDMARK, shift_per_sd
 
 _SHOWN = 2.0
 """Natural logarithm of the evidence from which it is told, and standard deviations of its size."""
@@ -27,19 +27,19 @@ _VISIBLE = 1.0
 Names = tuple[tuple[str, str], ...]
 
 
-def landmark_alias(evidence: WitnessEvidence, value: Array, named: Names, cause: tuple[str, str]) -> tuple[Alias, ...]:
+def landmark_alias(evidence: ObservedEvidence, value: Array, named: Names, cause: tuple[str, str]) -> tuple[Alias, ...]:
     """Return the feet's markers as a look-alike of a ``cause`` that only feet on plates show, beside the causes
     ``named`` before it; () where they explain nothing of the values (n,) minus expectation.
     """
     where = _columns(evidence)
     feet = (evidence.shared[:, where] != 0).any(axis=1)
-    if not (feet & (evidence.traces.get(cause, np.zeros(len(feet))) != 0)).any():
+    if not (feet & (evidence.sensitivities.get(cause, np.zeros(len(feet))) != 0)).any():
         return ()
     bayes = _evidence(evidence, value, named, where)
     return (Alias(ToeLandmark.name, _target(evidence), bayes),) if bayes > 0 else ()
 
 
-def landmark_finding(evidence: WitnessEvidence, value: Array, named: Names) -> tuple[Finding, ...]:
+def landmark_finding(evidence: ObservedEvidence, value: Array, named: Names) -> tuple[Finding, ...]:
     """Return how far the markers of both feet lie beside where they are expected, with all plates that look the same:
     where the values (n,) minus expectation clearly show it, or would name a plate if markers were as expected. The
     causes ``named`` are allowed for.
@@ -69,10 +69,10 @@ def with_habits(one: Diagnosis, habits: tuple[Finding, ...]) -> Diagnosis:
     return replace(one, findings=(*one.findings, *beside))
 
 
-def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> tuple[Estimate, ...]:
+def _sizes(evidence: ObservedEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> tuple[Estimate, ...]:
     """Return how far the markers lie beside where they are expected; the causes ``named`` are allowed for."""
     norms = [name for name, one in zip(evidence.norms, where, strict=True) if one]
-    Z = np.column_stack([evidence.shared[:, where], *(evidence.traces[name] for name in named)])
+    Z = np.column_stack([evidence.shared[:, where], *(evidence.sensitivities[name] for name in named)])
     size = np.array([1.0] * len(norms) + [SCALE * typical_size(*name) for name in named])
     found = fit_known(evidence, value, Z, size, without=where)
     return tuple(
@@ -82,13 +82,13 @@ def _sizes(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray
 
 
 def _plates_alike(
-    evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_], bayes: float
+    evidence: ObservedEvidence, value: Array, named: Names, where: NDArray[np.bool_], bayes: float
 ) -> list[Alias]:
     """Return the causes that explain what feet on plates show nearly as well where the markers are as expected."""
     before, found = explain(evidence, value, named, without=where).log_evidence, []
     feet = (evidence.shared[:, where] != 0).any(axis=1)
     for names in evidence.causes:
-        if names in named or not evidence.traces[names][feet].any():
+        if names in named or not evidence.sensitivities[names][feet].any():
             continue
         alone = explain(evidence, value, (*named, names), without=where)
         if bayes - (alone.log_evidence - before) <= TOGETHER and is_told(evidence, names, alone):
@@ -96,13 +96,13 @@ def _plates_alike(
     return sorted(found, key=lambda alias: -alias.log_bayes_factor)
 
 
-def _evidence(evidence: WitnessEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> float:
+def _evidence(evidence: ObservedEvidence, value: Array, named: Names, where: NDArray[np.bool_]) -> float:
     """Return the log Bayes factor of unknown places of the feet's markers against the expected ones."""
     free, fixed = explain(evidence, value, named), explain(evidence, value, named, without=where)
     return free.log_evidence - fixed.log_evidence
 
 
-def _columns(evidence: WitnessEvidence) -> NDArray[np.bool_]:
+def _columns(evidence: ObservedEvidence) -> NDArray[np.bool_]:
     """Return (k,) which shared errors are those of where markers sit on both feet."""
     return np.array([LANDMARK in name for name in evidence.norms], dtype=bool)
 
@@ -112,7 +112,7 @@ def _quantity(norm: str) -> str:
     return "backwards" if norm.endswith("along") else "inwards"
 
 
-def _target(evidence: WitnessEvidence) -> str:
+def _target(evidence: ObservedEvidence) -> str:
     """Return the side of the only foot seen on plates, or both."""
     seen = [side for side in SIDES if any(name.startswith(f"person {side} ") for name in evidence.norms)]
     return seen[0] if len(seen) == 1 else "both"

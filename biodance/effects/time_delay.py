@@ -20,7 +20,7 @@ _EXPLAINS = 0.5
 _SAME = 0.02
 """s: lags of several trials that differ by less are one: trunk and centre of mass differ by 9 ms between movements."""
 _LABORATORY = 0.006
-"""s: standard deviation of the lag of clean recordings between laboratories (`witnesses.newton`)."""
+"""s: standard deviation of the lag of clean recordings between laboratories (`observations.newton`)."""
 
 
 def moved_in_time(time: Array, value: Array, delay: Array) -> Array:

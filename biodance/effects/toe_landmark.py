@@ -39,7 +39,7 @@ class ToeLandmark(DiscreteEffect):
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:
-        """Return no check: what both feet share is seen by the witnesses (`diagnosis.witness_landmark`)."""
+        """Return no check: what both feet share is seen by observations (`diagnosis.witness_landmark`)."""
         return ()
 
 

@@ -22,9 +22,9 @@ from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, Rows
 from biodance.inference.scales import SOFT, prior_sd
 from biodance.inference.sets import UNKNOWN, Hypothesis, Posterior, Search, hypothesis
+from biodance.observations import LANDMARK, shift_per_sd
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
-from biodance.witnesses import LANDMARK, shift_per_sd
 
 NAMED, SUGGESTED = 0.85, 0.5
 """Probability from which a cause is named, and from which it is told as only resembled."""

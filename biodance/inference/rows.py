@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from biodance.diagnosis.candidates import Candidate, removed, slopes
 from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnosis.problem import Problem
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Effect
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
+
+_Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
 BODY, OBSERVED = "body", "observed"
 """Groups of columns: the parameters of the body, and errors that several observations share."""
@@ -36,7 +38,7 @@ class Rows:
         Where the simulated rows come from; None where only observations judge.
     tolerances : Tolerances
         Nominal sizes under which the rows are whitened.
-    evidence : WitnessEvidence or None
+    evidence : ObservedEvidence or None
         Observations that count; None without any.
     X : (r, K) array
         Whitened columns of all that is no fault, per nominal standard deviation.
@@ -55,7 +57,7 @@ class Rows:
 
     problem: Problem | None
     tolerances: Tolerances
-    evidence: WitnessEvidence | None
+    evidence: ObservedEvidence | None
     X: Array
     y: Array
     group: NDArray[np.intp]
@@ -105,14 +107,11 @@ class Rows:
         one, names = self.evidence, [parameter.name for parameter in effect.parameters]
         if one is None:
             return np.zeros((0, len(names)))
-        out, key = np.zeros((len(one.observations), len(names))), (effect.name, effect.target)
-        if key in one.traces and one.causes[key].parameter in names:
-            own = np.array([o.sd for o in one.observations])
-            out[:, names.index(one.causes[key].parameter)] = one.in_reach * one.traces[key] / own
-        return out
+        own = np.array([o.sd for o in one.observations])
+        return np.asarray(one.columns(effect.name, effect.target, names) * (one.in_reach / own)[:, None])
 
 
-def observed_causes(evidence: WitnessEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
+def observed_causes(evidence: ObservedEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
     """Return the causes that only observations judge, with no simulated rows."""
     kinds = {name: one for name, one in family.items() if isinstance(one, Effect)}
     return tuple(
@@ -127,7 +126,7 @@ def observed_causes(evidence: WitnessEvidence, family: Mapping[str, object]) -> 
 
 
 def rows_of(
-    problem: Problem | None, causes: Sequence[Candidate], tolerances: Tolerances, evidence: WitnessEvidence | None
+    problem: Problem | None, causes: Sequence[Candidate], tolerances: Tolerances, evidence: ObservedEvidence | None
 ) -> Rows:
     """Return the evidence of a session; those of ``causes`` with a learned size are tolerances, too."""
     seen = None if evidence is None or not evidence.counting.observations else evidence.counting
@@ -135,7 +134,7 @@ def rows_of(
     if problem is None:
         X, y = np.zeros((0, len(tolerated))), np.zeros(0)
         names = [one.names[0] for one in tolerated]
-        units = {
+        units: _Units = {
             one.names: (slice(k, k + 1), tolerances.size(key_of(*one.names)) * one.units[:, :1])
             for k, one in enumerate(tolerated)
         }
@@ -157,8 +156,6 @@ def rows_of(
     )
 
 
-_Units = Mapping[tuple[str, str], tuple[slice, Array]]
-
 
 def _simulated(
     problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances
@@ -179,7 +176,7 @@ def _simulated(
 
 
 def _with_observations(
-    X: Array, y: Array, names: list[str], units: _Units, seen: WitnessEvidence
+    X: Array, y: Array, names: list[str], units: _Units, seen: ObservedEvidence
 ) -> tuple[Array, Array, list[str]]:
     """Return columns, target and groups with the observations below: a plate that lies elsewhere within its tolerance
     shows in both. A pressure out of reach of its foot is of another foot, and tells no size.
@@ -187,8 +184,8 @@ def _with_observations(
     own = np.array([one.sd for one in seen.observations])
     below = np.zeros((len(own), X.shape[1]))
     for name, (at, unit) in units.items():
-        if name in seen.traces:
-            below[:, at] = np.outer(seen.traces[name] / own, unit[0])
+        if name in seen.sensitivities:
+            below[:, at] = np.outer(seen.sensitivities[name] / own, unit[0])
     shared = seen.shared / own[:, None]
     top = np.concatenate([X, np.zeros((len(X), shared.shape[1]))], axis=1)
     bottom = np.concatenate([below, shared], axis=1) * seen.in_reach[:, None]

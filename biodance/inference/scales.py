@@ -117,7 +117,8 @@ class Fit:
             known[g] = 2 * np.sum((np.eye(here.size) - C[np.ix_(here, here)]) ** 2)
         plates = self.products.plates[:-1, :-1] * np.exp(-2 * self.scales.noise)
         taken = float(np.sum(C * (self.size[:, None] * plates * self.size)))
-        return Curvature(np.bincount(group, weights=np.diag(C), minlength=count), known, taken)
+        shares = np.bincount(group[group >= 0], weights=np.diag(C)[group >= 0], minlength=count).astype(float)
+        return Curvature(shares, known, taken)
 
 
 def nominal(rows: Rows) -> Scales:

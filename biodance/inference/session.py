@@ -8,11 +8,11 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding, Verdict
-from biodance.diagnosis.naming import build_model, causes_of
+from biodance.diagnosis.model import build_model, causes_of
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
@@ -60,7 +60,7 @@ def see(
 @one_thread()
 def judge(
     seen: Seen | None,
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     known: Tolerances,
     asked: Mapping[str, Cause],
     bare: Diagnosis,
@@ -128,18 +128,18 @@ def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosi
 
 
 def _turned(
-    evidence: WitnessEvidence, known: Tolerances, causes: Sequence[Candidate], asked: Mapping[str, Cause]
+    evidence: ObservedEvidence, known: Tolerances, causes: Sequence[Candidate], asked: Mapping[str, Cause]
 ) -> tuple[Finding, ...]:
     """Return the channel whose sign, turned back, puts the pressure under the feet and makes a step brake first and
     push then; () where none is more probable than all signs as they are.
     """
     counting, found = evidence.counting, []
-    for name, turned in counting.turned.items():
+    for name, turned in counting.sign_reversed.items():
         here = np.isfinite(turned)
         if not here.any():
             continue
         as_is, other = (_log_evidence(counting, here, values, known, causes) for values in (None, turned))
-        found.append((other - as_is + np.log(_SIGN / (1 - _SIGN) / len(counting.turned)), name))
+        found.append((other - as_is + np.log(_SIGN / (1 - _SIGN) / len(counting.sign_reversed)), name))
     if not found:
         return ()
     best, name = max(found)
@@ -152,7 +152,7 @@ def _turned(
 
 
 def _log_evidence(
-    evidence: WitnessEvidence,
+    evidence: ObservedEvidence,
     here: np.ndarray,
     values: np.ndarray | None,
     known: Tolerances,
@@ -163,7 +163,7 @@ def _log_evidence(
     if values is not None:
         kept = [replace(one, value=one.expected + v) for one, v in zip(kept, values[here], strict=True)]
     some = replace(
-        evidence, observations=tuple(kept), traces={n: t[here] for n, t in evidence.traces.items()}, turned={}
+        evidence, observations=tuple(kept), sensitivities={n: t[here] for n, t in evidence.sensitivities.items()}, sign_reversed={}
     )
     rows = rows_of(None, causes, known, some)
     return fit(products(rows, rows.X, rows.y, rows.group), prior_sd(rows), nominal(rows)).log_evidence

@@ -119,11 +119,11 @@ class Posterior:
 
     def probabilities(self) -> dict[tuple[str, str], float]:
         """Return the probability of every cause."""
-        out: Counter[tuple[str, str]] = Counter()
+        out: dict[tuple[str, str], float] = {}
         for one, weight in zip(self.hypotheses, self.weights.sum(axis=1), strict=True):
             for name in one.names:
-                out[name] += float(weight)
-        return dict(out.most_common())
+                out[name] = out.get(name, 0.0) + float(weight)
+        return dict(sorted(out.items(), key=lambda pair: -pair[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +302,7 @@ def energies(one: Hypothesis) -> tuple[Array, Array]:
     """
     n = one.rows.plates
     left = one.left[:n]
-    count = np.bincount(one.rows.block[:n])
+    count = np.bincount(one.rows.block[:n]).astype(float)
     loud = np.exp(2 * one.fit.scales.noise)
     return np.bincount(one.rows.block[:n], weights=left**2) / np.maximum(count, 1) / loud, count
 

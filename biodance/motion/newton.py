@@ -44,7 +44,7 @@ _WEIGHED, _UNLIKE = 0.002, 0.25
 goes unlike the centre of mass (slope of force against acceleration: 0.75 to 0.85 of the mass in squats and in running).
 """
 _TRUNKS: "WeakKeyDictionary[Trial, tuple[float, Trunk | None]]" = WeakKeyDictionary()
-"""The trunk of a trial with the mass it was asked for, kept as long as the trial lives: checks and witnesses ask."""
+"""The trunk of a trial with the mass it was asked for, kept as long as the trial lives: checks and observers ask."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,23 @@ class Trunk:
     def rate(self) -> float:
         """Hz of the markers."""
         return 1 / float(np.median(np.diff(self.time)))
+
+    def spans(self, least: float) -> list[slice]:
+        """Return the frames, ``least`` s or longer without a break, in which plates alone can carry the person."""
+        return [slice(*run) for run in runs(self.covered) if run[1] - run[0] >= least * self.rate]
+
+    def weights(self, gravity: float) -> list[tuple[slice, Array, float]]:
+        """Return the frames that weigh, the factors (n,) s²/m by which forces at them give a mass, and its standard
+        deviation as a share of it.
+        """
+        found = []
+        for span in self.spans(_WEIGHS):
+            weight, bend = fading(self.time[span])
+            height = self.height[span]
+            acceleration = float(bend @ (height - height.mean()))
+            sd = float(np.hypot(_WEIGHED, _UNLIKE * acceleration / gravity))
+            found.append((span, weight / (gravity + acceleration), sd))
+        return found
 
     def beside(self, total: Wrench, *, gravity: float, sway: float) -> "LagAndMass | None":
         """Return what Newton tells of the ``total`` wrench of all plates, see `lag_and_mass`; the last ones are kept: a
@@ -167,7 +184,7 @@ def lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, 
     rate = 1 / float(np.median(np.diff(time))) if time.size > 1 else 0.0
     if rate <= 2 * _BAND.cutoff or time.size < 2 * _BAND.shortest(rate) or not known.all():
         return None
-    spans = [slice(*run) for run in runs(trunk.covered) if run[1] - run[0] >= _LEAST * trunk.rate]
+    spans = trunk.spans(_LEAST)
     if not spans:
         return None
     here = np.concatenate([np.arange(span.start, span.stop) for span in spans])
@@ -180,7 +197,7 @@ def lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, 
     force = np.interp(trunk.time + (lag if np.isfinite(lag) else 0.0), time, slow)
     mass = mass_sd = float("nan")
     if correlation >= TELLS or swing <= sway:
-        mass, mass_sd = _mass(trunk, [s for s in spans if s.stop - s.start >= _WEIGHS * trunk.rate], force, gravity)
+        mass, mass_sd = _mass(trunk, force, gravity)
     seconds = here.size / trunk.rate
     return LagAndMass(lag, lag_sd, mass, mass_sd, correlation, unmoved, seconds, swing)
 
@@ -210,20 +227,62 @@ def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, fl
     return float(lag), float(left.std() / steep / independent**0.5), float(alike[k]), unmoved
 
 
-def _mass(trunk: Trunk, spans: list[slice], force: Array, gravity: float) -> tuple[float, float]:
-    """Return the mass kg and its sd by all ``spans`` of frames, each with the weight of its own sd; NaN without one."""
-    masses, sds = [], []
-    for span in spans:
-        time, height = trunk.time[span], trunk.height[span]
-        weight, bend = fading(time)
-        acceleration = float(bend @ (height - height.mean()))
-        mass = float(weight @ force[span]) / (gravity + acceleration)
-        masses.append(mass)
-        sds.append(abs(mass) * float(np.hypot(_WEIGHED, _UNLIKE * acceleration / gravity)))
-    if not masses:
+def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
+    """Return the mass kg and its sd by the force (T,) N, each span of frames with the weight of its own sd; NaN without
+    one.
+    """
+    weights = trunk.weights(gravity)
+    if not weights:
         return float("nan"), float("nan")
-    share = np.array(sds) ** -2
+    masses = np.array([weight @ force[span] for span, weight, _ in weights])
+    share = (np.abs(masses) * [sd for *_, sd in weights]) ** -2
     return float(share @ masses / share.sum()), float(max(share.sum() ** -0.5, _WEIGHED * np.mean(masses)))
+
+
+def slopes_of(trunk: Trunk, told: LagAndMass, total: Wrench, changes: Array, *, gravity: float) -> tuple[Array, Array]:
+    """Return the derivatives of lag and mass of `lag_and_mass` with respect to the sizes (d,) of ``changes`` (S, d) N
+    of the total vertical force; 0 of what is not told.
+
+    The lag is the top of the parabola through three correlations: its derivative is that of the three. The mass changes
+    with the forces, with the lag, and with what each span weighs among all.
+    """
+    rate = 1 / float(np.median(np.diff(total.time)))
+    slow = low_pass(np.column_stack([total.force[:, 2], changes]), rate, _BAND)
+    slow = np.column_stack([slow, np.gradient(slow[:, 0], total.time)])
+    lags, masses = np.zeros(changes.shape[1]), np.zeros(changes.shape[1])
+    if np.isfinite(told.lag):
+        lags = _lag_slope(trunk, total.time, slow[:, :-1], told.lag)
+    weights = trunk.weights(gravity) if np.isfinite(told.mass) else []
+    times = trunk.time + (told.lag if np.isfinite(told.lag) else 0.0)
+    each = np.array([weight @ _at(times[span], total.time, slow) for span, weight, _ in weights])
+    if len(each):
+        share = (np.abs(each[:, 0]) * [sd for *_, sd in weights]) ** -2
+        share /= share.sum()
+        share *= 1 - 2 * (each[:, 0] - told.mass) / each[:, 0]  # a heavier span weighs less among all
+        masses = share @ (each[:, 1:-1] + np.outer(each[:, -1], lags))
+    return lags, masses
+
+
+def _lag_slope(trunk: Trunk, time: Array, slow: Array, lag: float) -> Array:
+    """Return the derivatives (d,) of the lag with respect to the columns of ``slow`` (S, 1 + d) after the first."""
+    here = np.concatenate([np.arange(span.start, span.stop) for span in trunk.spans(_LEAST)])
+    wanted = trunk.acceleration[here] - trunk.acceleration[here].mean()
+    alike, slopes = [], []
+    for near in _STEP * (round(lag / _STEP) + np.arange(-1, 2)):
+        found = _at(trunk.time[here] + near, time, slow)
+        found -= found.mean(axis=0)
+        force, changed = found[:, 0], found[:, 1:]
+        size = np.linalg.norm(force) * np.linalg.norm(wanted)
+        alike.append(force @ wanted / size)
+        slopes.append(wanted @ changed / size - alike[-1] * (force @ changed) / (force @ force))
+    bend, bends = np.diff(alike, 2)[0], np.diff(slopes, 2, axis=0)[0]
+    fall, falls = alike[0] - alike[2], slopes[0] - slopes[2]
+    return np.asarray(0.5 * _STEP * (falls - fall / bend * bends) / bend) if bend < 0 else np.zeros_like(falls)
+
+
+def _at(time: Array, known: Array, values: Array) -> Array:
+    """Return columns (S, k) at other times (n,) s, straight between samples."""
+    return np.stack([np.interp(time, known, column) for column in values.T], axis=1)
 
 
 def fading(time: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import failed_check
-from biodance.diagnosis.witness_evidence import WitnessEvidence
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.cause_words import alternatives, spoken
@@ -183,7 +183,7 @@ def _first_sentence(reason: str) -> str:
     return reason.split(". ")[0].rstrip(".")
 
 
-def stepped(rows: tuple[Judged, ...], evidence: WitnessEvidence | None) -> tuple[Judged, ...]:
+def stepped(rows: tuple[Judged, ...], evidence: ObservedEvidence | None) -> tuple[Judged, ...]:
     """Return what a verdict rests on with the steps that only the witnesses could judge: seconds of one foot alone on
     a plate. Such a trial still misses the comparison with a body.
     """

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.spectrum import SHORTEST_RUN

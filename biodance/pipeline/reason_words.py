@@ -1,6 +1,6 @@
 """Why a diagnosis says no more than it does, in words: the one room in which a `Reason` becomes a sentence."""
 
-from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.reasons import Reason
 from biodance.pipeline.finding_words import in_words, listed

@@ -3,10 +3,10 @@
 import numpy as np
 
 from biodance.motion.quiet_standing import QuietStanding
+from biodance.observations import recording
+from biodance.observations.stride_force import StrideForce
 from biodance.pipeline.trial_result import WeighedBy, Weighing
 from biodance.records import Session
-from biodance.witnesses import recording
-from biodance.witnesses.stride_force import StrideForce
 
 _STANDING, _MOVING = 0.002, 0.005
 """Standard deviation of a weight as a share of it: in quiet standing; of one person between movements (a belt at two

@@ -2,7 +2,7 @@
 the foot of an ordinary step and when the heel strikes.
 
 What steps share (a person's foot, a laboratory's way to put its toe marker) is shared in their covariance: two steps of
-one foot do not halve it. Norms and standard deviations are those of the witnesses.
+one foot do not halve it. Norms and standard deviations are those of the observations.
 """
 
 from collections.abc import Iterable
@@ -20,14 +20,14 @@ from biodance.lab.plates.faults import DELAY, POSITION, ROTATION
 from biodance.motion.contact.contact import Contact
 from biodance.motion.contact.over import inside
 from biodance.motion.contact.soles import Soles
+from biodance.observations import ONSET, FootPath
+from biodance.observations.foot_across import ACROSS_PHASES
+from biodance.observations.foot_along import ALONG_PHASES
+from biodance.observations.force_onset import ONSET_AFTER_STRIKE, heel_strike
 from biodance.records import SIDES, Array, Motion, Trial, Wrench, runs
 from biodance.registration.pose import Forces, FramePose
 from biodance.spatial import cross, wrench_about_origin, wrench_about_point
 from biodance.uncertainty.tolerances import Tolerances
-from biodance.witnesses import ONSET, FootPath
-from biodance.witnesses.foot_across import ACROSS_PHASES
-from biodance.witnesses.foot_along import ALONG_PHASES
-from biodance.witnesses.force_onset import ONSET_AFTER_STRIKE, heel_strike
 
 _SHORTEST_STEP, _LONGEST_STEP = 0.3, 1.6
 """s: a walking step."""
@@ -110,18 +110,16 @@ def _step(
     if not (np.isfinite(heel[near]).all() and np.isfinite(toe[near]).all()):
         return None
     path = FootPath(SIDES[foot], frames, heel, toe, toe)
-    ahead, beside, apart = path.in_foot(time, place[:, :2])
-    behind, front = path.at(time)
-    forwards = (front - behind) * np.array([1.0, 1.0, 0.0]) / apart[:, None]
-    left = np.stack([-forwards[:, 1], forwards[:, 0], np.zeros(len(forwards))], axis=1)
-    outwards = -left if SIDES[foot] == "right" else left
+    under = path.in_foot(time, place[:, :2])
+    ahead, beside = under.place.T
+    forwards, outwards = np.moveaxis(np.pad(under.axes, ((0, 0), (0, 0), (0, 1))), 1, 0)
     phase = (time - time[0]) / (time[-1] - time[0])
     onset = time[0] - heel_strike(path, float(time.mean()), time[0])
     known = np.isfinite(ahead)
     phase, place, forwards, outwards, ahead, beside = (
         x[known] for x in (phase, place, forwards, outwards, ahead, beside)
     )
-    length = float(np.median(apart))
+    length = float(np.median(under.length))
     return PlateStep(number, SIDES[foot], phase, place, forwards, outwards, ahead, beside, length, onset)
 
 

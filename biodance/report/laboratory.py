@@ -2,7 +2,7 @@
 `biodance learn` print.
 
 ``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`),
-every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and witnesses;
+every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and observations;
 ``[normal."..."]`` are bands of joint angles, moments and powers. Corrections
 that were accepted stand in ``[corrections]`` of the same file.
 """

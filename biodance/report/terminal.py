@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from biodance.diagnosis.adequacy import LIMIT
+from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.doctor import MachineFinding
 from biodance.errors import without_codes
@@ -265,11 +265,11 @@ def _print_judged(rows: Sequence[dict[str, Any]], console: Console) -> None:
 
 
 def _print_witnesses(found: dict[str, Any], console: Console) -> None:
-    """Print how many causes the witnesses could have seen, and where it stands how well."""
+    """Print how many causes the observations respond to, and where it stands how well."""
     if not found["witnesses"]:
         return
     seen, blind = (sum(bool(row["witnesses"]) is looked for row in found["witness_table"]) for looked in (True, False))
-    text = f"witnesses (feet, clocks, empty plates) could see {seen} causes and are blind to {blind}: how small, and "
+    text = f"feet, clocks and empty plates would show {seen} causes and {blind} not: how small, and "
     _line(console, f"{text}what looks like what, stands in the page and in results.json")
 
 

@@ -78,7 +78,7 @@ class Tolerances:
     more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a nuisance,
     by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
     share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like
-    its model; ``norms`` by kind of observation (`witnesses.Observation.kind`): what a laboratory's own sessions share
+    its model; ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share
     beyond what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is
     the plates' zero, an error like the other sizes: it hides causes, and no noise does.
     """

@@ -15,8 +15,8 @@ from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, of_steps, placed, step_rows
 from biodance.lab.markers.still import is_still, standing_mass
 from biodance.lab.plates.decode import block_means, find_baseline
+from biodance.observations import recording
 from biodance.records import Array, Plate, Trial
-from biodance.witnesses import recording
 
 _LOADED = 20.0
 """N: mean vertical force from which on somebody stands on a plate."""

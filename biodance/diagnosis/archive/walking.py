@@ -1,8 +1,8 @@
 """What ordinary steps say of the plates they fall on: their place, the delay of the force, what they weigh.
 
-The witnesses (`biodance.witnesses`) tell how far the pressure lies from where it is in a foot; which way a plate would
-have to be moved for it is asked of them by altering the recording. Where a person's own foot has the pressure is
-unknown and the same in all steps of that foot: all steps of a visit, on all plates, are solved together, so that left
+Observations (`biodance.observations`) tell how far the pressure lies from where it is in a foot; which way a plate
+would have to be moved for it, their sensitivities say. Where a person's own foot has the pressure is unknown and the
+same in all steps of that foot: all steps of a visit, on all plates, are solved together, so that left
 and right, there and back tell the foot from the plate.
 """
 
@@ -13,8 +13,8 @@ import numpy as np
 
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.effects.plate_position import PlatePosition
+from biodance.observations import Observation, SeenTrial, observe, sensitivities
 from biodance.records import Array
-from biodance.witnesses import Observation, SeenTrial, observe, possible_causes, traces
 
 _PLACE, _ONSET, _WEIGHT = ("foot_across", "foot_along"), "force_onset", "stride_force"
 _BLIND = 0.03
@@ -22,7 +22,7 @@ _BLIND = 0.03
 _UNKNOWN = 0.3
 """m: what is known of a plate's place before any step."""
 _TAIL, _ROUNDS = 4.0, 15
-"""Degrees of freedom of a step's own error, as in `diagnosis.testimony`: one step in twenty is odd."""
+"""Degrees of freedom of a step's own error, as in `diagnosis.witness_fit`: one step in twenty is odd."""
 _OWN = "person "
 """Beginning of the names of what all steps of a person share."""
 
@@ -50,8 +50,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
     for plate in dict.fromkeys(step.plate for step in seen.steps):
         own = tuple(one for one in found if one.plate == plate)
         if own:
-            causes = {one.target: one for one in possible_causes(seen) if one.effect == PlatePosition.name}
-            columns = np.column_stack([traces(seen, own, causes[f"{plate}:{axis}"], _PLACE) for axis in "xy"])
+            shifts = [sensitivities(seen, own, PlatePosition.name, f"{plate}:{axis}", "shift") for axis in "xy"]
             out += [
                 StepRow(
                     labels[plate],
@@ -60,7 +59,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
                     one.sd,
                     {name: size for name, size in one.norms.items() if name.startswith(_OWN)},
                 )
-                for one, column in zip(own, columns, strict=True)
+                for one, column in zip(own, np.column_stack(shifts), strict=True)
             ]
     return out
 
@@ -111,8 +110,8 @@ def of_steps(
     for plate in dict.fromkeys(step.plate for step in seen.steps):
         own = [one for one in found if one.plate == plate]
         for quantity, value, sd in (
-            *_mean("delay", [one for one in own if one.witness == _ONSET], relative=False),
-            *_mean("gain", [one for one in own if one.witness == _WEIGHT], relative=True),
+            *_mean("delay", [one for one in own if one.observer == _ONSET], relative=False),
+            *_mean("gain", [one for one in own if one.observer == _WEIGHT], relative=True),
         ):
             name = seen.trial.name
             out.append(PlateEvidence(quantity, {labels[plate]: 1.0}, value, sd, visit, name, kind, "steps"))

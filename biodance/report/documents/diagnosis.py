@@ -10,7 +10,7 @@ import numpy as np
 from biodance.diagnosis.diagnosis import Estimate, Finding
 from biodance.diagnosis.foresight import TOLD, Foresight
 from biodance.diagnosis.gain import Gain
-from biodance.diagnosis.witness_evidence import WitnessEvidence, cause_visibilities
+from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.identification.identification import Identification
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.records.attention import Attention, Judged
@@ -149,19 +149,23 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
     }
 
 
-def _witnesses(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
-    """Return every observation; ``cause`` is the one that it sees best, "" where it is blind to all."""
+def _witnesses(evidence: ObservedEvidence | None) -> list[dict[str, Any]]:
+    """Return every observation; ``cause`` is the one to which it responds most, "" where to none."""
     return [
-        {"witness": o.witness, "cause": " ".join(filter(None, evidence.strongest(i))), **keyed(o, _OBSERVED)}
+        {"witness": o.observer, "cause": " ".join(filter(None, evidence.strongest(i))), **keyed(o, _OBSERVED)}
         for i, o in enumerate(evidence.observations if evidence else ())
         if evidence
     ]
 
 
-def _visibilities(evidence: WitnessEvidence | None) -> list[dict[str, Any]]:
-    """Return how well each cause was seen; an ``sd`` of null: every witness was blind to it."""
+def _visibilities(evidence: ObservedEvidence | None) -> list[dict[str, Any]]:
+    """Return how well each cause was seen; an ``sd`` of null: nothing responds to it."""
     return [
-        keyed(one, "effect target sd unit witnesses")
-        | {"alike": [f"{effect} {target}".strip() for effect, target in one.alike], "would_be_seen_by": one.would}
+        keyed(one, "effect target sd unit")
+        | {
+            "witnesses": one.observers,
+            "alike": [f"{effect} {target}".strip() for effect, target in one.alike],
+            "would_be_seen_by": one.would,
+        }
         for one in (cause_visibilities(evidence) if evidence else ())
     ]

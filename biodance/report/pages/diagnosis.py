@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.adequacy import LIMIT
-from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.consequence import LIMIT, Adequacy
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Unobservable
-from biodance.diagnosis.witness_evidence import WitnessEvidence, cause_visibilities
+from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import Provenance
@@ -213,17 +212,17 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     )
 
 
-def _witnesses(evidence: WitnessEvidence | None) -> dict[str, Any] | None:
-    """Return the causes with the witnesses that see them, the blind rows in words, and all observations."""
+def _witnesses(evidence: ObservedEvidence | None) -> dict[str, Any] | None:
+    """Return the causes with the observers that respond to them, the others in words, and all observations."""
     if evidence is None:
         return None
     rows = cause_visibilities(evidence)
-    blind: dict[str, list[str]] = {}
+    unseen: dict[str, list[str]] = {}
     for row in rows:
-        if not row.witnesses:
-            blind.setdefault(" ".join(row.would), []).append(named(row.effect, row.target))
+        if not row.observers:
+            unseen.setdefault(" ".join(row.would), []).append(named(row.effect, row.target))
     return {
-        "seen": [row for row in rows if row.witnesses],
-        "blind": [("; ".join(causes), would) for would, causes in blind.items()],
+        "seen": [row for row in rows if row.observers],
+        "unseen": [("; ".join(causes), would) for would, causes in unseen.items()],
         "observations": sorted(evidence.observations, key=lambda one: -abs(one.z)),
     }

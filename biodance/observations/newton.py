@@ -6,12 +6,17 @@ whole on a plate, no step and no posture; a chair that carries along lowers the 
 
 import math
 
+import numpy as np
+
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.plate_gain import PlateGain
 from biodance.effects.plate_offset import PlateOffset
 from biodance.effects.time_delay import TimeDelay
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses.stride_force import DECLARED, StrideForce
+from biodance.motion.newton import LagAndMass, slopes_of
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.observations.stride_force import DECLARED, StrideForce
+from biodance.records import Array
 
 _LABORATORY = 0.006
 """s: sd of one laboratory (and movement) of the lag of clean recordings: the means of 13 public laboratories have an sd
@@ -24,11 +29,11 @@ _PERSON = 0.005
 walking)."""
 
 
-class Newton(Witness):
+class Newton(Observer):
     """Lag (s) of the total vertical force behind the trunk, and the mass (kg) that it weighs."""
 
     name = "newton"
-    sees = (TimeDelay.name, BodyMass.name, PlateGain.name, PlateOffset.name)
+    responds_to = (TimeDelay.name, BodyMass.name, PlateGain.name, PlateOffset.name)
     needs = "Movement up and down with both feet on the plates (walking, squats); markers of pelvis or trunk, and feet."
     source = "Newton's second law; 13 public laboratories"
 
@@ -39,20 +44,38 @@ class Newton(Witness):
         told, trial = seen.newton, seen.trial.name
         if told is None:
             return ()
-        found = []
+        slopes, found = _slopes(seen, told), []
         if math.isfinite(told.lag):
             sd, norms = math.hypot(told.lag_sd, _TRIAL), {"laboratory newton lag": _LABORATORY}
-            found.append(Observation(self.name, "all plates, lag", trial, told.lag, sd, 0.0, "s", norms=norms))
+            responds = Sensitivity(slopes[0], delay=1.0)
+            found.append(
+                Observation(
+                    self.name, "all plates, lag", trial, told.lag, sd, 0.0, "s", norms=norms, sensitivity=responds
+                )
+            )
         if math.isfinite(told.mass) and seen.mass > 0:
             norms = {"person declared mass": DECLARED * seen.mass, "person weighs by newton": _PERSON * seen.mass}
             counts = not seen.still and not any(one.unit == "kg" for one in StrideForce().observe(seen))
             found.append(
                 Observation(
                     self.name, "all plates, mass", trial, told.mass, told.mass_sd, seen.mass, "kg", norms=norms,
-                    counts=counts,
+                    counts=counts, sensitivity=Sensitivity(slopes[1], mass=1.0),
                 )
             )  # fmt: skip
         return tuple(found)
 
 
-WITNESS = Newton
+def _slopes(seen: SeenTrial, told: LagAndMass) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return by plate the derivatives (6, 7) of the lag and of the mass with respect to B."""
+    assert seen.trunk is not None
+    lags, masses = {}, {}
+    for plate in seen.trial.plates:
+        lags[plate.name], masses[plate.name] = np.zeros((2, 6, 7))
+        changes = np.column_stack([plate.wrench.value, np.ones(plate.wrench.time.size)])
+        lags[plate.name][2], masses[plate.name][2] = slopes_of(
+            seen.trunk, told, seen.total, changes, gravity=seen.trial.settings.gravity
+        )
+    return lags, masses
+
+
+OBSERVER = Newton

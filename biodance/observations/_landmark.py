@@ -5,7 +5,7 @@ and a left foot on another then look like two plates shifted in opposite directi
 speaks of plates. The farther ahead the pressure lies, the more the toe marker's place matters: at the heel not at all.
 """
 
-from biodance.witnesses._feet import FootPath
+from biodance.observations._feet import FootPath
 
 LANDMARK = "toe landmark"
 """What the names of the errors hold that both feet share because of where their markers sit."""

@@ -9,10 +9,11 @@ from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_gain import PlateGain
 from biodance.effects.plate_offset import PlateOffset
 from biodance.effects.plate_rotation import PlateRotation
-from biodance.records import Array
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._recording import ONSET
-from biodance.witnesses.stride_force import DECLARED
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._recording import ONSET
+from biodance.observations._sensitivity import Sensitivity, of_mean
+from biodance.observations.stride_force import DECLARED
+from biodance.records import Array, Plate
 
 _ON_PLATES = (0.75, 1.35)
 """Share of the declared mass between which somebody stands on the plates with both feet and in the right unit."""
@@ -22,13 +23,13 @@ _SHORTEST = 0.4
 """s of standing."""
 
 
-class StandingForce(Witness):
+class StandingForce(Observer):
     """Mass (kg) by the mean vertical force in quiet standing, and the mean horizontal forces (N), in which no zero can
     be told from a plate that is not level.
     """
 
     name = "standing_force"
-    sees = (BodyMass.name, PlateGain.name, PlateOffset.name)
+    responds_to = (BodyMass.name, PlateGain.name, PlateOffset.name)
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still is not accelerated; 9 static trials of 3 public laboratories"
 
@@ -44,11 +45,22 @@ class StandingForce(Witness):
         where = plates[0].name if len(plates) == 1 else ""
         mass = force[2] / seen.trial.settings.gravity
         norms, trial = {"person declared mass": DECLARED * seen.mass}, seen.trial.name
-        found = [Observation(self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms)]
+        g = seen.trial.settings.gravity
+        weighs = Sensitivity({p.name: of_mean(_known(p), 2) / g for p in seen.trial.plates}, mass=1.0)
+        found = [
+            Observation(
+                self.name, "mass", trial, mass, _MASS * seen.mass, seen.mass, "kg", where, norms, sensitivity=weighs
+            )
+        ]
         sd = _SWAY * weight / max(1.0, (total.time[-1] - total.time[0])) ** 0.5
         for axis, channel in enumerate(("Fx", "Fy")):
             value, own = float(force[axis]), {f"plate level along {'xy'[axis]}": _level(axis) * weight}
-            found.append(Observation(self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where, own))
+            pushes = Sensitivity({p.name: of_mean(_known(p), axis) for p in seen.trial.plates})
+            found.append(
+                Observation(
+                    self.name, f"mean {channel}", trial, value, max(sd, 0.5), 0.0, "N", where, own, sensitivity=pushes
+                )
+            )
         return tuple(found)
 
 
@@ -61,10 +73,15 @@ def _level(axis: int) -> float:
     return float(np.linalg.norm([*lean, error_size(PlateCrosstalk.name, f"Fz->{channel}")]))
 
 
+def _known(plate: Plate) -> Array:
+    """Return the wrench (n, 6) of a plate at the samples that are known."""
+    return plate.wrench.value[np.isfinite(plate.wrench.value).all(axis=1)]
+
+
 def mean_force(force: Array) -> Array:
     """Return the mean (3,) N of forces (S, 3) N, NaN samples left out."""
     mean = force.mean(axis=0)
     return np.asarray(mean if np.isfinite(mean).all() else np.nanmean(force, axis=0))
 
 
-WITNESS = StandingForce
+OBSERVER = StandingForce

@@ -1,6 +1,6 @@
 """Where the feet and the pelvis were, by their markers."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,12 +13,59 @@ from biodance.records.arrays import rate_of
 
 _UNSEEN = 0.05
 """s over which a marker that was not seen is believed to go on straight."""
-_KEPT = 64
-"""Sets of times at which a foot's place is kept."""
 _HALF_BREADTH = 0.28
 """Half the distance of the outer markers of the forefoot, in units of that from the heel to the outermost one: 0.26 to
 0.29 in nine persons with shoes of two laboratories, 0.23 and 0.35 in two others: 8 mm either way.
 """
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A path where it was seen: ``time`` (T,) s and ``place`` (n, T) m."""
+
+    time: Array
+    place: Array
+
+    @cached_property
+    def speed(self) -> Array:
+        """(n, T) m/s."""
+        return np.asarray(np.gradient(self.place, self.time, axis=1)) if self.time.size > 1 else 0.0 * self.place
+
+    def at(self, time: Array) -> Array:
+        """Return places (t, n) m at other times, straight between frames; NaN where no frame near is known."""
+        return self._between(self.place, time)
+
+    def speed_at(self, time: Array) -> Array:
+        """Return velocities (t, n) m/s at other times."""
+        return self._between(self.speed, time)
+
+    def _between(self, values: Array, time: Array) -> Array:
+        if not self.time.size:
+            return np.full((time.size, len(values)), np.nan)
+        out = np.stack([np.interp(time, self.time, one) for one in values], axis=1)
+        after = np.minimum(np.searchsorted(self.time, time), self.time.size - 1)
+        near = np.minimum(np.abs(time - self.time[after]), np.abs(time - self.time[np.maximum(after - 1, 0)]))
+        out[near > _UNSEEN] = np.nan
+        return out
+
+
+def track_of(time: Array, path: Array) -> Track:
+    """Return the track of a path (T, n) m, NaN where it was not seen."""
+    seen = np.isfinite(path).all(axis=1)
+    return Track(time[seen], np.ascontiguousarray(path[seen].T))
+
+
+@dataclass(frozen=True, eq=False)
+class InFoot:
+    """Points in the frame of a foot, or what moves it: ``axes`` (n, 2, 2) unit vectors from the heel marker to the
+    front, and outwards; ``place`` (n, 2) m of the points along them from the heel marker; ``moves`` (n, 2) m/s: how
+    fast fixed points go along them because the foot moves; ``length`` (n,) m from the heel marker to the front.
+    """
+
+    axes: Array
+    place: Array
+    moves: Array
+    length: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,21 +82,21 @@ class FootPath:
     front: Array
     by_edges: bool = False
     centred: bool = True
-    _known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
-    _ways: dict[bytes, tuple[Array, Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
-    _drifts: dict[bytes, Array] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def tracks(self) -> tuple[Track, Track]:
+        """Heel marker and front where they were seen."""
+        return track_of(self.time, self.heel), track_of(self.time, self.front)
+
+    @cached_property
+    def toe_track(self) -> Track:
+        """Toe marker where it was seen."""
+        return track_of(self.time, self.toe)
 
     def at(self, time: Array) -> tuple[Array, Array]:
-        """Return heel and front (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen.
-
-        It is kept: witnesses are asked for the same times again and again, of recordings whose plates were altered.
-        """
-        key = time.tobytes()
-        if key not in self._known:
-            if len(self._known) >= _KEPT:
-                self._known.pop(next(iter(self._known)))
-            self._known[key] = path_at(self.time, self.heel, time), path_at(self.time, self.front, time)
-        return self._known[key]
+        """Return heel and front (n, 3) m at other times (n,) s; NaN beside frames in which they were not seen."""
+        heel, front = self.tracks
+        return heel.at(time), front.at(time)
 
     def outline(self, time: Array) -> Array:
         """Return the sole (n, P, 2) m seen from above, from the heel marker and the front."""
@@ -60,32 +107,24 @@ class FootPath:
 
     def axes(self, time: float) -> Array:
         """Return the horizontal unit vectors (2, 2) from the heel marker to the front and outwards, at ``time`` s."""
-        heel, front = (path[0, :2] for path in self.at(np.array([time])))
-        ahead = (front - heel) / np.linalg.norm(front - heel)
-        return np.stack([ahead, np.array([ahead[1], -ahead[0]]) * (1.0 if self.side == "right" else -1.0)])
+        at = np.array([time])
+        return np.asarray(self.in_foot(at, np.zeros((1, 2))).axes[0])
 
-    def in_foot(self, time: Array, point: Array) -> tuple[Array, Array, Array]:
-        """Return how far ``point`` (n, 2) m lies ahead of the heel marker and outwards of the line to the front, m
-        (n,), and the horizontal distance of the two (n,) m.
-        """
-        heel, ahead, out, length = self._lines(time)
-        x, y = (point - heel).T
-        return x * ahead[:, 0] + y * ahead[:, 1], x * out[:, 0] + y * out[:, 1], length
-
-    def _lines(self, time: Array) -> tuple[Array, Array, Array, Array]:
-        """Return the heel (n, 2) m, the directions ahead and outwards (n, 2) and the length (n,) m of the foot; kept,
-        like the places.
-        """
-        key = time.tobytes()
-        if key not in self._ways:
-            if len(self._ways) >= _KEPT:
-                self._ways.pop(next(iter(self._ways)))
-            heel, front = (path[:, :2] for path in self.at(time))
-            length = np.linalg.norm(front - heel, axis=1)
-            ahead = (front - heel) / length[:, None]
-            out = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) * (1.0 if self.side == "right" else -1.0)
-            self._ways[key] = heel, ahead, out, length
-        return self._ways[key]
+    def in_foot(self, time: Array, point: Array) -> InFoot:
+        """Return points (n, 2) m in the foot at times (n,) s."""
+        (heel, front), speeds = (
+            (path[:, :2] for path in self.at(time)),
+            [one.speed_at(time)[:, :2] for one in self.tracks],
+        )
+        length = np.linalg.norm(front - heel, axis=1)
+        ahead = (front - heel) / length[:, None]
+        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        outwards = -1.0 if self.side == "right" else 1.0
+        axes = np.stack([ahead, outwards * left], axis=1)
+        turns = np.sum(left * (speeds[1] - speeds[0]), axis=1) / length
+        place = np.einsum("nij,nj->ni", axes, point - heel)
+        crosses = np.stack([place[:, 1], -place[:, 0]], axis=1) * outwards * turns[:, None]
+        return InFoot(axes, place, crosses - np.einsum("nij,nj->ni", axes, speeds[0]), length)
 
     @property
     def rate(self) -> float:
@@ -100,35 +139,36 @@ class FootPath:
         return np.gradient((self.heel + self.toe) / 2, self.time, axis=0)
 
     @cached_property
+    def _velocity(self) -> Track:
+        return track_of(self.time, self.velocity)
+
+    def velocity_at(self, time: Array) -> Array:
+        """Return the velocity (n, 3) m/s of the middle between the two markers at other times (n,) s."""
+        return self._velocity.at(time)
+
+    @cached_property
     def pointing(self) -> Array:
         """(3,) m from the heel marker to the front, the median over the trial."""
         return np.asarray(np.nanmedian(self.front - self.heel, axis=0))
 
-    def drift(self, time: Array) -> Array:
-        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none. It is
-        kept, like the places.
+    @cached_property
+    def lowest(self) -> Array:
+        """(2,) m: the lowest places of the heel marker and of the front in the trial."""
+        return np.array([np.nanmin(path[:, 2]) for path in (self.heel, self.front)])
+
+    @cached_property
+    def resting(self) -> Array:
+        """(2,) m: median heights of the heel marker and the front where the foot goes neither up nor down; NaN where it
+        always does.
         """
-        key = time.tobytes()
-        if key not in self._drifts:
-            if len(self._drifts) >= _KEPT:
-                self._drifts.pop(next(iter(self._drifts)))
-            velocity = path_at(self.time, self.velocity, time)
-            known = velocity[np.isfinite(velocity).all(axis=1)]
-            self._drifts[key] = np.median(known, axis=0) if len(known) else np.full(3, np.nan)
-        return self._drifts[key]
+        flat = np.abs(self.velocity[:, 2]) < 0.1
+        return np.array([np.nanmedian(path[flat, 2]) if flat.any() else np.nan for path in (self.heel, self.front)])
 
-
-def path_at(known: Array, path: Array, time: Array) -> Array:
-    """Return a path (T, n) at other times, straight between frames; NaN where no frame near is known."""
-    seen = np.isfinite(path).all(axis=1)
-    if not seen.any():
-        return np.full((len(time), path.shape[1]), np.nan)
-    at, values = known[seen], path[seen]
-    out = np.stack([np.interp(time, at, column) for column in values.T], axis=1)
-    after = np.clip(np.searchsorted(at, time), 0, at.size - 1)
-    near = np.minimum(np.abs(time - at[after]), np.abs(time - at[np.maximum(after - 1, 0)]))
-    out[near > _UNSEEN] = np.nan
-    return out
+    def drift(self, time: Array) -> Array:
+        """Return the median velocity (3,) m/s at some times: that of the belt a foot stands on, or nearly none."""
+        velocity = self.velocity_at(time)
+        known = velocity[np.isfinite(velocity).all(axis=1)]
+        return np.median(known, axis=0) if len(known) else np.full(3, np.nan)
 
 
 def feet_of(markers: Markers | None, known: tuple[str, ...]) -> tuple[FootPath, ...]:
@@ -155,7 +195,7 @@ def _foot(markers: Markers, set_name: str, side: str, heel: Array, toe: Array) -
     if inner is not None and outer is not None:
         return FootPath(side, markers.time, heel, toe, (inner + outer) / 2, by_edges=True)
     found = FootPath(side, markers.time, heel, toe, toe)
-    if outer is None or not np.nanmedian(found.in_foot(markers.time, outer[:, :2])[1]) > 0:
+    if outer is None or not np.nanmedian(found.in_foot(markers.time, outer[:, :2]).place[:, 1]) > 0:
         return found
     along = (outer - heel)[:, :2]
     front = np.array(outer)

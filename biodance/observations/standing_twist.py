@@ -7,19 +7,20 @@ is the zero of Mz; horizontal forces, which are small, hardly enter.
 import numpy as np
 
 from biodance.effects.plate_offset import PlateOffset
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
-from biodance.witnesses import Observation, SeenTrial, Witness
 
 _OWN = 0.4
 """N·m of sway over a second or longer: 0.00 to 0.16 in eleven static trials of three laboratories."""
 
 
-class StandingTwist(Witness):
+class StandingTwist(Observer):
     """Mean moment (N·m) of all plates about the vertical through the mean centre of pressure in quiet standing."""
 
     name = "standing_twist"
-    sees = (PlateOffset.name,)
+    responds_to = (PlateOffset.name,)
     needs = "Standing still with both feet wholly on the plates."
     source = "Newton: who stands still does not turn; 11 static trials of 3 public laboratories"
 
@@ -36,7 +37,15 @@ class StandingTwist(Witness):
         twist, lasts = float(mean[5] - x * mean[1] + y * mean[0]), float(np.ptp(seen.total.time))
         loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * mean[2]]
         where, sd = loaded[0] if len(loaded) == 1 else "", _OWN * max(1.0, 1.0 / max(lasts, 1e-3))
-        return (Observation(self.name, "moment about the vertical", trial.name, twist, sd, 0.0, "N·m", where),)
+        aside = np.tile([mean[1], -mean[0]], (len(value), 1))  # the twist loses this times the place of the pressure
+        gradient = -pressure_gradient(value, aside, height) / len(value)
+        gradient += np.array([y, -x, 0.0, 0.0, 0.0, 1.0]) / len(value)
+        responds = Sensitivity(by_plate(gradient, {plate.name: plate.wrench.value for plate in plates}), linear=False)
+        return (
+            Observation(
+                self.name, "moment about the vertical", trial.name, twist, sd, 0.0, "N·m", where, sensitivity=responds
+            ),
+        )
 
 
-WITNESS = StandingTwist
+OBSERVER = StandingTwist

@@ -8,9 +8,10 @@ import numpy as np
 
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, by_plate, pressure_gradient
+from biodance.observations.standing_force import mean_force
 from biodance.records import Array
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses.standing_force import mean_force
 
 _ASIDE, _AHEAD = (0.0, 0.006, 0.003), (0.02, 0.015, 0.030)
 """m: expected place, sd of one person, sd of one laboratory (shoes, posture asked for, where the pelvis markers sit):
@@ -23,11 +24,11 @@ file says at all (exchanged, for example): of these no shift is told, along one 
 """
 
 
-class StandingPlace(Witness):
+class StandingPlace(Observer):
     """Centre of pressure to the left of the middle of the pelvis, and ahead of it, in quiet standing, m."""
 
     name = "standing_place"
-    sees = (PlatePosition.name, PlateCrosstalk.name)
+    responds_to = (PlatePosition.name, PlateCrosstalk.name)
     needs = "Standing still with both feet wholly on the plates; pelvis and foot markers."
     source = (
         "8 static trials of 2 public laboratories, 4 of a simulated one; Winter 1995, doi:10.1016/0966-6362(96)82849-9"
@@ -44,16 +45,24 @@ class StandingPlace(Witness):
         if not force > 0.75 * seen.mass * trial.settings.gravity or ahead is None:
             return ()
         height = float(np.mean([plate.height for plate in plates]))
-        away = np.nanmean(seen.total.cop(height=height)[:, :2], axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
+        pressure = seen.total.cop(height=height)[:, :2]
+        known = np.isfinite(pressure).all(axis=1)
+        away = np.nanmean(pressure, axis=0) - np.nanmean(seen.pelvis[:, :2], axis=0)
         if not np.linalg.norm(away) <= _REACH:
             return ()
         loaded = [plate.name for plate in plates if plate.wrench.force[:, 2].mean() > 0.05 * force]
         where = loaded[0] if len(loaded) == 1 else ""
         axes = {"to the left": (np.array([-ahead[1], ahead[0]]), _ASIDE), "ahead": (ahead, _AHEAD)}
+        total, each = seen.total.value[known], {plate.name: plate.wrench.value[known] for plate in plates}
+        rows = {
+            what: pressure_gradient(total, np.tile(axis, (len(total), 1)), height) / len(total)
+            for what, (axis, _) in axes.items()
+        }
         return tuple(
             Observation(
                 self.name, f"pressure {what} of the pelvis", trial.name, float(away @ axis), _OWN, expected, "m", where,
                 {f"person stands {what}": person, f"laboratory stands {what}": laboratory},
+                sensitivity=Sensitivity(by_plate(rows[what], each), linear=False),
             )
             for what, (axis, (expected, person, laboratory)) in axes.items()
         )  # fmt: skip
@@ -66,4 +75,4 @@ def _facing(seen: SeenTrial) -> Array | None:
     return both / length if length > 0.05 else None
 
 
-WITNESS = StandingPlace
+OBSERVER = StandingPlace

@@ -1,11 +1,13 @@
-"""One trial as witnesses look at it: where each foot was, which steps fell on which plate, which way the person went.
+"""One trial as observers look at it: where each foot was, which steps fell on which plate, which way the person went.
 
 The steps are sorted from the markers, not from the forces: a plate that lies elsewhere than the file says, or whose
 force comes late, must not hide the very steps that show it.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +16,10 @@ from biodance.lab.markers.sets import FAMILY
 from biodance.lab.markers.still import is_still
 from biodance.motion.contact.over import inside
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
+from biodance.observations._feet import FootPath, Track, feet_of, pelvis_path, track_of
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
-from biodance.witnesses._feet import FootPath, feet_of, path_at, pelvis_path
 
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -68,8 +70,7 @@ class SeenTrial:
     """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
     markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and
     whether somebody stands ``still`` throughout; the ``trunk``, against which the plates weigh and time (None = not
-    seen). ``moments`` keeps what witnesses computed of the pelvis at some times: a recording whose plates are altered
-    has the same.
+    seen). ``kept`` holds what several observers ask for.
     """
 
     trial: Trial
@@ -79,8 +80,7 @@ class SeenTrial:
     pelvis: Array | None
     still: bool
     trunk: Trunk | None = None
-    moments: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
-    _stances: dict[FootStep, slice | None] = field(default_factory=dict, init=False, repr=False)
+    kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def plate(self, name: str) -> Plate:
         """Return the plate of that name."""
@@ -92,35 +92,35 @@ class SeenTrial:
 
     def stance(self, step: FootStep) -> slice | None:
         """Return the samples of a step's plate while the foot stands on it; None where the force does not show it."""
-        if step not in self._stances:
-            self._stances[step] = self._stance(step)
-        return self._stances[step]
-
-    def _stance(self, step: FootStep) -> slice | None:
-        wrench = self.plate(step.plate).wrench
-        here = [run for run in runs(wrench.force[:, 2] > ONSET) if wrench.time[run[0]] <= step.middle]
-        if not here or wrench.time[here[-1][1] - 1] < step.middle:
+        time = self.plate(step.plate).wrench.time
+        runs_on = self._contacts[step.plate]
+        last = int(np.searchsorted(time[runs_on[:, 0]], step.middle, side="right")) - 1
+        if last < 0 or time[runs_on[last, 1] - 1] < step.middle:
             return None
-        return slice(*here[-1])
+        return slice(*map(int, runs_on[last]))
 
-    def under(self, step: FootStep) -> Wrench:
-        """Return the wrench under the foot of a step, at its plate's times: with that of the plates ``beside`` it,
-        which is the foot's alone while the other one swings.
+    @cached_property
+    def _contacts(self) -> dict[str, Index]:
+        """(n, 2) first sample and end of every contact with each plate."""
+        each = ((plate.name, runs(plate.wrench.force[:, 2] > ONSET)) for plate in self.trial.plates)
+        return {name: np.array(found, dtype=int).reshape(-1, 2) for name, found in each}
+
+    def under(self, step: FootStep, part: slice | Index) -> dict[str, Array]:
+        """Return by plate the wrench (n, 6) about the lab origin that carries the foot of a step at some of its plate's
+        samples: that of the plates ``beside`` it, too, which is the foot's alone while the other one swings.
         """
         own = self.plate(step.plate).wrench
-        if not step.beside:
-            return own
-        value = np.array(own.value)
-        for other in (self.plate(name).wrench for name in step.beside):
-            value += np.stack([np.interp(own.time, other.time, column) for column in other.value.T], axis=1)
-        return Wrench(own.time, value)
+        time, found = own.time[part], {step.plate: own.value[part]}
+        for name in step.beside:
+            other = self.plate(name).wrench
+            found[name] = np.stack([np.interp(time, other.time, column) for column in other.value.T], axis=1)
+        return found
 
-    def pressure(self, step: FootStep, part: slice | Index) -> Array:
-        """Return the centre of pressure (n, 2) m under the foot of a step at some of its plate's samples; NaN where
-        nearly nothing presses.
+    def pressure(self, step: FootStep, wrench: Array) -> Array:
+        """Return the centre of pressure (n, 2) m of a wrench (n, 6) under the foot of a step; NaN where nearly nothing
+        presses.
         """
-        value, height = self.under(step).value[part], self.plate(step.plate).height
-        return zero_moment_point(value, height=height, threshold=COP_FORCE)[:, :2]
+        return zero_moment_point(wrench, height=self.plate(step.plate).height, threshold=COP_FORCE)[:, :2]
 
     @cached_property
     def total(self) -> Wrench:
@@ -145,7 +145,7 @@ class SeenTrial:
         """Return (n,) whether the other foot swings at some ``time`` (n,) s while this one stands."""
         other = next(foot for foot in self.feet if foot.side != step.side)
         belt = self.foot(step.side).drift(np.linspace(step.middle - 0.1, step.middle + 0.1, 5))
-        off = np.linalg.norm(path_at(other.time, other.velocity, time) - belt, axis=1)
+        off = np.linalg.norm(other.velocity_at(time) - belt, axis=1)
         return np.asarray(np.nan_to_num(off, nan=0.0) > _STILL)
 
     def belt(self, step: FootStep) -> Array | None:
@@ -171,15 +171,16 @@ class SeenTrial:
         within = [np.max([inside(plate, sole) for plate in plates], axis=0).min(axis=1) for sole in soles]
         return all(not np.nanmedian(one) < -_OUTLINE for one in within if np.isfinite(one).any())
 
-    def pelvis_at(self, time: Array) -> Array:
-        """Return where (n, 3) m the pelvis is at times (n,) s; NaN where it was not seen."""
+    @cached_property
+    def pelvis_track(self) -> Track:
+        """The pelvis where it was seen."""
         if self.pelvis is None or self.trial.markers is None:
-            return np.full((len(time), 3), np.nan)
-        return path_at(self.trial.markers.time, self.pelvis, time)
+            return Track(np.empty(0), np.empty((3, 0)))
+        return track_of(self.trial.markers.time, self.pelvis)
 
 
 def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
-    """Return a trial as witnesses look at it; as read (forces at their own rate) it says most.
+    """Return a trial as observers look at it; as read (forces at their own rate) it says most.
 
     ``mass`` kg as declared, NaN = unknown. Feet and pelvis are found by the trial's marker set, and by the known ones
     where it has none. Without foot markers or plates there are no steps; nothing is raised.
@@ -257,12 +258,12 @@ def _over(plate: Plate, foot: FootPath, time: Array, *, raised: bool) -> float:
 def _stands(foot: FootPath, time: Array) -> bool:
     """Return whether a foot stands at most of some times: on the ground, or flat on a belt that moves evenly."""
     drift = foot.drift(time)
-    off = np.linalg.norm(path_at(foot.time, foot.velocity, time) - drift, axis=1)
+    off = np.linalg.norm(foot.velocity_at(time) - drift, axis=1)
     known = np.isfinite(off)
     if not known.any() or np.median(off[known]) > _EVEN or abs(drift[2]) > _EVEN:
         return False
-    heights = zip(foot.at(time), (foot.heel, foot.front), strict=True)
-    flat = all(np.nanmedian(path[:, 2]) < np.nanmin(whole[:, 2]) + _FLAT for path, whole in heights)
+    heights = zip(foot.at(time), foot.lowest, strict=True)
+    flat = all(np.nanmedian(path[:, 2]) < lowest + _FLAT for path, lowest in heights)
     return bool(np.linalg.norm(drift) < _STILL or flat)
 
 
@@ -272,18 +273,13 @@ def _treads(plate: Plate, foot: FootPath, time: Array, belt: Array) -> bool:
     """
     with np.errstate(invalid="ignore"):
         near = (inside(plate, foot.outline(time)) > 0.01).any(axis=1)
-        slow = np.linalg.norm(path_at(foot.time, foot.velocity, time) - belt, axis=1) < _STILL
+        slow = np.linalg.norm(foot.velocity_at(time) - belt, axis=1) < _STILL
         low = np.minimum(*(path[:, 2] for path in foot.at(time)))
-        lowest = min(np.nanmin(foot.heel[:, 2]), np.nanmin(foot.front[:, 2]))
-    return bool((near & slow & (low < lowest + _LIFTED)).mean() >= 0.1)
+    return bool((near & slow & (low < foot.lowest.min() + _LIFTED)).mean() >= 0.1)
 
 
 def _heel_first(foot: FootPath, first: float) -> bool:
     """Return whether the front is farther above its standing height than the heel when a contact begins."""
     at = np.array([first])
     heel, front = (path[0, 2] for path in foot.at(at))
-    flat = np.abs(foot.velocity[:, 2]) < 0.1
-    if not flat.any():
-        return False
-    rest = [np.nanmedian(path[flat, 2]) for path in (foot.heel, foot.front)]
-    return bool(front - rest[1] > heel - rest[0] + 0.01)
+    return bool(front - foot.resting[1] > heel - foot.resting[0] + 0.01)

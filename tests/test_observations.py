@@ -1,4 +1,4 @@
-"""What each witness sees of a trial: steps, pressure in the foot, clocks, weights, empty plates."""
+"""What each observer sees of a trial: steps, pressure in the foot, clocks, weights, empty plates."""
 
 import json
 from dataclasses import replace
@@ -11,22 +11,21 @@ from walking import FOOT, MASS, Wrong, place, session, standing, walk
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.diagnosis.witness_inference import size_from_witnesses
 from biodance.lab.markers.sets import GUESSED
-from biodance.records import SIDES, Trial, Wrench
-from biodance.witnesses import (
+from biodance.observations import (
     Observation,
     observe,
-    possible_causes,
     recording,
-    traces,
+    sensitivities,
 )
+from biodance.records import SIDES, Trial, Wrench
 
 
-def seen(trial: Trial, witness: str, mass: float = MASS) -> dict[str, Observation]:
-    return {one.what: one for one in observe(recording(trial, mass=mass), [witness])}
+def seen(trial: Trial, observer: str, mass: float = MASS) -> dict[str, Observation]:
+    return {one.what: one for one in observe(recording(trial, mass=mass), [observer])}
 
 
-def values(trial: Trial, witness: str, ending: str = "") -> list[float]:
-    return [one.value for what, one in seen(trial, witness).items() if what.endswith(ending)]
+def values(trial: Trial, observer: str, ending: str = "") -> list[float]:
+    return [one.value for what, one in seen(trial, observer).items() if what.endswith(ending)]
 
 
 def test_steps_are_found_from_markers_whatever_the_plates_say() -> None:
@@ -66,19 +65,19 @@ def test_a_moved_plate_moves_the_pressure_in_its_foot_only() -> None:
     assert left == pytest.approx(0.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("witness", ["force_onset", "force_end"])
-def test_clocks_run_late_by_what_was_made(witness: str) -> None:
-    before, after = (np.array(values(walk(Wrong(late=late)), witness)) for late in (0.0, 0.03))
+@pytest.mark.parametrize("observer", ["force_onset", "force_end"])
+def test_clocks_run_late_by_what_was_made(observer: str) -> None:
+    before, after = (np.array(values(walk(Wrong(late=late)), observer)) for late in (0.0, 0.03))
     assert len(before) == 2
     np.testing.assert_allclose(after - before, 0.03, atol=0.0015)
-    if witness == "force_onset":
+    if observer == "force_onset":
         np.testing.assert_allclose(before, 0.0, atol=0.006)
     else:
         np.testing.assert_allclose(before, -0.025, atol=0.01)
 
 
-@pytest.mark.parametrize("witness", ["force_onset", "force_end", "foot_across"])
-def test_a_foot_that_is_lifted_and_put_down_in_place_is_no_step(witness: str) -> None:
+@pytest.mark.parametrize("observer", ["force_onset", "force_end", "foot_across"])
+def test_a_foot_that_is_lifted_and_put_down_in_place_is_no_step(observer: str) -> None:
     """As in a stand on one leg: what its markers do most is anywhere, and the pressure lies where balance needs it."""
     trial = walk()
     xyz, time = np.array(trial.markers.xyz), trial.markers.time
@@ -86,8 +85,8 @@ def test_a_foot_that_is_lifted_and_put_down_in_place_is_no_step(witness: str) ->
         xyz[:, trial.markers.names.index(name), 0] = x + 0.01 * np.sin(2 * np.pi * 3.3 * time)
     lifted = replace(trial, markers=replace(trial.markers, xyz=xyz))
     assert [step.side for step in recording(lifted).steps] == ["right", "left"]
-    assert {what.split()[0] for what in seen(trial, witness)} == {"right", "left"}
-    assert {what.split()[0] for what in seen(lifted, witness)} == {"left"}
+    assert {what.split()[0] for what in seen(trial, observer)} == {"right", "left"}
+    assert {what.split()[0] for what in seen(lifted, observer)} == {"left"}
 
 
 def test_strides_weigh_the_person_and_each_plate() -> None:
@@ -158,25 +157,26 @@ def test_flight_reads_what_a_plate_leaves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "small", "size"),
+    ("names", "parameter", "small", "size"),
     [
-        (("plate_position", "plate1:y"), Wrong(moved=(0, 0.01)), 0.01),
-        (("plate_gain", "plate1:Fz"), Wrong(gain=0.02), 0.02),
-        (("time_delay", ""), Wrong(late=0.005), 0.005),
-        (("plate_offset", "plate1:Fx"), Wrong(zero=(6, 0, 0)), 6.0),
+        (("plate_position", "plate1:y"), "shift", Wrong(moved=(0, 0.01)), 0.01),
+        (("plate_gain", "plate1:Fz"), "gain", Wrong(gain=0.02), 0.02),
+        (("time_delay", ""), "delay", Wrong(late=0.005), 0.005),
+        (("plate_offset", "plate1:Fx"), "offset", Wrong(zero=(6, 0, 0)), 6.0),
     ],
 )
-def test_traces_are_what_a_recording_made_wrong_shows(names: tuple[str, str], small: Wrong, size: float) -> None:
+def test_sensitivities_are_what_a_recording_made_wrong_shows(
+    names: tuple[str, str], parameter: str, small: Wrong, size: float
+) -> None:
     here = recording(walk(), mass=MASS)
     found = observe(here)
-    cause = next(one for one in possible_causes(here) if one.names == names)
     made = {one.key: one.value - one.expected for one in observe(replace(here, trial=walk(small)))}
     change = np.array([made[one.key] - one.value + one.expected for one in found])
     if names[0] == "plate_offset":  # made on both plates
         change = np.where([one.plate == "plate2" for one in found], 0.0, change)
     assert np.abs(change).max() > 0
     sd = np.array([one.sd for one in found])
-    np.testing.assert_allclose(size * traces(here, found, cause) / sd, change / sd, atol=0.2)
+    np.testing.assert_allclose(size * sensitivities(here, found, *names, parameter) / sd, change / sd, atol=0.2)
 
 
 def test_a_toe_marker_at_one_edge_says_nothing_of_the_plate_s_place() -> None:
@@ -192,10 +192,10 @@ def test_a_toe_marker_at_one_edge_says_nothing_of_the_plate_s_place() -> None:
 
 def test_an_unknown_mass_and_missing_feet_are_silence_not_an_error() -> None:
     evidence = collect_evidence(session(walk(), mass=float("nan")))
-    assert "stride_force" not in {one.witness for one in evidence.observations}
+    assert "stride_force" not in {one.observer for one in evidence.observations}
     trial = walk()
     bare = replace(trial, markers=trial.markers.select(["SACR"]))
-    assert {one.witness for one in observe(recording(bare, mass=MASS))} == {"empty_plate"}
+    assert {one.observer for one in observe(recording(bare, mass=MASS))} == {"empty_plate"}
     assert size_from_witnesses(collect_evidence(session(replace(bare, markers=None))), ("time_delay", "")) is None
 
 
@@ -219,4 +219,4 @@ def test_a_foot_across_two_belts_is_judged_by_both_together() -> None:
     assert {step.plate, *step.beside} == {"plate1", "plate2"}
     assert step.overhang == 0.0
     middle = (seen.plate(step.plate).wrench.time > 0.9) & (seen.plate(step.plate).wrench.time < 1.3)
-    np.testing.assert_allclose(seen.under(step).force[middle, 2], WEIGHT, rtol=1e-9)
+    np.testing.assert_allclose(sum(seen.under(step, middle).values())[:, 2], WEIGHT, rtol=1e-9)

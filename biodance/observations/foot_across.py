@@ -5,14 +5,15 @@ tell it from where the laboratory puts its toe marker. A turned plate shows as a
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from biodance.effects.axis_error import AxisError
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
 from biodance.effects.plate_rotation import PlateRotation
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._landmark import landmark_across
-from biodance.witnesses._stance import by_step, step_course
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._landmark import landmark_across
+from biodance.observations._stance import step_course
 
 ACROSS_PHASES: Mapping[str, tuple[float, ...]] = {
     "early": (0.04, 0.20, 0.000, 0.0030, 0.0025, 0.0020),
@@ -27,11 +28,11 @@ doi:10.1016/j.gaitpost.2007.08.013); no public running was there to learn from, 
 """
 
 
-class FootAcross(Witness):
+class FootAcross(Observer):
     """Centre of pressure outwards of the line from the heel marker to the front of the foot, m, by phase of stance."""
 
     name = "foot_across"
-    sees = (PlatePosition.name, PlateRotation.name, PlateCrosstalk.name, AxisError.name)
+    responds_to = (PlatePosition.name, PlateRotation.name, PlateCrosstalk.name, AxisError.name)
     needs = "A step with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "49 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -41,7 +42,6 @@ class FootAcross(Witness):
         """
         return tuple(one for step in seen.steps for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         ways = ((ACROSS_PHASES, False), (_RUNNING, True))
         return [one for way in ways for one in self._phases(seen, step, *way)]
@@ -58,12 +58,16 @@ class FootAcross(Witness):
                 continue
             norms = {f"person {step.side} foot across, {phase}": foot, f"laboratory across, {phase}": laboratory}
             norms |= landmark_across(path, phase)
-            value, own = part.mean(part.outwards, start, stop), (sd**2 + step.overhang**2) ** 0.5
+            value, responds = part.place(1, start, stop)
+            own, lever = (sd**2 + step.overhang**2) ** 0.5, part.place(0, start, stop)[0] / part.length
             what = f"{step.name}, {phase}"
             found.append(
-                Observation(self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred)
-            )
+                Observation(
+                    self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
+                    replace(responds, landmarks={(step.side, "inwards"): lever}),
+                )
+            )  # fmt: skip
         return found
 
 
-WITNESS = FootAcross
+OBSERVER = FootAcross

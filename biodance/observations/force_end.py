@@ -7,9 +7,10 @@ that runs, has no such instant: its largest acceleration is anywhere (40 ms apar
 import numpy as np
 
 from biodance.effects.time_delay import TimeDelay
+from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._stance import crossing, steps, walks
 from biodance.records import Array
-from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._stance import by_step, steps, walks
 
 _AROUND = 0.1
 """s before and after the end of the force in which the toe leaves; what half as much more on either side shows larger
@@ -18,13 +19,13 @@ _EXPECTED, _STEP, _PERSON = -0.024, 0.010, 0.009
 """s: end less peak, its sd of one step and of one person."""
 
 
-class ForceEnd(Witness):
+class ForceEnd(Observer):
     """End of the vertical force (20 N) less the peak of the toe marker's horizontal acceleration away from where it
     stood, s.
     """
 
     name = "force_end"
-    sees = (TimeDelay.name,)
+    responds_to = (TimeDelay.name,)
     needs = "Walking steps that leave an empty plate and swing off; markers at 100 Hz or more."
     source = "42 steps of 11 persons of 6 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -32,14 +33,21 @@ class ForceEnd(Witness):
         """Return one observation of each step that ends within the recording."""
         return tuple(one for step in seen.steps if not step.mixed for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
-        part, time = seen.stance(step), seen.plate(step.plate).wrench.time
+        part, wrench = seen.stance(step), seen.plate(step.plate).wrench
+        time = wrench.time
         if part is None or part.stop >= time.size or not (walks(seen, step) and steps(seen, step)):
             return []
         end, foot = float(time[part.stop - 1]), seen.foot(step.side)
         value, norms = end - toe_pulled(foot, step.middle, end), {"person toe off": _PERSON}
-        return [Observation(self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms)]
+        _, slope = crossing(wrench, part.stop)
+        responds = Sensitivity({step.plate: slope}, delay=1.0)
+        return [
+            Observation(
+                self.name, step.name, seen.trial.name, value, _STEP, _EXPECTED, "s", step.plate, norms,
+                sensitivity=responds,
+            )
+        ]  # fmt: skip
 
 
 def toe_pulled(foot: FootPath, middle: float, near: float) -> float:
@@ -57,4 +65,4 @@ def toe_pulled(foot: FootPath, middle: float, near: float) -> float:
     return float(best) if abs(best - near) < _AROUND else float("nan")
 
 
-WITNESS = ForceEnd
+OBSERVER = ForceEnd

@@ -5,20 +5,20 @@ plates' gains, whatever the person weighs.
 """
 
 from biodance.effects.plate_gain import PlateGain
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses.stride_force import StrideForce
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations.stride_force import StrideForce
 
 _OWN = 0.02
 """Share of the mass: sd of one difference."""
 
 
-class DoubleSupport(Witness):
+class DoubleSupport(Observer):
     """Mass (kg) by one plate less that by the next one, each under one foot alone, in two steps with double support
     between.
     """
 
     name = "double_support"
-    sees = (PlateGain.name,)
+    responds_to = (PlateGain.name,)
     needs = "Two steps one after the other on two plates; pelvis markers."
     source = "20 pairs of steps of 9 persons of public laboratories"
 
@@ -34,8 +34,13 @@ class DoubleSupport(Witness):
                 continue
             what = f"{first.plate} less {last.plate} from {first.middle:.2f} s"
             value, sd = before.value - after.value, _OWN * seen.mass
-            found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "kg", counts=False))
+            found.append(
+                Observation(
+                    self.name, what, seen.trial.name, value, sd, 0.0, "kg", counts=False,
+                    sensitivity=before.sensitivity - after.sensitivity,
+                )
+            )  # fmt: skip
         return tuple(found)
 
 
-WITNESS = DoubleSupport
+OBSERVER = DoubleSupport

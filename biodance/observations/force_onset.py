@@ -7,10 +7,10 @@ swing: only the peaks near the ground count, and of these the one that is highes
 import numpy as np
 
 from biodance.effects.time_delay import TimeDelay
+from biodance.observations import FootPath, FootStep, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.observations._stance import crossing, steps
 from biodance.records import Array
-from biodance.witnesses import FootPath, FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._recording import ONSET
-from biodance.witnesses._stance import by_step, steps
 
 _AROUND = 0.08
 """s before and after the onset in which the heel strikes."""
@@ -21,11 +21,11 @@ ONSET_AFTER_STRIKE = (-0.002, 0.005, 0.007)
 forces come up to 20 ms early; medians of thirteen laboratories, of which one, 40 ms early, is left out)."""
 
 
-class ForceOnset(Witness):
+class ForceOnset(Observer):
     """Onset of the vertical force (20 N) less the peak of the heel marker's upward acceleration, s."""
 
     name = "force_onset"
-    sees = (TimeDelay.name,)
+    responds_to = (TimeDelay.name,)
     needs = "Steps that begin with the heel, on an empty plate; markers at 100 Hz or more."
     source = "42 heel strikes of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -35,22 +35,24 @@ class ForceOnset(Witness):
             one for step in seen.steps if step.heel_first and not step.mixed for one in self._of_step(seen, step)
         )
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part = seen.stance(step)
         if part is None or part.start == 0 or not steps(seen, step):
             return []
-        wrench = seen.plate(step.plate).wrench
-        before, after = wrench.force[part.start - 1, 2], wrench.force[part.start, 2]
-        share = (ONSET - before) / (after - before) if after > before else 1.0
-        onset = wrench.time[part.start - 1] + share * (wrench.time[part.start] - wrench.time[part.start - 1])
+        onset, slope = crossing(seen.plate(step.plate).wrench, part.start)
         foot = seen.foot(step.side)
         struck = heel_strike(foot, step.middle, onset)
         expected, step_sd, laboratory = ONSET_AFTER_STRIKE
         own = float(np.hypot(step_sd, 0.25 / foot.rate))
         norms = {"laboratory onset": laboratory}
         value = onset - struck
-        return [Observation(self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms)]
+        responds = Sensitivity({step.plate: slope}, delay=1.0)
+        return [
+            Observation(
+                self.name, step.name, seen.trial.name, value, own, expected, "s", step.plate, norms,
+                sensitivity=responds,
+            )
+        ]  # fmt: skip
 
 
 def heel_strike(foot: FootPath, middle: float, near: float) -> float:
@@ -79,4 +81,4 @@ def _vertex(time: Array, value: Array, i: int) -> float:
     return float(time[i] + (0.5 * (before - after) / bend if bend < 0 else 0.0) * (time[i + 1] - time[i]))
 
 
-WITNESS = ForceOnset
+OBSERVER = ForceOnset

@@ -8,10 +8,11 @@ import numpy as np
 
 from biodance.effects.plate_drift import PlateDrift
 from biodance.effects.plate_offset import PlateOffset
+from biodance.observations import Observation, Observer, SeenTrial
+from biodance.observations._causes import was_zeroed
+from biodance.observations._recording import ONSET
+from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import CHANNELS, Plate
-from biodance.witnesses import Observation, SeenTrial, Witness
-from biodance.witnesses._causes import was_zeroed
-from biodance.witnesses._recording import ONSET
 
 _SETTLES = 0.15
 """s after the step in which a plate still rings."""
@@ -21,11 +22,11 @@ _OWN = 0.3
 """N: how exactly the level of an empty plate is known: noise, and neighbours that tremble."""
 
 
-class EmptyPlate(Witness):
+class EmptyPlate(Observer):
     """Force (N) that the empty plate read and that was taken off, and its change from before to after the steps."""
 
     name = "empty_plate"
-    sees = (PlateOffset.name, PlateDrift.name)
+    responds_to = (PlateOffset.name, PlateDrift.name)
     needs = "A trial that begins or ends with nobody on the plate."
     source = "An empty plate reads zero; 35 empty plates of 8 public laboratories were zeroed to 0-6 N (horizontal)."
 
@@ -39,10 +40,11 @@ class EmptyPlate(Witness):
             return []
         return [
             Observation(
-                self.name, f"{plate.name} {name}, taken off", seen.trial.name, float(size), _OWN, 0.0, "N", plate.name
+                self.name, f"{plate.name} {name}, taken off", seen.trial.name, float(size), _OWN, 0.0, "N", plate.name,
+                sensitivity=Sensitivity(zero={plate.name: np.eye(3)[k]}),
             )
-            for name, size in zip(CHANNELS[:3], plate.zero, strict=True)
-        ]
+            for k, (name, size) in enumerate(zip(CHANNELS[:3], plate.zero, strict=True))
+        ]  # fmt: skip
 
     def _change(self, seen: SeenTrial, plate: Plate) -> list[Observation]:
         wrench = plate.wrench
@@ -54,13 +56,14 @@ class EmptyPlate(Witness):
         if before.stop < least or after.stop - after.start < least:
             return []
         value = wrench.force[after].mean(axis=0) - wrench.force[before].mean(axis=0)
+        moved = [of_mean(wrench.value[after], k) - of_mean(wrench.value[before], k) for k in range(3)]
         return [
             Observation(
                 self.name, f"{plate.name} {name}, after less before", seen.trial.name, float(size), 1.0, 0.0, "N",
-                plate.name, counts=False,
+                plate.name, counts=False, sensitivity=Sensitivity({plate.name: moves}),
             )
-            for name, size in zip(CHANNELS[:3], value, strict=True)
+            for name, size, moves in zip(CHANNELS[:3], value, moved, strict=True)
         ]  # fmt: skip
 
 
-WITNESS = EmptyPlate
+OBSERVER = EmptyPlate

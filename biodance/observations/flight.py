@@ -6,8 +6,9 @@ import numpy as np
 
 from biodance.effects.plate_drift import PlateDrift
 from biodance.effects.plate_offset import PlateOffset
+from biodance.observations import FootPath, Observation, Observer, SeenTrial
+from biodance.observations._sensitivity import Sensitivity, of_mean
 from biodance.records import Array, runs
-from biodance.witnesses import FootPath, Observation, SeenTrial, Witness
 
 _HIGH = 0.06
 """m above their lowest place in the trial that both markers of a foot in flight are."""
@@ -19,11 +20,11 @@ _OWN = {"Fx": 1.5, "Fy": 1.5, "Fz": 4.0}
 """N: how exactly zero a plate reads so soon after a load."""
 
 
-class Flight(Witness):
+class Flight(Observer):
     """Mean force (N) of every plate while both feet are in the air."""
 
     name = "flight"
-    sees = (PlateOffset.name, PlateDrift.name)
+    responds_to = (PlateOffset.name, PlateDrift.name)
     needs = "A run or a jump on the plates; foot markers."
     source = "Free flight: nothing touches the plates."
 
@@ -36,12 +37,20 @@ class Flight(Witness):
         found = []
         for plate in seen.trial.plates:
             wrench = plate.wrench
-            inside = np.any([(wrench.time >= a) & (wrench.time <= b) for a, b in spans], axis=0) if spans else []
-            if not np.any(inside) or wrench.force[:, 2].max() < 100.0:
+            inside = np.zeros(wrench.time.size, dtype=bool)
+            for start, stop in spans:
+                inside |= (wrench.time >= start) & (wrench.time <= stop)
+            if not inside.any() or wrench.force[:, 2].max() < 100.0:
                 continue
+            lost = [wrench.force[a] - wrench.force[b - 1] for a, b in runs(inside)]
+            late = np.sum(lost, axis=0) / np.count_nonzero(inside) * wrench.rate
             for axis, (channel, sd) in enumerate(_OWN.items()):
                 value, what = float(wrench.force[inside, axis].mean()), f"{plate.name} {channel} in flight"
-                found.append(Observation(self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name))
+                plates = {plate.name: of_mean(wrench.value[inside], axis)}
+                responds = Sensitivity(plates, delay=float(late[axis]))
+                found.append(
+                    Observation(self.name, what, seen.trial.name, value, sd, 0.0, "N", plate.name, sensitivity=responds)
+                )
         return tuple(found)
 
 
@@ -58,4 +67,4 @@ def _height(foot: FootPath) -> Array:
     return np.nan_to_num(np.minimum(*each), nan=-np.inf)
 
 
-WITNESS = Flight
+OBSERVER = Flight

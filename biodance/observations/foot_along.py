@@ -4,12 +4,14 @@ Coarser than across the foot, and it scales with the foot; steps in different di
 plates, tell plate from foot.
 """
 
+from dataclasses import replace
+
 from biodance.effects.axis_error import AxisError
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_position import PlatePosition
-from biodance.witnesses import FootStep, Observation, SeenTrial, Witness
-from biodance.witnesses._landmark import landmark_along
-from biodance.witnesses._stance import by_step, step_course
+from biodance.observations import FootStep, Observation, Observer, SeenTrial
+from biodance.observations._landmark import landmark_along
+from biodance.observations._stance import step_course
 
 ALONG_PHASES = {
     "early": (0.04, 0.10, 0.23, 0.030, 0.030, 0.02),
@@ -22,11 +24,11 @@ _MIDDLE = (0.30, 0.60, 0.75, 0.063, 0.11, 0.08)
 edge, which early and late hold the other foot, too (48 steps of 12 persons)."""
 
 
-class FootAlong(Witness):
+class FootAlong(Observer):
     """Centre of pressure ahead of the heel marker along the foot, m, early and late in stance."""
 
     name = "foot_along"
-    sees = (PlatePosition.name, PlateCrosstalk.name, AxisError.name)
+    responds_to = (PlatePosition.name, PlateCrosstalk.name, AxisError.name)
     needs = "A step from heel to toe with one whole foot on one plate; heel and toe markers, not at one edge only."
     source = "45 steps of 10 persons of 5 public laboratories (docs/benchmarks/diagnosis.md)"
 
@@ -34,7 +36,6 @@ class FootAlong(Witness):
         """Return two observations of each step in which the heel came down first, one of a foot on two plates."""
         return tuple(one for step in seen.steps if step.heel_first for one in self._of_step(seen, step))
 
-    @by_step
     def _of_step(self, seen: SeenTrial, step: FootStep) -> list[Observation]:
         part, found = step_course(seen, step), []
         if part is None:
@@ -47,12 +48,17 @@ class FootAlong(Witness):
                 f"laboratory along, {phase}": laboratory * part.length,
                 **landmark_along(path),
             }
-            value, own = part.mean(part.ahead, start, stop), ((sd * part.length) ** 2 + step.overhang**2) ** 0.5
+            value, responds = part.place(0, start, stop)
+            own, beside = ((sd * part.length) ** 2 + step.overhang**2) ** 0.5, part.place(1, start, stop)[0]
+            levers = {(step.side, "backwards"): 1 - share, (step.side, "inwards"): -beside / part.length}
             what, expected = f"{step.name}, {phase}", share * part.length
             found.append(
-                Observation(self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred)
-            )
+                Observation(
+                    self.name, what, trial, value, own, expected, "m", step.plate, norms, path.centred,
+                    replace(responds, landmarks=levers),
+                )
+            )  # fmt: skip
         return found
 
 
-WITNESS = FootAlong
+OBSERVER = FootAlong

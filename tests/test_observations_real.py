@@ -1,4 +1,4 @@
-"""Faults written into the bytes of real walks are named by the witnesses, and clean walks stay silent."""
+"""Faults written into the bytes of real walks are named by the observers, and clean walks stay missing."""
 
 from pathlib import Path
 

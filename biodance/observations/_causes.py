@@ -1,0 +1,168 @@
+"""What causes do to a recording: plates' records are changed as a wrong file, cable or clock would change them.
+
+Names and parameters are those of the effects (`biodance.effects`). What a fault of a plate does to its wrench is said
+once (`lab.plates.faults`): observations' sensitivities and the correction of a recording both come from it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Protocol
+
+import numpy as np
+
+from biodance.effects.added_mass import AddedMass
+from biodance.effects.axis_error import AxisError
+from biodance.effects.body_mass import BodyMass
+from biodance.effects.toe_landmark import ToeLandmark
+from biodance.lab.plates.faults import CROSSTALK, DELAY, GAIN, OFFSET, PLATE_FAULTS, POSITION, ROTATION, PlateFault
+from biodance.observations._recording import SeenTrial
+from biodance.observations._sensitivity import Sensitivity
+from biodance.records import CHANNELS, SIDES, Array, Plate, Wrench
+from biodance.spatial import wrench_shift
+
+
+@dataclass(frozen=True)
+class ObservableCause:
+    """A fault with one size: ``effect``, ``target`` and ``parameter`` as in the family of effects, the parameter's
+    ``unit``, and a small size ``step``.
+    """
+
+    effect: str
+    target: str
+    parameter: str
+    unit: str
+    step: float
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect, self.target
+
+
+class _Observed(Protocol):
+    @property
+    def sensitivity(self) -> Sensitivity: ...
+
+
+def possible_causes(seen: SeenTrial, *, single: bool | None = None) -> tuple[ObservableCause, ...]:
+    """Return the causes that are looked for in a recording with these plates; ``single`` whether targets are named
+    without the plate, because the session has no other (by default: this recording has none).
+    """
+    single = len(seen.trial.plates) == 1 if single is None else single
+    found = [_cause(DELAY, "", "s", 0.004), ObservableCause(BodyMass.name, "", "error", "kg", 0.5)]
+    for plate in seen.trial.plates:
+        own = f"{plate.name}:"
+        prefix = "" if single else own
+        found += [_cause(POSITION, f"{own}{axis}", "m", 0.004) for axis in "xy"]
+        found.append(_cause(ROTATION, f"{own}z", "rad", 0.02))
+        found += [_cause(OFFSET, f"{prefix}{channel}", "N", 2.0) for channel in CHANNELS[:3]]
+        found += [_cause(OFFSET, f"{prefix}{channel}", "N·m", 0.5) for channel in CHANNELS[3:]]
+        found += [_cause(GAIN, f"{prefix}{channel}", "1", 0.02) for channel in CHANNELS[:3]]
+        found += [_cause(CROSSTALK, f"{prefix}Fz->{moment}", "m", 0.004) for moment in ("Mx", "My")]
+    return tuple(found)
+
+
+def _cause(fault: PlateFault, target: str, unit: str, step: float) -> ObservableCause:
+    return ObservableCause(fault.name, target, fault.parameter, unit, step)
+
+
+def _about_centre(plate: Plate, slope: Array, zero: Array) -> Array:
+    """Return the change B (6, 7) about the lab origin of ``slope`` (6, 6) @ wrench + ``zero`` (6,) about the centre of
+    a plate.
+    """
+    there, back = wrench_shift(plate.centre), wrench_shift(-plate.centre)
+    return np.asarray(back @ np.column_stack([slope @ there, zero]))
+
+
+def plate_change(effect: str, target: str, plate: Plate) -> Array:
+    """Return B (6, 7): what one unit of a fault adds to a plate's wrench w about the lab origin is B [w; 1]; zero for
+    faults of other plates, and where a reader's zero takes it off.
+
+    ``target`` as in the family of effects (``plate1:x``, ``plate1:Fz->Mx``, ``Fz`` where there is one plate).
+    """
+    name, _, place = target.rpartition(":")
+    fault = PLATE_FAULTS.get(effect)
+    taken_off = fault is OFFSET and was_zeroed(plate)
+    if fault is None or fault is DELAY or not fault.is_target(target) or name not in ("", plate.name) or taken_off:
+        return np.zeros((6, 7))
+    if fault is POSITION and place == "z":
+        return np.zeros((6, 7))  # the pressure is looked for on the plate, however high it is
+    return _about_centre(plate, fault.slope(place), fault.zero(place))
+
+
+def sensitivities(seen: SeenTrial, found: Sequence[_Observed], effect: str, target: str, parameter: str) -> Array:
+    """Return (n,) the derivatives of the values less the expectations of the observations ``found`` in one recording
+    with respect to a parameter of an effect; 0 where an observation does not respond.
+    """
+    known = [one.sensitivity for one in found]
+    if (effect, parameter) == (DELAY.name, DELAY.parameter):
+        return np.array([one.delay for one in known])
+    if (effect, parameter) in {(BodyMass.name, "error"), (AddedMass.name, "mass")}:
+        return np.array([one.mass for one in known])
+    if effect == ToeLandmark.name:
+        sides = SIDES if target == "both" else (target,)
+        return np.array([sum(one.landmarks.get((side, parameter), 0.0) for side in sides) for one in known])
+    out, fault = np.zeros(len(known)), PLATE_FAULTS.get(effect)
+    if fault is None or fault.parameter != parameter:
+        return out
+    name, _, place = target.rpartition(":")
+    for plate in seen.trial.plates:
+        change = plate_change(effect, target, plate)
+        out += [one.to(plate.name, change) for one in known]
+        if fault is OFFSET and name in ("", plate.name) and was_zeroed(plate):
+            out += [one.zero.get(plate.name, np.zeros(3)) @ fault.zero(place)[:3] for one in known]
+    return out
+
+
+def corrected(seen: SeenTrial, effect: str, target: str, size: float) -> SeenTrial:
+    """Return the recording that would have been made without a cause of a ``size``: the mass as weighed, or the plates
+    without their fault; a zero that the reader found and took off is still what the plate reads empty.
+    """
+    if effect == BodyMass.name:
+        return replace(seen, mass=seen.mass + size)
+    fault, (name, _, place) = PLATE_FAULTS[effect], target.rpartition(":")
+
+    def right(plate: Plate) -> Plate:
+        if name not in ("", plate.name):
+            return plate
+        if fault is OFFSET and was_zeroed(plate):
+            return replace(plate, zero=plate.zero - size * fault.zero(place)[:3])
+        return fault.done(plate, place, -size)
+
+    return replace(seen, trial=replace(seen.trial, plates=tuple(map(right, seen.trial.plates))))
+
+
+def _changed(wrench: Wrench, change: Array) -> Wrench:
+    value = wrench.value + wrench.value @ change[:, :6].T + change[:, 6]
+    value.setflags(write=False)  # the record keeps it without a copy
+    return Wrench(wrench.time, value)
+
+
+def sign_reversals(seen: SeenTrial, *, single: bool) -> Mapping[tuple[str, str], tuple[str, Array]]:
+    """Return by effect and target the plate and the change B (6, 7) that turn one channel round, about its centre.
+
+    Where that is the vertical force, the reader has turned the whole plate round to make the weight point up: all other
+    channels are reversed. ``single`` as in `possible_causes`.
+    """
+    found = {}
+    for plate in seen.trial.plates:
+        for k, name in enumerate(CHANNELS[:5]):
+            wrong = np.eye(6)[k] if name != "Fz" else 1 - np.eye(6)[k]
+            change = _about_centre(plate, np.diag(-2 * wrong), np.zeros(6))
+            found[AxisError.name, name if single else f"{plate.name}:{name}"] = plate.name, change
+    return MappingProxyType(found)
+
+
+def with_changed_plate(seen: SeenTrial, name: str, change: Array) -> SeenTrial:
+    """Return the recording with a plate's wrench changed by B (6, 7) about the lab origin."""
+    plates = [
+        replace(plate, wrench=_changed(plate.wrench, change)) if plate.name == name else plate
+        for plate in seen.trial.plates
+    ]
+    return replace(seen, trial=replace(seen.trial, plates=tuple(plates)))
+
+
+def was_zeroed(plate: Plate) -> bool:
+    """Return whether the reader found the plate empty in this trial and took its reading off."""
+    return any("subtracted" in said and "nothing was subtracted" not in said for said in plate.decisions)
