@@ -16,6 +16,8 @@ from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.effects import unit_at
+from biodance.effects.added_mass import AddedMass
+from biodance.effects.body_mass import BodyMass
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.causes import NamedCause, cause_key
 from biodance.inference.left import adequacy
@@ -35,6 +37,8 @@ _FAR = 3.0
 _HABIT = 0.010
 """m: a marker beside the second ray, or a heel marker on a thick sole, is as anywhere."""
 
+UNPLACED_LOAD = (AddedMass.name, "")
+"""Effect and target of a load of which only the weight is known."""
 Key = tuple[str, str]
 
 
@@ -144,7 +148,7 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     verdict: Verdict = "unexplained" if unknown else "nothing wrong"
     if named:
         verdict = "named, incomplete" if unknown or resembled else "named, complete"
-    findings = tuple(replace(f, set=(*f.set, *_habit_alias(p, best, rows))) for p, f in named)
+    findings = tuple(replace(f, set=(*f.set, *_habit_alias(p, best, rows), *_load_alias(p, rows))) for p, f in named)
     habit = _habit(best, rows, findings)
     clean = float(posterior.weights[[not one.causes for one in posterior.hypotheses], 0].sum())
     told = replace(
@@ -275,6 +279,12 @@ def _habit_alias(place: Place, best: Hypothesis, rows: Rows) -> tuple[Alias, ...
     feet = np.array([any(LANDMARK in name for name in one.norms) for one in rows.evidence.observations])
     seen = rows.observed(place.cause.effect).any(axis=1)
     return (Alias(ToeLandmark.name, _feet(rows), 0.0),) if (feet & seen).any() else ()
+
+
+def _load_alias(place: Place, rows: Rows) -> tuple[Alias, ...]:
+    """Return a load on some segment as a look-alike of a body heavier than declared, where only its weight is seen."""
+    heavier = isinstance(place.cause.effect, BodyMass) and place.cause.theta[0] > 0
+    return (Alias(*UNPLACED_LOAD, place.shares[0][2]),) if heavier and rows.problem is None else ()
 
 
 def _feet(rows: Rows) -> str:

@@ -156,7 +156,6 @@ def rows_of(
     )
 
 
-
 def _simulated(
     problem: Problem, tolerated: tuple[Candidate, ...], tolerances: Tolerances
 ) -> tuple[Array, Array, list[str], _Units]:

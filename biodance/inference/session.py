@@ -163,7 +163,10 @@ def _log_evidence(
     if values is not None:
         kept = [replace(one, value=one.expected + v) for one, v in zip(kept, values[here], strict=True)]
     some = replace(
-        evidence, observations=tuple(kept), sensitivities={n: t[here] for n, t in evidence.sensitivities.items()}, sign_reversed={}
+        evidence,
+        observations=tuple(kept),
+        sensitivities={n: t[here] for n, t in evidence.sensitivities.items()},
+        sign_reversed={},
     )
     rows = rows_of(None, causes, known, some)
     return fit(products(rows, rows.X, rows.y, rows.group), prior_sd(rows), nominal(rows)).log_evidence

@@ -8,12 +8,10 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Ve
 from biodance.effects import CheckKind
 from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
+from biodance.inference.decision import UNPLACED_LOAD
 from biodance.pipeline.checks import load_doubts
 from biodance.pipeline.finding_words import LOAD, cause_of, explained
 from biodance.pipeline.results import SessionResult
-
-UNPLACED_LOAD = (AddedMass.name, "")
-"""Effect and target of a load of which only the weight is known."""
 
 
 def as_diagnosed(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:
