@@ -46,8 +46,8 @@ def movements(count: int, *, seed: int = 0) -> tuple[tuple[State, CheckedMotion]
     """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for
     both sides.
 
-    Some bow to the floor. Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm
-    from grips; nobody jumps (100 N on the ground at least).
+    Some bow to the floor. Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms
+    are up to about 6 cm from grips; nobody jumps (100 N on the ground at least).
     """
     return tuple((state, checked(state)) for state in _movements(count, seed))
 
