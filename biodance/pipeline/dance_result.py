@@ -13,6 +13,7 @@ from biodance.dance.expectation import Expectation
 from biodance.dance.limits import ForImprecise, family
 from biodance.dance.metrics import DanceMetrics, longest_alone
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
+from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.footprint import room_in_words, room_on_plates
 from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
@@ -21,6 +22,8 @@ from biodance.records import Session
 if TYPE_CHECKING:
     from biodance.diagnosis.foresight import Foresight
 
+_AS_MUCH = 1.1
+"""Times as much left of the table's standard deviation of a counterpart's mass: less is no effect of an emphasis."""
 _FAR, _NEW = 3.0, 0.9
 """Times its bound at which the static criterion is warned of; share of the table's standard deviation that is left of
 what is not learned.
@@ -135,6 +138,29 @@ class DanceResult:
             f"Expected standard deviations of masses and centres of mass after it: {here}; if the same postures were "
             f"chosen freely, with any number of instructions at once: {free}."
         )
+
+    @property
+    def emphasis(self) -> tuple[str, ...]:
+        """What came of the emphasis on segments, a sentence each: how well its mass will be known, how well that of its
+        counterpart, and why both where one was asked for.
+        """
+        known, out = self.expectation, list[str]()
+        for name, factor in self.plan.weights if known is not None else ():
+            if known is None or factor <= self.plan.other_weight or counterpart(name) == name:
+                continue
+            here, there = (known.segments.index(one) for one in (name, counterpart(name)))
+            before, after = known.mass[0], known.mass[-1]
+            said = (
+                f"Emphasis on the {_names((name,))}: its mass becomes known to {after[here]:.2f} kg (table: "
+                f"{before[here]:.2f}), that of the {_names((counterpart(name),))} to {after[there]:.2f}."
+            )
+            covariance = self.body.sip.covariance
+            i, j = 10 * here, 10 * there
+            alike = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
+            if after[there] / before[there] < _AS_MUCH * after[here] / before[here]:
+                said += f" Both, because a person's sides are alike (correlation in the table {alike:.2f})."
+            out.append(said)
+        return tuple(out)
 
     @property
     def about(self) -> tuple[str, ...]:

@@ -202,7 +202,7 @@ def print_dance(found: dict[str, Any]) -> None:
             console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
     if found["simplicity_price"]:
         console.print(found["simplicity_price"]["sentence"], markup=False)
-    for note in (*found["warnings"], *found["notes"]):
+    for note in (*found["warnings"], *found["emphasis"], *found["notes"]):
         console.print(f"look: {note}", markup=False)
 
 

@@ -43,6 +43,7 @@ def dance_document(result: DanceResult) -> dict[str, Any]:
         "plate_m": dance.plate if dance else None,
         "room_on_plates_m": room_on_plates(dance.stances) if dance else None,
         "simplicity_price": _price(result),
+        "emphasis": result.emphasis,
         "warnings": result.warnings,
         "notes": (*result.notes, *(dance.notes if dance else ())),
         "seed": dance.seed if dance else None,
