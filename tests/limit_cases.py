@@ -19,6 +19,8 @@ from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
+_BOWS = 2 * 9
+"""Of as many movements one bows until the hands come to the floor: every second one on two feet side by side."""
 
 
 @cache
@@ -44,8 +46,8 @@ def movements(count: int, *, seed: int = 0) -> tuple[tuple[State, CheckedMotion]
     """Return ``count`` random movements of 3 samples each, gentle and violent ones, on all kinds of feet in turn, for
     both sides.
 
-    Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms are up to about 6 cm
-    from grips; nobody jumps (100 N on the ground at least).
+    Some bow to the floor. Planted knees are bent by 8.2 degrees (less bends the reach of the closed legs) to 70, palms
+    are up to about 6 cm from grips; nobody jumps (100 N on the ground at least).
     """
     return tuple((state, checked(state)) for state in _movements(count, seed))
 
@@ -61,6 +63,8 @@ def _movements(count: int, seed: int) -> Iterator[State]:
             x[:, [CHAIN.leg_columns[side][0] for side in (0, 1)]] = rng.uniform(1.0, 1.8, (3, 2))
         else:
             x[:, 3:6] *= 0.5
+            if found % _BOWS == 0:
+                x[:, 5] -= np.radians(100.0)
             x = _standing(x, where, np.radians(rng.choice([rng.uniform(8.2, 10.0, 3), rng.uniform(10.0, 70.0, 3)])))
         if np.isfinite(where.hands).all():
             where = replace(where, hands=_palms(close_legs(CHAIN, where, x, v, a))[0] + rng.normal(0.0, 0.02, (2, 3)))

@@ -28,6 +28,22 @@ def test_freely_chosen_postures_are_of_the_same_number_and_ask_more_at_once() ->
     assert max(map(len, dance_instructions(free)[1:])) > PLAN.instructions
 
 
+def test_what_came_of_an_emphasis_is_said_and_why_it_is_no_more() -> None:
+    """The table takes the masses of both forearms for alike, so that what one tells holds of the other."""
+    plan = replace(PLAN, weights=(("left_forearm_hand", 1.0),), other_weight=0.0)
+    result = DanceResult(BODY, plan, None, (), None, expected(0.5, 0.010), "", (), 1.0)
+    (said,) = result.emphasis
+    assert "Emphasis on the left forearm hand: its mass becomes known to 0.50 kg (table: 1.00)" in said
+    assert "sides are alike (correlation in the table 0.80)" in said
+    assert replace(result, plan=PLAN).emphasis == ()
+    told = result.expectation
+    assert told is not None
+    mass = told.mass.copy()
+    mass[-1, BODY.segment_index("left_forearm_hand")] = 0.3
+    (more,) = replace(result, expectation=replace(told, mass=mass)).emphasis
+    assert "alike" not in more
+
+
 def test_the_price_and_what_cannot_be_learned_are_said() -> None:
     free = freer_dance(BODY, replace(PLAN, blocks=(("parallel", 2),)))
     poor = DanceMetrics(300.0, 65.0, np.ones(1), 65.0, ("left_foot",), ())
@@ -36,10 +52,11 @@ def test_the_price_and_what_cannot_be_learned_are_said() -> None:
     assert price["mass_kg"]["with"] > price["mass_kg"]["without"]
     assert price["com_m"] == {"with": 0.010, "without": 0.008}
     assert "chosen freely" in result.price
-    assert result.price in result.about
+    assert result.price not in result.about  # which the person reads who dances
     (warning,) = result.warnings
     assert "4.6 times its bound" in warning
     assert "left foot" in warning
     assert f"It cannot teach the mass of {BODY.segments[3].replace('_', ' ')}" in warning
     near = replace(result, account=replace(poor, static=180.0))
     assert near.warnings == ()
+    assert not any("criterion" in sentence for sentence in result.about)

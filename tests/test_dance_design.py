@@ -58,7 +58,7 @@ def test_the_dance_has_its_postures_its_feet_and_its_time(dance):
 def test_every_limit_holds(dance):
     margins = verify(BODY, dance, PLAN.limits)
     told = (
-        "balance continuity foot_placement friction ground_clearance joint_range joint_speed joint_torque "
+        "balance continuity floor foot_placement friction ground_clearance joint_range joint_speed joint_torque "
         "self_collision"
     )
     assert [m.limit for m in margins] == told.split()
@@ -153,6 +153,7 @@ def moved(stance):
         ("balance", lambda d: shifted(d, "postures", 0, 0.1)),
         ("foot_placement", lambda d: shifted(d, "postures", 2, 0.2)),
         ("ground_clearance", lambda d: shifted(d, "via", 6 + BODY.joint_index("right_ankle_dorsiflexion"), -2.0)),
+        ("floor", lambda d: shifted(d, "via", 5, -1.5)),
         ("self_collision", lambda d: shifted(d, "via", 6 + BODY.joint_index("right_shoulder_adduction"), 2.0)),
         ("continuity", lambda d: replace(d, stances=(d.stances[0], moved(d.stances[1]), *d.stances[2:]))),
     ],

@@ -22,7 +22,7 @@ from biodance.dance.performers import PerformersMargin, Rehearsed, perform_with,
 from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
-from biodance.dance.problem.person import PersonLimits, limit_body
+from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.transitions.context import Checkpoint, DesignContext
 from biodance.dance.verify import broken, verify
@@ -107,6 +107,19 @@ def test_who_cannot_bend_the_hip_to_sit_is_told_so() -> None:
     assert rest_cut_short(replace(BODY, limits=stiff), seated, words) == said
 
 
+def test_a_share_of_the_range_does_not_take_the_chair_away() -> None:
+    plan = replace(PLAN, blocks=(("seated", 1),))
+    body, _, notes = fit_to_person(BODY, plan, PersonLimits(range_shares=(("left", 0.6),)))
+    (seated,) = support_sequence(body, plan)
+    assert rest_cut_short(body, seated, read_vocabulary()) == ""
+    assert any("left hip flexion to 93 degrees" in note for note in notes)
+    assert not any("right" in note for note in notes)
+    stiff = PersonLimits(range_shares=(("left", 0.6),), ranges=(("left_hip_flexion", -0.1, np.radians(70.0)),))
+    body, _, notes = fit_to_person(BODY, plan, stiff)
+    assert rest_cut_short(body, seated, read_vocabulary()).startswith("left hip flexion reaches")
+    assert not any("left hip flexion" in note for note in notes)
+
+
 def test_what_a_stiff_arm_cannot_do_is_said() -> None:
     (stance, *_), words = support_sequence(BODY, PLAN), read_vocabulary()
     assert words_left_out(BODY, PLAN, (stance,), words) == ()
@@ -114,6 +127,22 @@ def test_what_a_stiff_arm_cannot_do_is_said() -> None:
     (said,) = words_left_out(stiff, PLAN, (stance,), words)
     assert said.startswith("Left out for the left arm: the left arm out to the side (a T)")
     assert "left shoulder adduction" in said
+
+
+def test_an_arm_that_only_goes_forward_hangs_all_the_same() -> None:
+    """A word that does not name a joint has it straight: at 0 degrees, which is a stop of such a shoulder."""
+    stiff = limit_body(BODY, PersonLimits(ranges=(("left_shoulder_flexion", 0.0, np.radians(70.0)),)))
+    body, (stance, *_) = replace(BODY, limits=stiff), support_sequence(BODY, PLAN)
+    words = words_for(body, PLAN, stance, read_vocabulary(), np.random.default_rng(0))
+    assert [
+        np.degrees(dict(words[f"{side}_arm"][0].angles).get("shoulder_flexion", 0.0)) for side in ("right", "left")
+    ] == [
+        0.0,
+        pytest.approx(1.5),
+    ]
+    rest = {part: group[:1] for part, group in words.items()}
+    room, limit = Catalogue.of(Chain(body), stance, rest).keeps(0, PLAN.limits)
+    assert room > 3.2, limit
 
 
 def test_a_catalogue_stands_balanced_on_its_feet() -> None:

@@ -1,13 +1,17 @@
 """Played in MuJoCo: the same body, standing on its own feet; a balanced motion stays up, an unbalanced one falls."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_bodies import random_body
+from small_dances import small_dance
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
+from biodance.dance.playback import Playback, floor_model, play
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.dance.rehearsal import Playback, floor_model, play
+from biodance.dance.rehearsal import Rehearsal
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import Motion, Subject
@@ -63,6 +67,34 @@ def test_lifting_a_foot_without_shifting_the_weight_falls() -> None:
     found = play(BODY, hold)
     assert not found.stays_up
     assert found.time[-1] == found.fell < hold.time[-1]
+
+
+@pytest.mark.parametrize("part", ["right_forearm_hand", "left_forearm_hand"])
+def test_a_hand_that_the_plan_sends_through_the_floor_stops_there_and_counts(part: str) -> None:
+    """An arm 62 cm longer than a person's hangs 4 cm above the floor; the shoulder sinks by 12 as the trunk bows."""
+    hand, boxes = BODY.segment_index(part), BODY.boxes.copy()
+    boxes[hand, 0, 1] -= 0.62
+    shoulder = part.replace("forearm_hand", "shoulder_flexion")
+    body, bow = replace(BODY, boxes=boxes), plan(BODY, {"trunk_flexion": 40, shoulder: 40})
+    fingertips = np.array([0.0, float(boxes[hand, 0, 1]), 0.0])
+    planned = poses(body, bow.q).points([hand], fingertips[None])[:, 0, 2]
+    assert planned.min() < -0.03
+    found = play(body, bow)
+    assert list(found.touched) == [part]
+    assert planned[round(100 * found.touched[part])] == pytest.approx(0.0, abs=0.02)
+    assert poses(body, found.q).points([hand], fingertips[None])[:, 0, 2].min() > -0.01
+    said = Rehearsal(small_dance(), found, np.full(found.time.size, 0.05)).broken
+    assert any(part.replace("_", " ") in one and "comes to the floor" in one for one in said)
+
+
+@pytest.mark.parametrize(("inside", "told"), [(0.01, 0), (-0.128, 1)])
+def test_pressure_outside_the_soles_counts(inside: float, told: int) -> None:
+    still = play(BODY, plan(BODY, {"left_elbow_flexion": 20}, duration=1.0))
+    left = np.full(still.time.size, 0.05)
+    left[3] = inside
+    said = Rehearsal(small_dance(), still, left).broken
+    assert len(said) == told
+    assert not told or "128 mm outside the soles at 0.0 s" in said[0]
 
 
 def test_a_body_without_feet_is_refused() -> None:

@@ -137,6 +137,35 @@ def test_ground_clearance_is_the_height_of_the_lowest_corner() -> None:
     assert both(FAMILY["ground_clearance"], x, feet()[3]) == pytest.approx((lower, lower), abs=1e-6)
 
 
+def test_floor_is_what_is_left_under_a_hand_that_reaches_down() -> None:
+    """An arm that hangs ends at the shoulder's height less the arm's length; lowered with the pelvis by 64.5 cm, its
+    fingertips are 1.7 cm above the floor, and 4 cm are asked.
+    """
+    x = upright()
+    hand = BODY.segment_index("right_forearm_hand")
+    pose = poses(BODY, CHAIN.motion(np.zeros(1), x, *np.zeros((2, *x.shape))).q)
+    fingertips = float(pose.position[0, hand, 2] + BODY.boxes[hand][0][1])
+    assert fingertips == pytest.approx(0.662, abs=5e-4)
+    assert min(both(FAMILY["floor"], x, feet()[8])) == pytest.approx(
+        0.419 - 0.04, abs=2e-3
+    )  # under the knees, where shanks begin
+    x[0, 2] -= fingertips - 0.017
+    x[0, 6 + BODY.joint_index("right_hip_flexion")] = x[0, 6 + BODY.joint_index("left_hip_flexion")] = np.pi / 2
+    x[0, 6 + BODY.joint_index("right_knee_flexion")] = x[0, 6 + BODY.joint_index("left_knee_flexion")] = 0.0
+    assert both(FAMILY["floor"], x, feet()[8]) == pytest.approx((-0.023, -0.023), abs=1e-6)
+    assert both(replace(FAMILY["floor"], gap=0.0), x, feet()[8]) == pytest.approx((0.017, 0.017), abs=1e-6)
+
+
+def test_floor_asks_of_what_is_near_it_upright_for_half_of_that_at_most() -> None:
+    """Hands so long that 3 cm are left under them are asked for 1.5 cm, as the low shells of robots would be."""
+    low = BODY.boxes.copy()
+    low[BODY.segment_index("right_forearm_hand"), 0, 1] -= 0.632
+    shell = replace(BODY, boxes=low)
+    state = State(type(CHAIN)(shell), feet()[8], upright(), *np.zeros((2, 1, CHAIN.size)))
+    assert FAMILY["floor"].margins(state).value.min() == pytest.approx(0.015, abs=5e-4)
+    assert FAMILY["floor"].check(checked(state)).value.min() == pytest.approx(0.015, abs=5e-4)
+
+
 @pytest.mark.parametrize("knee", [12.0, 40.0, 80.0])
 def test_foot_placement_is_what_the_cosine_rule_leaves(knee: float) -> None:
     thigh, shank = 0.371686, 0.442392

@@ -52,7 +52,8 @@ def test_margins_are_what_the_check_finds_on_movements_that_keep_the_limit_and_t
     assert 0.01 < broken < 0.99
 
 
-NUMBERS = [(limit, one.name) for limit in FAMILY.values() for one in fields(limit)]
+NUMBERS = [(limit, one.name) for limit in FAMILY.values() for one in fields(limit) if not one.metadata["imprecise"]]
+ASKED = [(limit, one.name) for limit in FAMILY.values() for one in fields(limit) if one.metadata["imprecise"]]
 
 
 @pytest.mark.parametrize(("limit", "name"), NUMBERS, ids=[f"{limit.name}.{name}" for limit, name in NUMBERS])
@@ -65,6 +66,13 @@ def test_another_number_reaches_the_margins_and_the_check(limit: Limit, name: st
         np.testing.assert_allclose(found, left, rtol=1e-6, atol=1e-6)
         changed += np.sum(left != compared(limit, *movement)[0])
     assert changed >= 6
+
+
+@pytest.mark.parametrize(("limit", "name"), ASKED, ids=[f"{limit.name}.{name}" for limit, name in ASKED])
+def test_what_imprecise_people_must_keep_is_a_number_of_the_limit(limit: Limit, name: str) -> None:
+    asked = replace(limit, **{name: 0.031}).for_imprecise()
+    assert asked is not None
+    assert asked.least == 0.031
 
 
 @pytest.mark.parametrize("where", feet(), ids=lambda one: f"{one.name}-{one.over}-{np.isfinite(one.hands).sum()}")

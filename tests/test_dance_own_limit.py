@@ -207,7 +207,7 @@ def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
     known = {(path.name, limit.name) for path in files for limit in family() if f'"{limit.name}"' in path.read_text()}
     assert {one for one in known if f"{one[1]}.py" != one[0]} == {
         ("robot.py", "seat"),  # a size of a stance
-        ("rehearsal.py", "friction"),  # of MuJoCo's floor
+        ("playback.py", "friction"),  # of MuJoCo's floor
         ("plan.py", "balance"),  # share_of_support, the short form in protocols
     }
 

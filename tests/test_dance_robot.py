@@ -26,7 +26,7 @@ from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of
 from biodance.dance.problem.stance import _WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.problem.state import Closure, close_legs
-from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, robot_plan, robot_rows
+from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, person_sized_plan, robot_plan, robot_rows
 from biodance.dance.transitions.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
@@ -99,6 +99,17 @@ def test_a_plan_takes_the_size_and_the_speed_of_the_robot() -> None:
     toy = replace(HOAP, sip=replace(HOAP.sip, phi=0.4 * HOAP.sip.phi))
     with pytest.raises(BiodanceError, match=r"3\.18 kg"):
         robot_plan(toy, read_plan("full"))
+
+
+@pytest.mark.parametrize("seconds", [0.5, 20.0])
+def test_what_is_legal_are_the_seconds_of_the_protocol_and_not_those_of_a_larger_model(seconds: float) -> None:
+    """A joint of 1 rad/s takes 2.5 times as long, a model 3.6 times as large 1.9 times that: 95 s for 20."""
+    plan = robot_plan(HOAP, replace(read_plan("full"), move=seconds, hold=60.0))
+    large = person_sized_plan(plan, person_sized(HOAP))
+    assert plan.move == pytest.approx(2.5 * seconds)
+    assert large.move == pytest.approx(2.5 * np.sqrt(3.6) * seconds)
+    with pytest.raises(BiodanceError, match="move = "):
+        replace(plan, move=2.5 * 20.1)
 
 
 def test_a_slow_move_is_judged_at_fewer_instants_and_tells_as_much() -> None:

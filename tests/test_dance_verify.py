@@ -8,6 +8,7 @@ from small_dances import BODY, small_dance
 
 from biodance.dance.dance import Dance
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, unconcerned
+from biodance.dance.limits.joint_range import JointRange
 from biodance.dance.problem.stance import Phase
 from biodance.dance.problem.state import State
 from biodance.dance.verify import Margin, _least, broken, verify
@@ -88,3 +89,29 @@ def test_a_leap_between_two_phases_is_seen(leaps: str) -> None:
     assert left.limit == "continuity"
     assert left.worst == pytest.approx(-0.01, abs=1e-5)
     assert left.where_s in (1.0, 3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Twitching(Dance):
+    """A dance whose left elbow bends 1 rad too far back within the first, or the last, 8 ms of its move."""
+
+    at_start: bool = True
+
+    def state(self, phase: Phase, time: np.ndarray) -> State:
+        """Return the state with the twitch."""
+        state = super().state(phase, time)
+        x, since = state.x.copy(), time - phase.start if self.at_start else phase.end - time
+        if phase.kind == "move":
+            x[(since > 0) & (since < 0.008), 6 + BODY.joint_index("left_elbow_flexion")] -= 1.0
+        return State(state.chain, state.stance, x, state.v, state.a)
+
+
+@pytest.mark.parametrize(("at_start", "where"), [(True, (1.0, 1.008)), (False, (2.992, 3.0))])
+def test_what_happens_just_after_a_move_begins_or_before_it_ends_is_seen(at_start: bool, where: tuple) -> None:
+    """A foot that has just left the ground, or comes back, is lowest between two of the instants 0.01 s apart."""
+    dance, limit = small_dance(), JointRange()
+    assert not broken(verify(BODY, dance, (limit,)))
+    own = {one.name: getattr(dance, one.name) for one in fields(dance)}
+    (found,) = broken(verify(BODY, Twitching(**own, at_start=at_start), (limit,)))
+    assert found.what == "left_elbow_flexion"
+    assert where[0] < found.where_s < where[1]

@@ -142,6 +142,8 @@ def test_a_dance_is_played_and_filmed(tmp_path: Path, capsys: pytest.CaptureFixt
     assert run([*words, str(tmp_path / "film.gif"), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["stays_up"]
+    assert told["kept"]
+    assert told["touched"] == []
     assert told["played_s"] == pytest.approx(3.0)
     with Image.open(tmp_path / "film.gif") as film:
         assert film.n_frames == pytest.approx(3.0 * 12.5, abs=2)

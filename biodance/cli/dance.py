@@ -35,6 +35,12 @@ if TYPE_CHECKING:
     from biodance.records import Subject
 
 FileOut = Annotated[Path, Parameter(name="--out", help="Output file, e.g. dance.html.")]
+DespiteOption = Annotated[
+    bool,
+    Parameter(
+        negative="", help="Write cards or page of a dance that is NOT SAFE when imprecise all the same; they say so."
+    ),
+]
 
 
 @Parameter(name="*")
@@ -76,6 +82,7 @@ def dance_command(
             converter=whole, validator=not_negative, help="Random seed, 0 or more; the same seed gives the same dance."
         ),
     ] = 0,
+    despite: DespiteOption = False,
     out: OutOption,
     json: JsonOption = False,
     force: ForceOption = False,
@@ -84,7 +91,8 @@ def dance_command(
 
     Writes dance.npz, dance.c3d (a person's virtual markers) or dance.csv (a robot's joint angles), cues.md, cues.html
     (printable cards), margins.md, figures and results.json. Ctrl-C keeps finished parts; the same command resumes from
-    there. If no dance satisfies all limits, the violated limit is reported (exit code 1).
+    there. If no dance satisfies all limits, the violated limit is reported (exit code 1). What leads a person (cards,
+    cues, dance.c3d) is not written of a dance that is NOT SAFE when imprecise, unless --despite is given.
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.pipeline.dance import (
@@ -115,24 +123,27 @@ def dance_command(
             return STOPPED
         tell("writing", 0, 0)
         result = result if isinstance(who, RobotFile) else designed_for(result, who)
-        found = write_dance(result, folder)
+        found = write_dance(result, folder, despite=despite)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     if json:
         print_json(found)
     else:
         print_dance(found)
         show_place(folder)
+    if result.dance is not None and result.dance.unsafe and not despite:
+        say("No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same.")
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
     return DONE if result.feasible and result.complete else NEEDS_A_PERSON
 
 
 @app.command(name="feedback")
-def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -> int:
+def feedback_command(dance: Path, *, despite: DespiteOption = False, out: FileOut, force: ForceOption = False) -> int:
     """Write a page that guides a person through a dance: one HTML file that opens in a browser without a network.
 
     It shows the person's own body, the next posture as a light figure, what to move, and a countdown with sound;
-    optionally over the mirrored image of a camera. With a camera it tracks the person, scores every posture by its
+    optionally over the mirrored image of a camera. Of a dance that is NOT SAFE when imprecise there is no page, unless
+    --despite is given: then it says so on top. With a camera it tracks the person, scores every posture by its
     information about each segment, and asks for the missing ones.
 
     Parameters
@@ -143,7 +154,7 @@ def feedback_command(dance: Path, *, out: FileOut, force: ForceOption = False) -
     from biodance.dance.dance import Dance
     from biodance.report.feedback.write import write_feedback
 
-    if not write_feedback(Dance.load(dance), out, force=force):
+    if not write_feedback(Dance.load(dance), out, force=force, despite=despite):
         say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
     show_place(out)
     return DONE
@@ -160,6 +171,8 @@ def play_command(
     force: ForceOption = False,
 ) -> int:
     """Simulate a designed dance in MuJoCo with a free-standing body, and render it as a video next to the plan.
+
+    A fall, a hand or knee on the floor, or pressure outside the planned soles ends with exit code 1.
 
     Parameters
     ----------
@@ -181,7 +194,7 @@ def play_command(
         print_json(playback_document(found, place))
     else:
         sys.stdout.write(f"{found.table()}\n{place}\n")
-    return DONE if found.playback.stays_up else NEEDS_A_PERSON
+    return NEEDS_A_PERSON if found.broken else DONE
 
 
 def _sides(plate: str) -> tuple[float, float]:

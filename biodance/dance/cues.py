@@ -82,7 +82,7 @@ def cue_sheet(
     lines = [
         "# The dance, posture by posture",
         "",
-        f"Each posture: {move:g} s to get there, counted *{_counts(move)}*, then {hold:g} s of standing still. Only "
+        f"Each posture: {move:g} s to get there, counted *{_counts(move)}*, then {hold:g} s of holding still. Only "
         f"what moves",
         "is said; everything else stays as it is. Stop whenever something hurts or you lose your balance; the posture "
         "can be repeated.",

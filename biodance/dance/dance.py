@@ -6,7 +6,7 @@ planted feet stay where they are at every instant, not only at samples.
 
 import json
 import zlib
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
 from biodance.dance.dance_words import LARGEST, possible_array, read_words
+from biodance.dance.margin import Margin
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
@@ -74,6 +75,8 @@ class Dance(Sendable):
         Postures that are the one before them with right and left exchanged.
     plate : tuple of float or None
         Force plate from side to side and ahead, m, on which all feet were set; None any.
+    unsafe : tuple of Margin
+        Limits of which people who copy it imprecisely leave too little; empty where it is safe, or nobody was asked.
 
     Examples
     --------
@@ -96,6 +99,7 @@ class Dance(Sendable):
     names: tuple[str, ...] = ()
     mirrored: tuple[int, ...] = ()
     plate: tuple[float, float] | None = None
+    unsafe: tuple[Margin, ...] = ()
 
     def __post_init__(self) -> None:
         count, size = np.shape(self.postures)
@@ -237,6 +241,7 @@ class Dance(Sendable):
             who = {name: getattr(self.subject, name) for name in _PERSON}
             words["subject"] = {name: value for name, value in who.items() if value == value}
         words |= {"names": self.names, "mirrored": self.mirrored, "plate": self.plate}
+        words["unsafe"] = [asdict(margin) for margin in self.unsafe]
         words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
         np.savez_compressed(
@@ -280,6 +285,7 @@ class Dance(Sendable):
             feet: dict[str, Any] = {name: tuple(Stance(**s) for s in words[name]) for name in ("stances", "under")}
             who = Subject(**words["subject"]) if words.get("subject") else None
             more: dict[str, Any] = {name: tuple(words.get(name, ())) for name in ("notes", "names", "mirrored")}
+            more["unsafe"] = tuple(Margin(**margin) for margin in words.get("unsafe", ()))
             more["plate"] = words.get("plate")
             return cls(words["protocol"], body, seed=words["seed"], subject=who, **more, **feet, **arrays)
         except OSError as error:

@@ -47,6 +47,16 @@ class PersonWords(_Entry):
     age: float = Field(float("nan"), ge=0, le=120)
 
 
+class MarginWords(_Entry):
+    """A `Margin`."""
+
+    limit: str = Field(max_length=200)
+    worst: float = Field(allow_inf_nan=False)
+    where_s: float = Field(allow_inf_nan=True)
+    unit: str = Field(max_length=20)
+    what: str = Field("", max_length=200)
+
+
 class DanceWords(_Entry):
     """All of them."""
 
@@ -58,6 +68,7 @@ class DanceWords(_Entry):
     names: list[str] = Field([], max_length=MOST_POSTURES)
     mirrored: list[int] = Field([], max_length=MOST_POSTURES)
     plate: tuple[Annotated[float, Field(gt=0, le=_FAR)], Annotated[float, Field(gt=0, le=_FAR)]] | None = None
+    unsafe: list[MarginWords] = Field([], max_length=MOST_POSTURES)
     stances: list[StanceWords] = Field(max_length=MOST_POSTURES)
     under: list[StanceWords] = Field(max_length=MOST_POSTURES)
 

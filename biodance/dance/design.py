@@ -99,7 +99,8 @@ def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
             plan = replace(plan, blocks=blocks)
     dance, found = mended_dance(walk, steps, moves, work.workers)
     lacking = words_left_out(work.chain.body, plan, tuple(step.catalogue.stance for step in steps), walk.reach.words)
-    return replace(dance, notes=(*notes, *lacking, *dance.notes)), found.margins(dance)
+    margins = found.margins(dance)
+    return replace(dance, notes=(*notes, *lacking, *dance.notes), unsafe=broken(margins)), margins
 
 
 def _postures(work: DesignContext) -> Course:

@@ -1,249 +1,51 @@
-"""Rehearse a designed dance in MuJoCo, first posture to last: the body stands on its own feet and follows the plan by
-its joints alone.
+"""Rehearse a designed dance in MuJoCo (`playback`), first posture to last.
 
-The simulator knows nothing of the plan's balance: the root is free, the soles are contact points on a plane with
-friction, joints get the planned torque plus a spring and a damper to the planned angle, and nobody holds the body. Does
-it stay up, where does the centre of pressure go, how far is it from the plan? MuJoCo is an optional library (extra
-``peers``).
+Does the body stay up on its feet alone, and does the pressure stay within the soles?
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body
-from biodance.body.export import mjcf
 from biodance.dance.dance import Dance
+from biodance.dance.playback import RADIUS, Playback, play
 from biodance.dance.problem.stance import phase_at
-from biodance.errors import BiodanceError, MissingLibrary
-from biodance.motion.dynamics import distribute, joint_torques
-from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Motion, Wrench
-from biodance.spatial import quaternion_matrix, wrench_of_force
-
-_STEP = 0.00025
-"""s, of the simulation: at 1 and 0.5 ms stiff legs ring on the floor and topple postures that stand at 0.25 ms."""
-STIFFNESS = {"hip": 4000.0, "knee": 4000.0, "ankle": 4000.0, "trunk": 3000.0, "shoulder": 400.0, "elbow": 200.0}
-"""N·m/rad of the joint springs: several times the m g h (about 600 N·m/rad) that would topple a standing person."""
-_DAMPING, ROTOR = 0.05, 0.005
-"""s, damper over spring; kg·m² added to every joint in the simulation: where two axes of a shoulder are nearly in line,
-nothing else resists them."""
-SETTLE = 0.5
-"""s in which the first posture is held before the motion begins, so that the floor bears the body."""
-FALLEN = 0.6
-"""Share of the planned height of the root below which the body has fallen."""
-HARD = 0.002
-"""s, time constant of the contacts: at 8 ms a foot under the whole body sinks by 0.6 mm, which tilts a person on one
-leg until he falls; 4, 2 and 1 ms keep the pelvis within 12, 5 and 2 mm of the plan.
-"""
-_RADIUS = 0.004
-"""m, of the contact points under the soles."""
-TOUCHING = 0.01
-"""m over the floor up to which a planned sole counts as planted for the planned torques."""
-
-
-@dataclass(frozen=True, eq=False)
-class Playback:
-    """What became of a plan, at its own instants ``time`` (T,) s up to the fall.
-
-    ``angle_error`` (T, n) rad joints, ``root_error`` (T,) m, ``tilt_error`` (T,) rad of the root; ``wrench`` of the
-    floor on the body about the lab origin, ``planned_wrench`` what the plan needs; ``fell`` s, NaN if it did not; ``q``
-    (T, nq) where the body was.
-    """
-
-    time: Array
-    angle_error: Array
-    root_error: Array
-    tilt_error: Array
-    wrench: Wrench
-    planned_wrench: Wrench
-    fell: float
-    q: Array
-
-    @property
-    def stays_up(self) -> bool:
-        """Whether the body never fell."""
-        return bool(np.isnan(self.fell))
-
-    @property
-    def zmp_error(self) -> Array:
-        """(T,) m between the centres of pressure of the playback and of the plan; NaN where the body is in the air."""
-        return np.linalg.norm((self.wrench.cop() - self.planned_wrench.cop())[:, :2], axis=1)
-
-
-def _mujoco() -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingLibrary(
-            "Playing a dance needs MuJoCo, which is not installed: pip install 'biodance[peers]'."
-        ) from error
-    return mujoco
-
-
-def floor_model(body: Body, *, friction: float = 0.5) -> Any:
-    """Return the MuJoCo model of ``body`` with contact points at its soles' corners, ``friction`` of the floor."""
-    mujoco = _mujoco()
-    spec = mujoco.MjSpec.from_string(mjcf.text(body, "biodance playback"))
-    spec.option.timestep, spec.option.integrator = _STEP, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    contact: dict[str, Any] = {"solref": [HARD, 1.0], "friction": [friction, 0.0, 0.0], "condim": 3}
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=1, conaffinity=2, **contact)
-    for foot in body.feet.values():
-        part = spec.body(body.segments[foot.segment])
-        for corner in foot.outline:
-            place = corner + np.array([0.0, _RADIUS, 0.0])
-            part.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_SPHERE,
-                size=[_RADIUS, 0, 0],
-                pos=place,
-                mass=0.0,
-                contype=2,
-                conaffinity=1,
-                **contact,
-            )
-    return spec.compile()
-
-
-def planned_torques(body: Body, motion: Motion, wrench: Wrench, down: NDArray[np.bool_] | None = None) -> Array:
-    """Return the joint torques (T, n) N·m of the plan, the ground wrench shared by the feet (right, left) that are
-    ``down`` (T, 2); without it, those whose soles are near the floor.
-    """
-    pose = poses(body, motion.q)
-    soles = [pose.rotation[:, f.segment] @ f.outline.mean(axis=0) + pose.position[:, f.segment] for f in _both(body)]
-    if down is None:
-        down = np.stack([sole[:, 2] < TOUCHING for sole in soles], axis=1)
-    parts = distribute(wrench, soles[0], soles[1], down)
-    names = [body.segments[f.segment] for f in _both(body)]
-    return joint_torques(body, motion, dict(zip(names, parts, strict=True))).torque
-
-
-def _both(body: Body) -> tuple[Any, Any]:
-    if not body.n_root or set(body.feet) != {"right", "left"}:
-        raise BiodanceError(
-            f"{body.name}: a playback needs a free root and a right and a left foot; this body has {sorted(body.feet)}."
-        )
-    return body.feet["right"], body.feet["left"]
-
-
-def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.bool_] | None = None) -> Playback:
-    """Return what becomes of ``motion`` of ``body`` (from rest, feet on the plane z = 0) when only its joints are
-    driven.
-
-    ``down`` (T, 2) True where the right, the left foot is planned to bear; without it, where its sole is near the
-    floor.
-
-    Raises
-    ------
-    MissingLibrary
-        MuJoCo is not installed.
-    BiodanceError
-        The body has no free root or not two feet.
-    """
-    mujoco = _mujoco()
-    wrench = predict_wrench(body, motion)
-    torque = planned_torques(body, motion, wrench, down)
-    model = floor_model(body, friction=friction)
-    data = mujoco.MjData(model)
-    driver = _Driver(body, model)
-    driver.place(data, motion.q[0], motion.v[0])
-    for _ in range(round(SETTLE / _STEP)):
-        driver.drive(data, motion.q[0, 7:], np.zeros(len(body.joints)), torque[0])
-        mujoco.mj_step(model, data)
-    rows, fell = [], np.nan
-    for frame in range(motion.time.size):
-        if frame:
-            _advance(mujoco, driver, data, motion, torque, frame)
-        rows.append((*driver.gap(data, motion.q[frame]), _floor_wrench(mujoco, model, data), driver.place_of(data)))
-        if data.qpos[2] < FALLEN * motion.q[frame, 2]:
-            fell = float(motion.time[frame])
-            break
-    angle, root, tilt, floor, q = (np.array(column) for column in zip(*rows, strict=True))
-    time = motion.time[: len(rows)]
-    return Playback(time, angle, root, tilt, Wrench(time, floor), Wrench(time, wrench.value[: len(rows)]), fell, q)
-
-
-def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: Array, frame: int) -> None:
-    """Simulate from the frame before to ``frame``; the plan is followed linearly in between."""
-    steps = max(1, round((motion.time[frame] - motion.time[frame - 1]) / _STEP))
-    joints = len(driver.body.joints)
-    for k in range(steps):
-        share = k / steps
-        q, v, tau = (
-            (1 - share) * x[frame - 1] + share * x[frame]
-            for x in (motion.q[:, -joints:], motion.v[:, -joints:], torque)
-        )
-        driver.drive(data, q, v, tau)
-        mujoco.mj_step(driver.model, data)
-
-
-class _Driver:
-    """Where the joints of a body are in MuJoCo's coordinates, and their springs (n,) N·m/rad; sets the dampers."""
-
-    def __init__(self, body: Body, model: Any) -> None:
-        self.body, self.model = body, model
-        self.q_place = np.array([model.joint(joint.name).qposadr[0] for joint in body.joints])
-        self.v_place = np.array([model.joint(joint.name).dofadr[0] for joint in body.joints])
-        kinds = [next((kind for kind in STIFFNESS if kind in joint.name), "trunk") for joint in body.joints]
-        self.stiffness = np.array([STIFFNESS[kind] for kind in kinds])
-        model.dof_damping[self.v_place] = _DAMPING * self.stiffness
-        model.dof_armature[self.v_place] = ROTOR
-
-    def place(self, data: Any, q: Array, v: Array) -> None:
-        """Put the body into a configuration of Pinocchio's order (quaternion x y z w, velocity in the root's frame)."""
-        data.qpos[:3], data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
-        data.qvel[:3] = quaternion_matrix(q[None, 3:7])[0] @ v[:3]
-        data.qvel[3:6] = v[3:6]
-        data.qpos[self.q_place], data.qvel[self.v_place] = q[7:], v[6:]
-
-    def place_of(self, data: Any) -> Array:
-        """Return the configuration (nq,) in Pinocchio's order."""
-        return np.concatenate([data.qpos[:3], data.qpos[[4, 5, 6, 3]], data.qpos[self.q_place]])
-
-    def drive(self, data: Any, angle: Array, rate: Array, torque: Array) -> None:
-        """Set the joint torques of a plan; the damper itself is in the model, where MuJoCo integrates it implicitly."""
-        spring = self.stiffness * (angle - data.qpos[self.q_place])
-        data.qfrc_applied[self.v_place] = torque + spring + _DAMPING * self.stiffness * rate
-
-    def gap(self, data: Any, q: Array) -> tuple[Array, float, float]:
-        """Return the distances from the plan: joint angles (n,) rad, root m, root's tilt rad."""
-        up = quaternion_matrix(np.stack([q[3:7], data.qpos[[4, 5, 6, 3]]]))[:, :, 1]
-        cosine = np.clip(up[0] @ up[1], -1.0, 1.0)
-        return data.qpos[self.q_place] - q[7:], float(np.linalg.norm(data.qpos[:3] - q[:3])), float(np.arccos(cosine))
-
-
-def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
-    """Return the wrench (6,) of all contacts on the body about the lab origin, N and N·m."""
-    total, local = np.zeros(6), np.zeros(6)
-    for i in range(data.ncon):
-        contact = data.contact[i]
-        mujoco.mj_contactForce(model, data, i, local)
-        force = contact.frame.reshape(3, 3).T @ local[:3]
-        total += wrench_of_force(force, contact.pos)
-    return total
-
+from biodance.errors import BiodanceError
+from biodance.records import Array
 
 _RATE = 100.0
 """Hz at which plan and playback are compared."""
+UNSURE = 0.2
+"""s around the instant at which a foot leaves the ground, or comes back, in which it may still, or already, bear: it
+rises by 10 h (t/T)³ at first, so that what sinks by 1 mm bears 0.2 s longer where h = 0.1 m in T = 2 s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rehearsal:
     """``playback`` of the ``dance`` (its holds shortened), ``inside`` (T,) m how far the centre of pressure of the
-    simulated floor is inside the whole base of support of the feet that are planned to be down (negative: outside).
+    simulated floor is inside the whole base of support of the feet that are planned to be down, or may be still or
+    already (`UNSURE`); negative: outside.
     """
 
     dance: Dance
     playback: Playback
     inside: Array
 
+    @property
+    def broken(self) -> tuple[str, ...]:
+        """What the plan did not foresee, in phrases: a fall, a hand on the floor, pressure outside the soles."""
+        p = self.playback
+        told = [] if p.stays_up else [f"falls at {p.fell:.1f} s of {self.dance.duration:.1f} s"]
+        told += [f"the {part.replace('_', ' ')} comes to the floor at {at:.1f} s" for part, at in p.touched.items()]
+        if (least := float(np.nanmin(self.inside))) < -RADIUS:
+            when = p.time[int(np.nanargmin(self.inside))]
+            told.append(f"the pressure is {-1000 * least:.0f} mm outside the soles at {when:.1f} s")
+        return tuple(told)
+
     def table(self) -> str:
         """Return what became of the dance in a few lines of Markdown."""
-        p, end = self.playback, self.dance.duration
-        fate = "stays up to the end" if p.stays_up else f"falls at {p.fell:.1f} s of {end:.1f} s"
+        p, fate = self.playback, "; ".join(self.broken) or "stays up to the end, on its feet alone"
         angle, gap = np.degrees(p.angle_error), 1e3 * p.zmp_error[np.isfinite(p.zmp_error)]
         inside = 1e3 * self.inside[np.isfinite(self.inside)]
         angle_rms, gap_rms = (np.sqrt(np.mean(error**2)) for error in (angle, gap))
@@ -267,7 +69,11 @@ def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehea
     ------
     MissingLibrary
         MuJoCo is not installed.
+    BiodanceError
+        It is danced on a stool, which is not simulated.
     """
+    if any(stance.seat for stance in dance.stances):
+        raise BiodanceError(f"Dance {dance.protocol}: is danced on a stool, which is not simulated. Play another one.")
     short = replace(dance, hold=np.minimum(dance.hold, hold))
     motion = short.motion(_RATE)
     played = play(dance.body, motion, friction=friction, down=bearing(short, motion.time))
@@ -281,9 +87,11 @@ def bearing(dance: Dance, time: Array) -> NDArray[np.bool_]:
 
 
 def _inside(dance: Dance, played: Playback) -> Array:
-    point, owner = played.wrench.cop()[:, :2], phase_at(dance.phases, played.time)
-    out = np.empty(len(point))
-    for k in np.unique(owner):
-        normals, offsets = dance.phases[k].stance.whole.reduced(1.0)
-        out[owner == k] = (point[owner == k] @ normals.T + offsets).min(axis=1)
+    point, out = played.wrench.cop()[:, :2], np.full(len(played.time), -np.inf)
+    for late in (0.0, -UNSURE, UNSURE):
+        owner = phase_at(dance.phases, np.clip(played.time + late, 0.0, dance.duration))
+        for k in np.unique(owner):
+            normals, offsets = dance.phases[k].stance.whole.reduced(1.0)
+            own = owner == k
+            out[own] = np.maximum(out[own], (point[own] @ normals.T + offsets).min(axis=1))
     return out

@@ -113,7 +113,8 @@ def robot_plan(body: Body, plan: Plan) -> Plan:
     free: dict[str, Any] = {"instructions": float("inf"), "simplicity": 0.0, "wide": 1.0, "plate": None}
     if any(isinstance(limit, Balance) and limit.share == FOLLOWABLE_SHARE for limit in plan.limits):
         plan = plan.with_limits([Balance()])  # people have performers instead
-    return replace(plan, move=plan.move * max(1.0, UNHURRIED / usual), forward=ahead, **free)
+    slower = max(1.0, UNHURRIED / usual)
+    return replace(plan, move=plan.move * slower, slower=slower, forward=ahead, **free)
 
 
 def leg_length(body: Body) -> float:
@@ -124,6 +125,19 @@ def leg_length(body: Body) -> float:
 def person_sized(body: Body) -> SimilarityScale:
     """Return the factors that make a robot as large and as heavy as a person."""
     return SimilarityScale(_LEG / leg_length(body), MASS / float(body.sip.mass.sum()))
+
+
+def person_sized_plan(plan: Plan, to: SimilarityScale) -> Plan:
+    """Return the ``plan`` of a robot (`robot_plan`) for its similar model of a person's size."""
+    return replace(
+        plan,
+        move=to.time * plan.move,
+        hold=to.time * plan.hold,
+        slower=to.time * plan.slower,
+        budget=to.time * plan.budget,
+        forward=float(np.clip(to.length * plan.forward, 0.05, 0.4)),
+        limits=tuple(limit.resized(to.length) for limit in plan.limits),
+    )
 
 
 def design_robot(
@@ -144,15 +158,7 @@ def design_robot(
         There is no such dance: the message names the posture or move and the limit that forbids it.
     """
     plan, to = plan.with_limits(limits), person_sized(body)
-    time, length = to.time, to.length
-    long = replace(
-        plan,
-        move=time * plan.move,
-        hold=time * plan.hold,
-        budget=time * plan.budget,
-        forward=float(np.clip(length * plan.forward, 0.05, 0.4)),
-        limits=tuple(limit.resized(length) for limit in plan.limits),
-    )
+    long = person_sized_plan(plan, to)
     large, _ = design(similar_body(body, to), long, seed=seed, tell=tell, resume=resume)
     if tell is not None:
         tell("the way from rest", 0, 0)

@@ -7,13 +7,13 @@ between solids from coal, and the base of support is drawn anew from where the s
 
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit
+from biodance.dance.margin import Margin as Margin
 from biodance.threads import one_thread
 
 EDGES = np.array([0.0025, 0.005])
@@ -24,19 +24,6 @@ JUMP = 1e-6
 
 _RATE = 100.0
 """Hz at which a dance is judged."""
-
-
-@dataclass(frozen=True)
-class Margin:
-    """What is left of one limit at its worst: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what``
-    (a joint, a pair).
-    """
-
-    limit: str
-    worst: float
-    where_s: float
-    unit: str
-    what: str = ""
 
 
 @one_thread()

@@ -10,9 +10,10 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import Expectation
-from biodance.dance.limits import ForImprecise
+from biodance.dance.limits import ForImprecise, family
 from biodance.dance.metrics import DanceMetrics, longest_alone
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
+from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.footprint import room_in_words, room_on_plates
 from biodance.dance.problem.plan import Plan
 from biodance.dance.verify import Margin, broken
@@ -21,6 +22,8 @@ from biodance.records import Session
 if TYPE_CHECKING:
     from biodance.diagnosis.foresight import Foresight
 
+_AS_MUCH = 1.1
+"""Times as much left of the table's standard deviation of a counterpart's mass: less is no effect of an emphasis."""
 _FAR, _NEW = 3.0, 0.9
 """Times its bound at which the static criterion is warned of; share of the table's standard deviation that is left of
 what is not learned.
@@ -99,14 +102,10 @@ class DanceResult:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What this dance cannot tell, in plain sentences: where the criterion is far from its bound."""
-        unsafe = tuple(
-            f"NOT SAFE when imprecise: {m.limit.removesuffix(OF_PERFORMERS).replace('_', ' ').strip()} fell short "
-            f"by {-1000 * m.worst:.0f} mm at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of "
-            f"{PERFORMER_COUNT}. Try another seed, an easier protocol, or dance it with somebody at hand."
-            for m in broken(self.margins)
-            if m.limit.endswith(OF_PERFORMERS)
-        )
+        """What must be known of this dance, in plain sentences: what is not safe, and what it cannot tell because the
+        criterion is far from its bound.
+        """
+        unsafe = not_safe(self.dance) if self.dance else ()
         if self.account is None or self.expectation is None or self.account.static <= _FAR * self.account.static_bound:
             return unsafe
         ratio = self.account.static / self.account.static_bound
@@ -141,8 +140,33 @@ class DanceResult:
         )
 
     @property
+    def emphasis(self) -> tuple[str, ...]:
+        """What came of the emphasis on segments, a sentence each: how well its mass will be known, how well that of its
+        counterpart, and why both where one was asked for.
+        """
+        known, out = self.expectation, list[str]()
+        for name, factor in self.plan.weights if known is not None else ():
+            if known is None or factor <= self.plan.other_weight or counterpart(name) == name:
+                continue
+            here, there = (known.segments.index(one) for one in (name, counterpart(name)))
+            before, after = known.mass[0], known.mass[-1]
+            said = (
+                f"Emphasis on the {_names((name,))}: its mass becomes known to {after[here]:.2f} kg (table: "
+                f"{before[here]:.2f}), that of the {_names((counterpart(name),))} to {after[there]:.2f}."
+            )
+            covariance = self.body.sip.covariance
+            i, j = 10 * here, 10 * there
+            alike = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
+            if after[there] / before[there] < _AS_MUCH * after[here] / before[here]:
+                said += f" Both, because a person's sides are alike (correlation in the table {alike:.2f})."
+            out.append(said)
+        return tuple(out)
+
+    @property
     def about(self) -> tuple[str, ...]:
-        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what is untold."""
+        """What stands before the cues: for whom, the person's own limits and their reason, how safe, what was left
+        out.
+        """
         out = [f"For {self.plan.whom}."] if self.plan.whom else []
         if self.dance and (alone := longest_alone(self.dance)):
             out.append(f"One foot is off the ground for up to {alone:.0f} s at a time.")
@@ -151,15 +175,14 @@ class DanceResult:
         if self.reason_of_person:
             out.append(f"Made for one person's limits: {self.reason_of_person}.")
         if found := self._left:
-            kept = " and ".join(one.words.format(f"{100 * worst:.1f}") for one, worst in found)
+            kept = ", ".join(f"{100 * worst:.1f} cm of {one.words}" for one, worst in found)
             out.append(
-                f"{PERFORMER_COUNT} simulated people, seven degrees off in every joint, a fifth off in time and "
-                f"swaying, {kept} at the worst moment."
+                f"Copied badly by {PERFORMER_COUNT} simulated people (seven degrees off in every joint, a fifth off in "
+                f"time, swaying), it keeps {kept} at the worst moment."
             )
         else:
             out.append("Nobody imprecise was tried on this dance: it is for trained people only.")
-        out += [self.price] if self.price else []
-        return (*out, *self.notes, *(self.dance.notes if self.dance else ()), *self.warnings)
+        return (*out, *self.notes, *(self.dance.notes if self.dance else ()))
 
     @property
     def complete(self) -> bool:
@@ -176,6 +199,17 @@ class DanceResult:
 
 def _names(segments: tuple[str, ...]) -> str:
     return ", ".join(name.replace("_", " ") for name in segments)
+
+
+def not_safe(dance: Dance) -> tuple[str, ...]:
+    """Return what imprecise people lack in a dance, a sentence for each limit; none where it is safe."""
+    words = {f"{limit.name}_{OF_PERFORMERS}": one.words for limit, one in for_imprecise(family()).items()}
+    return tuple(
+        f"NOT SAFE when imprecise: {-100 * m.worst:.1f} cm of the {words.get(m.limit, m.limit)} that is needed are "
+        f"missing at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of {PERFORMER_COUNT} simulated "
+        f"people. Try another seed or an easier protocol."
+        for m in dance.unsafe
+    )
 
 
 def plate_sentence(dance: Dance) -> str:

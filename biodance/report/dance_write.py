@@ -16,7 +16,7 @@ from biodance.dance.verify import Margin
 from biodance.lab.c3d.write import FileValue, write_c3d
 from biodance.lab.plain_text import for_spreadsheet
 from biodance.motion.kinematics import poses
-from biodance.pipeline.dance_result import DanceResult
+from biodance.pipeline.dance_result import DanceResult, not_safe
 from biodance.pipeline.still import posture_still
 from biodance.records import SIDES, Array, Markers
 from biodance.report.documents.dance import dance_document
@@ -31,21 +31,18 @@ DOTS = 160
 """Dots per inch of the figures."""
 
 
-def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
+def write_dance(result: DanceResult, folder: Path, *, despite: bool = False) -> dict[str, Any]:
     """Write all files of a dance into ``folder`` (which exists) and return the content of ``results.json``.
 
-    A dance that does not keep every limit is not written: then ``results.json`` alone says why.
+    A dance that does not keep every limit is not written: then ``results.json`` alone says why. Of one that imprecise
+    people cannot dance safely what leads a person is only written ``despite`` that.
     """
     found: dict[str, Any] = plain_values(dance_document(result))
     if result.dance is not None and result.account is not None and result.expectation is not None:
         dance = result.dance
         dance.save(folder / "dance.npz")
-        if dance.body.markers.names:
-            write_preview(dance, folder / "dance.c3d")
-            (folder / "cues.html").write_text(cards_page(result), encoding="utf-8", newline="\n")
-        else:
-            write_angles(dance, folder / "dance.csv")
-        (folder / "cues.md").write_text(cues(dance, result.about), encoding="utf-8", newline="\n")
+        if despite or not dance.unsafe:
+            _write_leading(result, dance, folder)
         (folder / "margins.md").write_text(margin_table(result.margins), encoding="utf-8", newline="\n")
         counted = np.flatnonzero(dance.counted).tolist()
         titles = tuple(f"{p + 1} {_short(dance.stances[p])}" for p in counted)
@@ -63,6 +60,17 @@ def write_dance(result: DanceResult, folder: Path) -> dict[str, Any]:
             (folder / "postures_3d.png").write_bytes(picture)
     (folder / "results.json").write_text(to_text(found), encoding="utf-8", newline="\n")
     return found
+
+
+def _write_leading(result: DanceResult, dance: Dance, folder: Path) -> None:
+    """Write what leads a person, or a robot, through the dance; NOT SAFE comes first."""
+    if dance.body.markers.names:
+        write_preview(dance, folder / "dance.c3d")
+        (folder / "cues.html").write_text(cards_page(result), encoding="utf-8", newline="\n")
+    else:
+        write_angles(dance, folder / "dance.csv")
+    text = cues(dance, (*not_safe(dance), *result.about))
+    (folder / "cues.md").write_text(text, encoding="utf-8", newline="\n")
 
 
 def _held(dance: Dance, chosen: Sequence[int]) -> tuple[Any, Any, Any]:
@@ -196,7 +204,7 @@ def print_dance(found: dict[str, Any]) -> None:
             console.print(f"hardly tilted: {', '.join(criterion['hardly_excited'])}", markup=False)
     if found["simplicity_price"]:
         console.print(found["simplicity_price"]["sentence"], markup=False)
-    for note in (*found["warnings"], *found["notes"]):
+    for note in (*found["warnings"], *found["emphasis"], *found["notes"]):
         console.print(f"look: {note}", markup=False)
 
 

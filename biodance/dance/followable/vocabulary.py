@@ -31,6 +31,10 @@ _FREE = {
 }
 """degrees: what free postures of an arm are drawn from; away from trunk and thighs."""
 _FREE_WORDS = 8
+_JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
+    ("lifted", "hanging"), ("hip", "knee", "ankle")
+)
+"""Joints by what moves."""
 _FITS = np.radians(25.0)
 """rad: a word that a person's range shortens by more is not asked of that person."""
 _CUT = np.radians(10.0)
@@ -194,8 +198,18 @@ def _fitted(body: Body, part: str, word: Word) -> Word | None:
         return word
     if not word.rest and _short_of(body, part, word):
         return None
-    within = tuple((joint, _near(body, part, joint, angle)) for joint, angle in word.angles)
-    return replace(word, angles=within)
+    named = dict(word.angles)
+    angles = dict.fromkeys(_joints_of(body, part), 0.0) | named
+    within = {joint: _near(body, part, joint, angle) for joint, angle in angles.items()}
+    return replace(word, angles=tuple((joint, angle) for joint, angle in within.items() if angle or joint in named))
+
+
+def _joints_of(body: Body, part: str) -> tuple[str, ...]:
+    """Return the joints of a part, without its side: what a word does not name is straight, as far as it goes."""
+    side, _, group = part.rpartition("_")
+    names = (joint.name for joint in body.joints)
+    own = (name.removeprefix(f"{side}_") for name in names if not side or name.startswith(f"{side}_"))
+    return tuple(name for name in own if name.startswith(_JOINTS[group]))
 
 
 def _short_of(body: Body, part: str, word: Word) -> str:

@@ -30,9 +30,11 @@ from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Array, assign
 
 
-def bounded(default: float, low: float, high: float, unit: str = "") -> Any:
-    """Return a number of a limit: its ``default`` and the legal range from ``low`` to ``high`` in ``unit``."""
-    return field(default=default, metadata={"low": low, "high": high, "unit": unit})
+def bounded(default: float, low: float, high: float, unit: str = "", *, imprecise: bool = False) -> Any:
+    """Return a number of a limit: its ``default`` and the legal range from ``low`` to ``high`` in ``unit``;
+    ``imprecise`` True where it says what imprecise people must keep (`Limit.for_imprecise`), and nothing else.
+    """
+    return field(default=default, metadata={"low": low, "high": high, "unit": unit, "imprecise": imprecise})
 
 
 @dataclass(frozen=True)

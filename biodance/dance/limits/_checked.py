@@ -136,7 +136,7 @@ class ForImprecise:
     """What imprecise people must keep of a limit.
 
     ``left`` gives what a copy leaves, in the limit's unit, at least ``least`` of which is demanded; ``key`` is its name
-    in results.json, ``words`` say it of the worst of them (``{}``: cm).
+    in results.json, ``words`` say what it is, after a number of cm.
     """
 
     left: Callable[[Copied], Remaining]

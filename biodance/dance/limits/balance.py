@@ -12,9 +12,12 @@ from biodance.records import Array
 
 @dataclass(frozen=True)
 class Balance(Limit):
-    """``share`` of every half width of the base of support, from its middle, that may be used (paper: 0.6)."""
+    """``share`` of every half width of the base of support, from its middle, that may be used (paper: 0.6); ``room`` m
+    inside the edge of the whole support that imprecise people keep.
+    """
 
     share: float = bounded(0.6, 0.1, 1.0)
+    room: float = bounded(0.015, 0.0, 0.1, "m", imprecise=True)
     name, unit, scale, suspicion = "balance", "m", 0.03, 30
     mended_by_slowness = True
 
@@ -43,8 +46,8 @@ class Balance(Limit):
         return Remaining(least[:, None], (motion.stance.name,))
 
     def for_imprecise(self) -> ForImprecise:
-        """Nobody leaves the whole support."""
-        return ForImprecise(_left, 0.0, "balance_m", "kept the weight {} cm inside the edge of feet or stool")
+        """Nobody comes nearer than ``room`` to the edge of the whole support."""
+        return ForImprecise(_left, self.room, "balance_m", "reserve for the balance")
 
 
 LIMIT = Balance

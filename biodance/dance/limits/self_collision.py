@@ -21,17 +21,16 @@ _ROUNDS = 6
 """Of the search, which leaves a sixteenth of the line each time."""
 _ENOUGH = 0.05
 """m: a distance above it is given as what is certain."""
-IMPRECISE_GAP = 0.02
-"""m that segments of people stay apart who copy a dance imprecisely."""
 _POINTS = 5
 """Points on the axis of a capsule for the first look."""
 
 
 @dataclass(frozen=True)
 class SelfCollision(Limit):
-    """``gap`` m that is left between the surfaces of any two segments at least."""
+    """``gap`` m that is left between the surfaces of any two segments at least, ``room`` m by imprecise people."""
 
     gap: float = bounded(0.0, 0.0, 0.04, "m")
+    room: float = bounded(0.02, 0.0, 0.05, "m", imprecise=True)
     name, unit, scale, suspicion = "self_collision", "m", 0.05, 50
 
     def margins(self, state: State) -> Margins:
@@ -48,9 +47,8 @@ class SelfCollision(Limit):
         return Remaining(apart - self.gap, tuple(pairs))
 
     def for_imprecise(self) -> ForImprecise:
-        """Segments stay `IMPRECISE_GAP` apart."""
-        least = max(self.gap, IMPRECISE_GAP)
-        return ForImprecise(_left, least, "gap_m", "kept arms and legs {} cm apart")
+        """Segments stay ``room`` apart."""
+        return ForImprecise(_left, max(self.gap, self.room), "gap_m", "room between arms, legs and trunk")
 
 
 LIMIT = SelfCollision

@@ -140,11 +140,33 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
         for stance, count in plan.blocks
         if not _allowed(stance, person)
     )
-    return (
-        replace(body, limits=limit_body(body, person)),
-        replace(plan, blocks=kept, alone=person.stand_alone_on, holds=person.holds),
-        notes,
-    )
+    limits = limit_body(body, person)
+    if plan.seated:
+        limits, widened = _as_seated(body, limits, person)
+        notes += widened
+    plan = replace(plan, blocks=kept, alone=person.stand_alone_on, holds=person.holds)
+    return replace(body, limits=limits), plan, notes
+
+
+_SITTING = {"hip_flexion": math.radians(93.0), "knee_flexion": math.radians(82.0)}
+"""rad to which whoever sits on a stool bends (the word for it in the vocabulary, and 2 degrees)."""
+
+
+def _as_seated(body: Body, limits: JointLimits, person: PersonLimits) -> tuple[JointLimits, tuple[str, ...]]:
+    """Return the limits with what sitting takes, and what of ``person`` was therefore not applied, in sentences: a
+    share of every range says nothing of how far the hips of somebody bend who sits; a range does.
+    """
+    told = {j for key, _, _ in person.ranges for j in joints(body, key)}
+    upper, notes = limits.upper.copy(), list[str]()
+    for j, joint in enumerate(body.joints):
+        angle = min(_SITTING.get(joint.name.partition("_")[2], -math.inf), body.limits.upper[j])
+        if upper[j] < angle and j not in told:
+            upper[j] = angle
+            name = joint.name.replace("_", " ")
+            notes.append(
+                f"Whoever sits bends the {name} to {math.degrees(angle):.0f} degrees, so range_share is not kept there."
+            )
+    return replace(limits, upper=upper), tuple(notes)
 
 
 def limit_body(body: Body, person: PersonLimits) -> JointLimits:

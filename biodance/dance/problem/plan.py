@@ -85,7 +85,8 @@ class Plan:
     people can take who tire or fear to fall; ``deep`` deep ones, too; ``lively`` wider ones, too, chosen also for what
     they tell of the joint centres; ``wide`` times the usual distance between the feet; ``whom`` for whom it is, in
     words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached
-    without effort, or all that a healthy joint allows (the paper).
+    without effort, or all that a healthy joint allows (the paper); ``slower`` times that it takes as long as the
+    protocol says, whose seconds must be legal: of robots.
     """
 
     name: str
@@ -108,6 +109,7 @@ class Plan:
     holds: tuple[str, ...] = ()
     ranges: Range = "comfortable"
     whom: str = ""
+    slower: float = 1.0
     limits: tuple[Limit, ...] = field(default_factory=family)
 
     def __post_init__(self) -> None:
@@ -126,8 +128,8 @@ class Plan:
 
     def _check(self) -> None:
         for name, low, high, unit in (
-            ("move", 0.5, 20.0, "s"),
-            ("hold", 0.0, 60.0, "s"),
+            ("move", 0.5 * self.slower, 20.0 * self.slower, "s"),
+            ("hold", 0.0, 60.0 * self.slower, "s"),
             ("forward", LEAST_FORWARD, 0.4, "m"),
             ("simplicity", 0.0, 100.0, ""),
             ("instructions", 2.0, float("inf"), ""),

@@ -18,6 +18,7 @@ from biodance.dance.problem.footprint import plate_corners
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
+from biodance.pipeline.dance_result import not_safe
 from biodance.records import SIDES, side_in_name
 from biodance.report.files import refuse_page, write_files
 from biodance.report.pages.template import render, script_json, template_text, three_js
@@ -208,19 +209,25 @@ _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json"
 """What follows a person: parts of the bundle that `make bundle` writes beside this module."""
 
 
-def write_feedback(dance: Dance, path: Path, *, force: bool = False) -> bool:
+def write_feedback(dance: Dance, path: Path, *, force: bool = False, despite: bool = False) -> bool:
     """Write the page of a dance to ``path`` and return whether it follows the person (see `bundle`).
+
+    Of one that imprecise people cannot dance safely only ``despite`` that; the page then says so on top.
 
     Raises
     ------
     BiodanceError
-        The name does not end in .html, there is a file of that name and ``force`` was not given, the folder is missing,
-        the dance is that of a robot without solids, or the drawing library is missing.
+        The dance is not safe and ``despite`` was not given, the name does not end in .html, there is a file of that
+        name and ``force`` was not given, the folder is missing, the dance is that of a robot without solids, or the
+        drawing library is missing.
     """
     refuse_page(path, force=force)
+    unsafe = not_safe(dance)
+    if unsafe and not despite:
+        raise BiodanceError(f"{' '.join(unsafe)} Or give --despite: then there is a page, which says this on top.")
     scene, carried = scene_of(dance), bundle()
     scene["follow"] = follow_scene(dance) if carried else None
-    page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None)
+    page = feedback_page(dance.protocol, scene, carried if scene["follow"] else None, unsafe)
     write_files(path.parent, {path.name: page})
     return scene["follow"] is not None
 
@@ -234,13 +241,18 @@ def bundle() -> dict[str, str] | None:
     return parts | {"notices": (folder / "NOTICES.txt").read_text(encoding="utf-8").replace("--", "- -")}
 
 
-def feedback_page(name: str, scene: dict[str, Any], carried: dict[str, str] | None) -> str:
-    """Return the page of a dance as HTML text: what it shows (`scene_of`), and what follows the person, or None."""
+def feedback_page(
+    name: str, scene: dict[str, Any], carried: dict[str, str] | None, unsafe: tuple[str, ...] = ()
+) -> str:
+    """Return the page of a dance as HTML text: what it shows (`scene_of`), what follows the person, or None, and in
+    what it is not safe.
+    """
     from markupsafe import Markup
 
     return render(
         "feedback.html.j2",
         name=name.replace("_", " "),
+        unsafe=unsafe,
         version=__version__,
         style=Markup(template_text("feedback.css")),
         program=Markup(template_text("feedback.js")),

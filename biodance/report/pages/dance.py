@@ -8,7 +8,7 @@ from biodance.body.solids import box_solid, shape_parts
 from biodance.dance.cues import dance_instructions
 from biodance.dance.problem.stance import stance_words
 from biodance.motion.kinematics import poses
-from biodance.pipeline.dance_result import DanceResult
+from biodance.pipeline.dance_result import DanceResult, not_safe
 from biodance.records import Array
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.pages.template import render
@@ -78,8 +78,8 @@ def cards_page(result: DanceResult) -> str:
         minutes=f"{dance.duration / 60:.1f} minutes",
         move=f"{float(np.median(dance.move)):g}",
         hold=f"{float(np.max(dance.hold)):g}",
-        about=[sentence for sentence in result.about if sentence not in result.warnings],
-        warnings=result.warnings,
+        about=result.about,
+        unsafe=not_safe(dance),
         right="blue",
         left="orange",
         cues=cues,
