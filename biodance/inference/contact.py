@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve, solve_triangular
+from scipy.linalg import solve
 
 from biodance.diagnosis.candidates import local_basis
 from biodance.effects import Transient
 from biodance.inference.causes import NamedCause, cause_key
 from biodance.inference.rows import Rows
-from biodance.inference.scales import posterior, prior_sd, widened
+from biodance.inference.scales import fit, posterior, prior_sd, widened
 from biodance.inference.sets import Hypothesis, Search
 from biodance.records import Array
 
@@ -63,24 +63,12 @@ def with_contacts(search: Search, base: Hypothesis, kinds: Sequence[Transient]) 
     """Return the hypotheses that add a contact to ``base``: of each of the ``kinds`` that is touched as hands and feet
     touch, the most probable one with its course.
     """
-    found = [one for kind in kinds if (one := _touch_of(search.rows, base, kind)) is not None]
+    found = [one for kind in kinds if (one := _touch_of(search, base, kind)) is not None]
     likely = sorted(found, key=lambda one: -one.log_bayes_factor)
     best = next(((one, values) for one in likely[:2] if (values := _touching(search.rows, one)) is not None), None)
     if best is None or best[0].log_bayes_factor <= 0:
         return ()
     return (_named(search, base, *best, len(kinds)),)
-
-
-def score(rows: Rows, base: Hypothesis, Z: Array) -> tuple[Array, Array]:
-    """Return score (k,) and information (k, k) of further whitened columns ``Z`` (r, k) beside a hypothesis."""
-    found, n = base.fit, rows.plates
-    weight = np.concatenate(
-        [np.full(n, np.exp(-2 * found.scales.noise)), np.ones(rows.simulated - n), found.scales.weights]
-    )
-    weighted = weight[:, None] * Z
-    cross = np.concatenate([rows.X.T @ weighted, base.Z.T @ weighted])
-    half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
-    return weighted.T @ base.left, Z.T @ weighted - half.T @ half
 
 
 def _columns(rows: Rows, effect: Transient) -> Array | None:
@@ -93,12 +81,12 @@ def _columns(rows: Rows, effect: Transient) -> Array | None:
     return np.concatenate([simulated, np.zeros((len(rows.y) - rows.simulated, own.width))])
 
 
-def _touch_of(rows: Rows, base: Hypothesis, effect: Transient) -> _Touch | None:
+def _touch_of(search: Search, base: Hypothesis, effect: Transient) -> _Touch | None:
     """Return a contact with its most probable size."""
-    Z = _columns(rows, effect)
+    Z = _columns(search.rows, effect)
     if Z is None:
         return None
-    s, G = score(rows, base, Z)
+    s, G = search.score(base, Z)
 
     def bayes(size: float) -> float:
         inner = np.eye(len(s)) + size**2 * G
@@ -148,20 +136,23 @@ def _named(search: Search, base: Hypothesis, one: _Touch, values: Array, kinds: 
     """Return the hypothesis with the contact at the point of its segment that explains most, and its course there; as
     its size the force while it acts: half of the squares of its ``values`` (n, p) belong to larger ones.
     """
-    rows, effect, Z = search.rows, *_placed(search.rows, base, one)
-    wide = SIZES[-1] * Z  # widest: the most probable one would shrink short peaks
-    both = np.concatenate([base.Z, wide], axis=1)
-    found = posterior(widened(search.inner, rows, rows.X, both, base.y), prior_sd(rows), base.fit.scales)
-    course, count = SIZES[-1] * found.last(wide.shape[1])[0], len(effect.parameters)
+    rows, effect, Z = search.rows, *_placed(search, base, one)
+    own = np.concatenate([base.Z, one.size * Z], axis=1)
+    sd, plain = prior_sd(rows), np.ones(len(rows.y))
+    found = fit(widened(search.inner, rows, rows.X, own, base.y), sd, base.fit.scales, least=search.least)
+    wide = np.concatenate([base.Z, SIZES[-1] * Z], axis=1)  # the most probable size would shrink short peaks
+    open_ = posterior(widened(search.inner, rows, rows.X, wide, base.y), sd, found.scales)
+    course, count = SIZES[-1] * open_.last(Z.shape[1])[0], len(effect.parameters)
     square = np.sum(values**2, axis=1)
     order = np.argsort(square)
     k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
     spread = one.size**2 * np.diag(one.spread).reshape(-1, count)[k]
     touch = NamedCause(effect, values[k], np.diag(spread), _by_trial(rows, effect, course))
     prior = effect.prior / kinds / len(SIZES)
-    value = base.log_posterior + one.log_bayes_factor + float(np.log(prior / (1 - prior)))
+    before = base.log_posterior - base.fit.log_evidence  # prior of the causes beside it
+    value = found.log_evidence + before + float(np.log(prior / (1 - prior)))
     causes = (*(c for c in base.causes if cause_key(c) != cause_key(touch)), touch)
-    return Hypothesis(causes, rows, replace(found, products=search.inner), value, both, base.y)
+    return Hypothesis(causes, rows, replace(found, products=search.inner), value, own, base.y, plain)
 
 
 def _by_trial(rows: Rows, effect: Transient, course: Array) -> dict[str, Array]:
@@ -176,28 +167,28 @@ def _by_trial(rows: Rows, effect: Transient, course: Array) -> dict[str, Array]:
     return parts
 
 
-def _placed(rows: Rows, base: Hypothesis, one: _Touch) -> tuple[Transient, Array]:
+def _placed(search: Search, base: Hypothesis, one: _Touch) -> tuple[Transient, Array]:
     """Return the contact at the point of its segment that explains most, with its whitened unit columns, by
     Gauss-Newton steps of the point and the time course together. An error of a hand's length changes the moment by
     several newton metres.
     """
     effect, Z, place, wide = one.effect, one.Z, np.zeros(3), SIZES[-1]
     for _ in range(_STEPS):
-        course = wide * _mean(rows, base, wide * Z, np.zeros(Z.shape[1]))
-        both = np.concatenate([wide * Z, _BESIDE * _slopes(rows, effect, place, course)], axis=1)
-        place = _BESIDE * _mean(rows, base, both, np.append(np.zeros(Z.shape[1]), place / _BESIDE))[-3:]
+        course = wide * _mean(search, base, wide * Z, np.zeros(Z.shape[1]))
+        both = np.concatenate([wide * Z, _BESIDE * _slopes(search.rows, effect, place, course)], axis=1)
+        place = _BESIDE * _mean(search, base, both, np.append(np.zeros(Z.shape[1]), place / _BESIDE))[-3:]
         there = effect.at_full_rate().beside(place)
-        columns = _columns(rows, there)
+        columns = _columns(search.rows, there)
         if columns is not None:
             effect, Z = there, columns
     return effect, Z
 
 
-def _mean(rows: Rows, base: Hypothesis, Z: Array, there: Array) -> Array:
+def _mean(search: Search, base: Hypothesis, Z: Array, there: Array) -> Array:
     """Return the posterior mean (k,) of the coefficients of further columns ``Z`` with unit normal priors, linearised
     about ``there`` (k,).
     """
-    s, G = score(rows, base, Z)
+    s, G = search.score(base, Z)
     return np.asarray(solve(np.eye(len(s)) + G, s + G @ there, assume_a="pos"))
 
 

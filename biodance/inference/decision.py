@@ -21,8 +21,8 @@ from biodance.effects.body_mass import BodyMass
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.causes import NamedCause, cause_key
 from biodance.inference.left import adequacy
-from biodance.inference.rows import BODY, Rows
-from biodance.inference.scales import SOFT, prior_sd
+from biodance.inference.rows import BODY, SOFT, Rows
+from biodance.inference.scales import prior_sd
 from biodance.inference.sets import UNKNOWN, Hypothesis, Posterior, Search, hypothesis
 from biodance.observations import LANDMARK, shift_per_sd
 from biodance.records import SIDES, Array

@@ -24,8 +24,11 @@ from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
 
 _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 
-BODY, OBSERVED = "body", "observed"
-"""Groups of columns: the parameters of the body, and errors that several observations share."""
+BODY, OBSERVED, TOLERATED = "body", "observed", "tolerances"
+"""Groups of columns: the parameters of the body, errors that several observations share, and causes within their
+tolerance: a laboratory is careful in all of them, or in none."""
+SOFT = ("slide", "flesh", "sag", "tilt", "filter_mismatch")
+"""Groups of soft tissue, and of the filter that noise of markers in the needed wrench looks like."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +48,7 @@ class Rows:
     y : (r,) array
         Whitened target.
     group : (K,) array of int
-        Index in ``groups`` of each column: columns of one group share a scale.
+        Index in ``groups`` of each column: columns of one group share a scale; -1: errors that observations share.
     block : (r,) array of int
         Noise group of each row: band times 6 + channel for the plates, then markers; -1 for observations.
     groups : tuple of str
@@ -53,6 +56,8 @@ class Rows:
     tolerated : mapping
         By effect and target where the columns of its tolerance lie, and (p, k) what one unit of each is in its
         parameters.
+    reach : (n,) array
+        1 for observations that tell the size of a cause, 0 for others.
     """
 
     problem: Problem | None
@@ -64,6 +69,7 @@ class Rows:
     block: NDArray[np.intp]
     groups: tuple[str, ...]
     tolerated: Mapping[tuple[str, str], tuple[slice, Array]] = field(default_factory=dict)
+    reach: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def plates(self) -> int:
@@ -108,7 +114,7 @@ class Rows:
         if one is None:
             return np.zeros((0, len(names)))
         own = np.array([o.sd for o in one.observations])
-        return np.asarray(one.columns(effect.name, effect.target, names) * (one.in_reach / own)[:, None])
+        return np.asarray(one.columns(effect.name, effect.target, names) * (self.reach / own)[:, None])
 
 
 def observed_causes(evidence: ObservedEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
@@ -126,33 +132,43 @@ def observed_causes(evidence: ObservedEvidence, family: Mapping[str, object]) ->
 
 
 def rows_of(
-    problem: Problem | None, causes: Sequence[Candidate], tolerances: Tolerances, evidence: ObservedEvidence | None
+    problem: Problem | None,
+    causes: Sequence[Candidate],
+    tolerances: Tolerances,
+    evidence: ObservedEvidence | None,
+    *,
+    everywhere: bool = False,
 ) -> Rows:
-    """Return the evidence of a session; those of ``causes`` with a learned size are tolerances, too."""
+    """Return the evidence of a session; those of ``causes`` with a learned size are tolerances, too. A pressure out of
+    reach of its foot is of another foot and tells no size, unless it counts ``everywhere``.
+    """
     seen = None if evidence is None or not evidence.counting.observations else evidence.counting
     tolerated = tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0)
     if problem is None:
         X, y = np.zeros((0, len(tolerated))), np.zeros(0)
-        names = [one.names[0] for one in tolerated]
+        names = [TOLERATED] * len(tolerated)
         units: _Units = {
             one.names: (slice(k, k + 1), tolerances.size(key_of(*one.names)) * one.units[:, :1])
             for k, one in enumerate(tolerated)
         }
     else:
         X, y, names, units = _simulated(problem, tolerated, tolerances)
+    reach = np.empty(0)
     if seen is not None:
-        X, y, names = _with_observations(X, y, names, units, seen)
-    groups = tuple(dict.fromkeys(names))
+        reach = np.ones(len(seen.observations)) if everywhere else seen.in_reach.astype(float)
+        X, y, names = _with_observations(X, y, names, units, seen, reach)
+    groups = tuple(name for name in dict.fromkeys(names) if name != OBSERVED)
     return Rows(
         problem,
         tolerances,
         seen,
         X,
         y,
-        np.array([groups.index(name) for name in names], dtype=int),
+        np.array([-1 if name == OBSERVED else groups.index(name) for name in names], dtype=int),
         _blocks(problem, len(y)),
         groups,
         units,
+        reach,
     )
 
 
@@ -175,10 +191,10 @@ def _simulated(
 
 
 def _with_observations(
-    X: Array, y: Array, names: list[str], units: _Units, seen: ObservedEvidence
+    X: Array, y: Array, names: list[str], units: _Units, seen: ObservedEvidence, reach: Array
 ) -> tuple[Array, Array, list[str]]:
     """Return columns, target and groups with the observations below: a plate that lies elsewhere within its tolerance
-    shows in both. A pressure out of reach of its foot is of another foot, and tells no size.
+    shows in both.
     """
     own = np.array([one.sd for one in seen.observations])
     below = np.zeros((len(own), X.shape[1]))
@@ -187,15 +203,15 @@ def _with_observations(
             below[:, at] = np.outer(seen.sensitivities[name] / own, unit[0])
     shared = seen.shared / own[:, None]
     top = np.concatenate([X, np.zeros((len(X), shared.shape[1]))], axis=1)
-    bottom = np.concatenate([below, shared], axis=1) * seen.in_reach[:, None]
-    value = seen.in_reach * np.array([one.value - one.expected for one in seen.observations]) / own
+    bottom = np.concatenate([below, shared], axis=1) * reach[:, None]
+    value = reach * np.array([one.value - one.expected for one in seen.observations]) / own
     return np.concatenate([top, bottom]), np.concatenate([y, value]), [*names, *[OBSERVED] * shared.shape[1]]
 
 
 def _group(key: str) -> str:
     """Return the group of a key: what is alike in kind is as large, or as small, together."""
-    words = key.removeprefix("habit ").split()
-    return words[0]
+    kind = key.removeprefix("habit ").split()[0]
+    return kind if kind in SOFT else TOLERATED
 
 
 def _blocks(problem: Problem | None, count: int) -> NDArray[np.intp]:

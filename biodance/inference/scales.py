@@ -20,20 +20,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg.lapack import dpotri
 
-from biodance.inference.rows import BODY, Rows
+from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.records import Array
 
 TAIL = 4.0
 """Degrees of freedom of an observation's own error."""
 LOUD = 0.5
 """Standard deviation of the logarithm of the noise, between laboratories and persons."""
-SPREAD, TOLERANCE = 0.6, 0.35
-"""Standard deviation of the logarithm of the size of a group of what is no fault: of body and soft tissue; of what may
-be a cause, whose heavy tail is the cause itself.
+SPREAD, FLESH, TOLERANCE = 0.25, 0.6, 0.35
+"""Standard deviation of the logarithm of the size of a group of what is no fault, between persons and laboratories: of
+the body, of soft tissue, and of tolerances.
 """
-SOFT = ("slide", "flesh", "sag", "tilt", "wobbling_mass")
-"""Groups of soft tissue."""
 FLOOR = -0.3
 """Logarithm below which no group is believed to be smaller than where its size was learned."""
 _STEPS, _DONE, _FAR = 12, 0.02, 0.7
@@ -48,6 +47,10 @@ class Scales:
     groups: Array
     noise: float
     weights: Array
+
+    def far(self, other: "Scales") -> float:
+        """Return how far the logarithms of scales of columns and noise lie from others."""
+        return max(float(np.abs(self.groups - other.groups).max(initial=0.0)), abs(self.noise - other.noise))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +112,8 @@ class Fit:
 
     def curvature(self, count: int) -> Curvature:
         """Return what the data tell of the scales of ``count`` groups."""
-        C = cho_solve((self.lower, True), np.eye(len(self.u)), check_finite=False)
-        group = self.products.group
+        half, group = dpotri(self.lower, lower=True)[0], self.products.group
+        C = np.tril(half) + np.tril(half, -1).T
         known = np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)
@@ -157,27 +160,20 @@ def widened(found: Products, rows: Rows, X: Array, Z: Array, y: Array) -> Produc
 
 def prior_sd(rows: Rows) -> Array:
     """Return (G,) the standard deviations of the logarithms of the groups' scales."""
-    return np.array([SPREAD if name == BODY or name in SOFT else TOLERANCE for name in rows.groups])
+    known = {BODY: SPREAD} | dict.fromkeys(SOFT, FLESH)
+    return np.array([known.get(name, TOLERANCE) for name in rows.groups])
 
 
-def fit(
-    found: Products,
-    sd: Array,
-    start: Scales,
-    *,
-    known: Curvature | None = None,
-    steps: int = _STEPS,
-    least: float = -np.inf,
-) -> Fit:
+def fit(found: Products, sd: Array, start: Scales, *, steps: int = _STEPS, least: float = -np.inf) -> Fit:
     """Return the posterior at the most probable scales, whose logarithms have prior standard deviations ``sd`` (G,),
-    searched for from ``start``; their curvature is computed in every step if it is not ``known``.
+    searched for from ``start``; the noise is at least ``least`` and no less than where everything was learned.
     """
     at = replace(start, noise=max(start.noise, least))
     for step in range(steps + 1):
         one = posterior(found, sd, at)
         if step == steps:
             break
-        moved, at = _moved(one, sd, known or one.curvature(sd.size))
+        moved, at = _moved(one, sd, one.curvature(sd.size))
         at = replace(at, noise=max(at.noise, least, 0.0))
         if moved < _DONE:
             break

@@ -168,5 +168,5 @@ def _log_evidence(
         sensitivities={n: t[here] for n, t in evidence.sensitivities.items()},
         sign_reversed={},
     )
-    rows = rows_of(None, causes, known, some)
+    rows = rows_of(None, causes, known, some, everywhere=True)
     return fit(products(rows, rows.X, rows.y, rows.group), prior_sd(rows), nominal(rows)).log_evidence

@@ -20,8 +20,8 @@ from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
 from biodance.effects import Effect
 from biodance.inference.causes import NamedCause, cause_key, unlike
 from biodance.inference.rows import Rows
-from biodance.inference.scales import Curvature, Fit, Products, Scales, fit, nominal, prior_sd, products, widened
-from biodance.records import Array
+from biodance.inference.scales import LOUD, TAIL, Fit, Products, Scales, fit, nominal, prior_sd, products, widened
+from biodance.records import CHANNELS, Array
 
 P_UNKNOWN, UNKNOWN = 0.1, 0.5
 """Probability of an unknown cause in a session, before any data, and from which there is one; those of causes stand in their effects
@@ -32,18 +32,19 @@ OWN, EXCESS = 0.4, 1.4
 """Standard deviation of the logarithm of the noise of one band and channel beside that of the session: without fault,
 and with an unknown cause.
 """
-_ROUNDS, _STEPS, _SETTLED = 4, 2, 0.02
+_ROUNDS, _STEPS, _SETTLED = 4, 3, 0.02
 _AGAIN = 1
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which a cause is not fitted, and by how much a set may lie behind the best and be widened."""
 _FELT = 0.05
-"""Square of a whitened column below which it changes nothing."""
+"""Share of the noise below which what a cause is unlike its model is none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A set of causes with their sizes: ``log_posterior`` up to a constant of the session, and of the unknown beside
-    it (``log_unknown``).
+    it (``log_unknown``); ``Z`` (r, k) columns and ``y`` (r,) target beside all that is no fault; ``surety`` (r,) by
+    which rows are scaled because no cause is quite like its model.
     """
 
     causes: tuple[NamedCause, ...]
@@ -52,6 +53,7 @@ class Hypothesis:
     log_posterior: float
     Z: Array
     y: Array
+    surety: Array
     log_unknown: float = -np.inf
     where_unknown: tuple[int, int] = (0, 0)
 
@@ -62,9 +64,9 @@ class Hypothesis:
 
     @property
     def left(self) -> Array:
-        """(r,) whitened rows that the posterior mean leaves."""
+        """(r,) whitened rows that the posterior mean leaves, in units of their noise."""
         K, size = self.rows.X.shape[1], self.fit.coefficients
-        return np.asarray(self.y - self.rows.X @ size[:K] - self.Z @ size[K:])
+        return np.asarray(self.surety * (self.y - self.rows.X @ size[:K] - self.Z @ size[K:]))
 
     @property
     def phi(self) -> Array:
@@ -159,15 +161,29 @@ class Search:
         n, r = self.rows.plates, self.rows.simulated
         return self.rows.X[:n].T @ self.Z[:n], self.rows.X[n:r].T @ self.Z[n:r]
 
+    def crossed_at(self, weight: Array) -> Array:
+        """Return (K, k) X' W Z where all rows of the plates have one weight, and all of the markers."""
+        r, loud = self.rows.simulated, weight[0] if self.rows.plates else 1.0
+        return loud * self.crossed[0] + self.crossed[1] + self.rows.X[r:].T @ (weight[r:, None] * self.Z[r:])
+
+    def score(self, base: "Hypothesis", Z: Array) -> tuple[Array, Array]:
+        """Return score (k,) and information (k, k) of further whitened columns ``Z`` (r, k) beside a hypothesis."""
+        weight = self.weight(base)
+        weighted = weight[:, None] * Z
+        cross = np.concatenate([self.rows.X.T @ weighted, base.Z.T @ weighted])
+        half = solve_triangular(base.fit.lower, base.fit.size[:, None] * cross, lower=True, check_finite=False)
+        return weighted.T @ (base.left / base.surety), Z.T @ weighted - half.T @ half
+
+    def weight(self, base: "Hypothesis") -> Array:
+        """Return (r,) the inverse variance of every row under a hypothesis."""
+        found, n, r = base.fit, self.rows.plates, self.rows.simulated
+        loud = np.full(n, np.exp(-2 * found.scales.noise))
+        return base.surety**2 * np.concatenate([loud, np.ones(r - n), found.scales.weights])
+
     @cached_property
     def start(self) -> Fit:
         """The posterior without any cause."""
         return fit(self.inner, prior_sd(self.rows), nominal(self.rows), least=self.least)
-
-    @cached_property
-    def curvature(self) -> Curvature:
-        """What the data tell of the scales there."""
-        return self.start.curvature(len(self.rows.groups))
 
 
 Further = Callable[[Search, Hypothesis], tuple[Hypothesis, ...]]
@@ -214,7 +230,23 @@ def _searched(search: Search) -> Posterior:
         best = max(one.log_posterior for one in known.values())
         new.sort(key=lambda one: -one.log_posterior)
         front = [one for one in new[:_BRANCHES] if one.log_posterior > best - _BEHIND]
+    _without_each(search, known)
     return Posterior(tuple(with_unknown(one) for one in known.values()), tuple(first))
+
+
+def _without_each(search: Search, known: dict[frozenset[tuple[str, str]], Hypothesis]) -> None:
+    """Add to the ``known`` hypotheses those that lack one cause of the most probable set, until none of them is more
+    probable: what was found first may have stood for what was found behind it.
+    """
+    while True:
+        best = max(known.values(), key=lambda one: one.log_posterior)
+        for gone in best.causes if len(best.causes) > 1 else ():
+            rest = tuple(one for one in best.causes if one is not gone)
+            names = frozenset(map(cause_key, rest))
+            if names not in known:
+                known[names] = hypothesis(search, rest, best.fit.scales)
+        if max(known.values(), key=lambda one: one.log_posterior) is best:
+            return
 
 
 def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
@@ -226,30 +258,33 @@ def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
 
 def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | None = None) -> Hypothesis:
     """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes."""
-    rows = search.rows
+    rows, plain = search.rows, np.ones(len(search.rows.y))
     if not causes:
-        return Hypothesis((), rows, search.start, search.start.log_evidence, np.empty((len(rows.y), 0)), rows.y)
+        return Hypothesis((), rows, search.start, search.start.log_evidence, np.empty((len(rows.y), 0)), rows.y, plain)
     u0 = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
-    at = start or search.start.scales
+    at, p = start or search.start.scales, u0.size
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
-        errors = [_model_errors(rows, one, own) for one, own in zip(causes, taken, strict=True)]
-        Z = np.concatenate(
-            [*errors, *(rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes)], axis=1
+        surety = _surety(rows, causes, taken)
+        Z = np.concatenate([rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes], axis=1)
+        y = rows.y - np.sum(taken, axis=0) + Z @ u0
+        inner, X = search.inner, rows.X
+        if (surety < 1).any():
+            X = surety[:, None] * rows.X
+            inner = products(rows, X, y, rows.group)
+        found = fit(
+            widened(inner, rows, X, surety[:, None] * Z, surety * y), prior_sd(rows), at, steps=_STEPS, least=search.least
         )
-        p = u0.size
-        y = rows.y - np.sum(taken, axis=0) + Z[:, Z.shape[1] - p :] @ u0
-        inner = widened(search.inner, rows, rows.X, Z, y)
-        found = fit(inner, prior_sd(rows), at, known=search.curvature, steps=_STEPS, least=search.least)
+        settled = found.scales.far(at) < _SETTLED
         at = found.scales
         u, C = found.last(p)
         causes, moved, u0 = _moved(causes, u, C), np.abs(u - u0).max(initial=0.0), u
-        if moved < _SETTLED:
+        if moved < _SETTLED and settled:
             break
-    value = found.log_evidence + sum(search.prior[cause_key(one)] for one in causes)
+    value = found.log_evidence + float(np.log(surety).sum()) + sum(search.prior[cause_key(one)] for one in causes)
     possible = all(rows.possible(one.effect, one.theta) for one in causes)
     found = replace(found, products=search.inner)  # the largest arrays, which nobody asks for again
-    return Hypothesis(causes, rows, found, value if possible else -np.inf, Z, y)
+    return Hypothesis(causes, rows, found, value if possible else -np.inf, Z, y, surety)
 
 
 def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCause, ...]:
@@ -262,23 +297,24 @@ def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCau
     return tuple(out)
 
 
-def _model_errors(rows: Rows, one: NamedCause, taken: Array) -> Array:
-    """Return (r, k) unit columns of how a cause is unlike its model: the share `unlike` of what it adds, in each band
-    and channel by itself.
+def _surety(rows: Rows, causes: Sequence[NamedCause], taken: Sequence[Array]) -> Array:
+    """Return (r,) by which rows are scaled because no cause is quite like its model: it leaves the share `unlike` of
+    what it adds to a band and channel (``taken`` (r,) of each), as noise beside the session's.
     """
-    n = rows.plates
-    out = np.zeros((len(taken), rows.block[:n].max(initial=-1) + 1))
-    out[np.arange(n), rows.block[:n]] = unlike(one.effect) * taken[:n]
-    return out[:, np.sum(out**2, axis=0) > _FELT]
+    n, extra = rows.plates, np.zeros(rows.plates)
+    count = np.maximum(np.bincount(rows.block[:n]), 1)
+    for one, added in zip(causes, taken, strict=True):
+        square = np.bincount(rows.block[:n], weights=added[:n] ** 2) / count
+        extra += unlike(one.effect) ** 2 * square[rows.block[:n]]
+    extra[rows.block[:n] < len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
+    return np.concatenate([1 / np.sqrt(1 + np.where(extra > _FELT, extra, 0.0)), np.ones(len(rows.y) - n)])
 
 
 def screen(search: Search, one: Hypothesis) -> list[Scored]:
     """Return every further cause by the score test at the scales of a hypothesis, most probable first."""
-    n, r, found = search.rows.plates, search.rows.simulated, one.fit
-    loud = np.exp(-2 * found.scales.noise)
-    weight = np.concatenate([np.full(n, loud), np.ones(r - n), found.scales.weights])
-    left = one.left
-    cross = loud * search.crossed[0] + search.crossed[1] + search.rows.X[r:].T @ (weight[r:, None] * search.Z[r:])
+    r, found, weight = search.rows.simulated, one.fit, search.weight(one)
+    left = one.left / one.surety
+    cross = search.crossed_at(weight) if (one.surety == 1).all() else search.rows.X.T @ (weight[:, None] * search.Z)
     if one.Z.shape[1]:
         cross = np.concatenate([cross, (one.Z * weight[:, None]).T @ search.Z])
     half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)
@@ -292,8 +328,39 @@ def screen(search: Search, one: Hypothesis) -> list[Scored]:
         inner = np.linalg.inv(np.eye(len(s)) + G)
         mean = inner @ s
         value = 0.5 * float(s @ mean) + 0.5 * float(np.linalg.slogdet(inner)[1])
-        scored.append(Scored(cause.effect, value + search.prior[cause.names], cause.start(mean)))
+        heard, size = _told_by_outliers(left[r:], Z[r:, 0]) if len(s) else (-np.inf, 0.0)
+        if heard > value:
+            value, mean = heard, np.append(size, np.zeros(len(s) - 1))
+        tried = [(value, cause.start(mean)), *_at_sizes(search, one, cause.effect)]
+        value, begin = max(tried, key=lambda pair: pair[0])
+        scored.append(Scored(cause.effect, value + search.prior[cause.names], begin))
     return sorted(scored, key=lambda suspect: -suspect.gain)
+
+
+def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[float, Array]]:
+    """Return what a cause gains near each of the sizes at which it is screened because it is far from proportion to its
+    size, and that size (1,): its prior there, and the volume that the data leave of it (Laplace, the slope taken as that
+    of the way from none).
+    """
+    out = []
+    for share in effect.screened_at:
+        s, G = search.score(one, search.rows.added(effect, share * effect.typical)[:, None])
+        u = share / SCALE
+        value = s[0] - 0.5 * G[0, 0] - 0.5 * u**2 - 0.5 * np.log1p(G[0, 0] / u**2)
+        out.append((float(value), share * effect.typical))
+    return out
+
+
+def _told_by_outliers(left: Array, z: Array) -> tuple[float, float]:
+    """Return what a cause with one column ``z`` (n,) gains where it explains observations that are outliers without it
+    (``left`` (n,)), whose weights say nothing of it; and its size. Laplace, all else as it is.
+    """
+    size, weight = 0.0, np.ones(len(left))
+    for _ in range(_ROUNDS):
+        size = float((weight * z) @ left / (1 + (weight * z) @ z))
+        weight = (TAIL + 1) / (TAIL + (left - z * size) ** 2)
+    gained = np.log1p(left**2 / TAIL) - np.log1p((left - z * size) ** 2 / TAIL)
+    return float(0.5 * (TAIL + 1) * gained.sum() - 0.5 * size**2 - 0.5 * np.log1p((weight * z) @ z)), size
 
 
 def energies(one: Hypothesis) -> tuple[Array, Array]:
@@ -308,19 +375,29 @@ def energies(one: Hypothesis) -> tuple[Array, Array]:
 
 
 def with_unknown(one: Hypothesis) -> Hypothesis:
-    """Return a hypothesis with the log posterior of an unknown cause beside it: one band and channel in which more is
-    left than laboratories leave there, log s of each ~ N(0, `EXCESS`^2) in place of N(0, `OWN`^2).
+    """Return a hypothesis with the log posterior of an unknown cause beside it: the noise of one band and channel, of
+    the whole session, or the size of a group of what is no fault is larger than anywhere, its logarithm
+    ~ N(0, `EXCESS`^2) in place of its usual spread.
     """
     square, count = energies(one)
-    there = count > 0
-    if not there.any():
+    if not count.any():
         return one
-    away = np.full(square.size, -np.inf)
-    away[there] = np.maximum(0.5 * np.log(np.maximum(square[there], 1e-12)), 0.0)
-    own, wide = OWN**2 + 0.5 / np.maximum(count, 1), EXCESS**2 + 0.5 / np.maximum(count, 1)
-    each = np.where(
-        there, 0.5 * np.where(there, away, 0.0) ** 2 * (1 / own - 1 / wide) - 0.5 * np.log(wide / own), -np.inf
+    blocks = 0.5 * np.log(np.maximum(square[count > 0], 1e-12))
+    kinds = (
+        (blocks, np.sqrt(OWN**2 + 0.5 / count[count > 0])),
+        (np.array([one.fit.scales.noise]), np.array([LOUD])),
+        (one.fit.scales.groups, prior_sd(one.rows)),
     )
-    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / there.sum())
-    at = int(np.argmax(each))
-    return replace(one, log_unknown=one.log_posterior + float(logsumexp(each)) + price, where_unknown=divmod(at, 6))
+    each = [float(logsumexp(_excess(away, usual))) - np.log(len(away)) for away, usual in kinds]
+    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / len(kinds))
+    at = np.flatnonzero(count)[int(np.argmax(_excess(*kinds[0])))]
+    told = one.log_posterior + float(logsumexp(each)) + price
+    return replace(one, log_unknown=told, where_unknown=divmod(int(at), len(CHANNELS)))
+
+
+def _excess(away: Array, usual: Array) -> Array:
+    """Return the log Bayes factors of scales whose logarithms are ``away`` from usual for being larger than anywhere:
+    N(0, `EXCESS`^2) against N(0, ``usual``^2).
+    """
+    wide = np.hypot(EXCESS, usual)
+    return np.asarray(0.5 * np.maximum(away, 0.0) ** 2 * (usual**-2 - wide**-2) - np.log(wide / usual))
