@@ -121,12 +121,14 @@ def with_failed(failed: tuple[QualityCheck, ...], left: Diagnosis) -> Diagnosis:
         "A check named its cause before any statistics. Mend it and diagnose again: nothing is fitted to "
         "recordings that are wrong."
     )
-    known = {(one.effect, one.target) for one in map(failed_check, failed)}
+    told = tuple(map(failed_check, failed))
+    known = {(one.effect, one.target) for one in told}
     rest = tuple(one for one in left.findings if (one.effect, one.target) not in known)
+    raw = tuple(one for one in told if one.cause.raw)
     return replace(
         left,
         verdict="named, complete" if left.verdict in ("nothing wrong", "named, complete") else "named, incomplete",
-        findings=(*map(failed_check, failed), *rest),
+        findings=(*raw, *rest, *(one for one in told if one not in raw)),
         notes=(note, *left.notes),
         why={reason: about for reason, about in left.why.items() if reason not in DOUBTS},
         probability=1.0,

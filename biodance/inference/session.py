@@ -17,10 +17,10 @@ from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
 from biodance.inference.left import adequacy
-from biodance.inference.rows import observed_causes, rows_of
+from biodance.inference.rows import Rows, observed_causes, rows_of
 from biodance.inference.scales import fit, nominal, prior_sd, products
-from biodance.inference.sets import Hypothesis, Search, hypothesis, infer, with_unknown
-from biodance.records import Sip
+from biodance.inference.sets import Hypothesis, Posterior, Search, hypothesis, infer, with_unknown
+from biodance.records import Array, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
 
@@ -28,6 +28,12 @@ _SIGN = 0.005
 """Probability that a channel of a session has the wrong sign, before any data."""
 _SURE = 0.85
 """Probability from which it is told."""
+
+
+_STALE = 0.03
+"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
+this share.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +85,44 @@ def judge(
     else:
         causes = observed_causes(evidence, asked)
         rows = rows_of(None, causes, known, evidence)
-    search = Search.of(rows, causes)
-    found = decide(search, infer(search, _contacts if rows.problem is not None else lambda _search, _base: ()), bare)
+    search, posterior = _inferred(rows, causes, asked, evidence)
+    found = decide(search, posterior, bare)
     sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
     if sign:  # what all other causes do holds only once the sign is mended
         told = replace(found.diagnosis, findings=sign, verdict="named, incomplete")
         found = replace(found, diagnosis=told, named=())
     return found if rows.problem is not None else replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
+
+
+def _inferred(
+    rows: Rows, causes: tuple[Candidate, ...], asked: Mapping[str, Cause], evidence: ObservedEvidence
+) -> tuple[Search, Posterior]:
+    """Return the search and its posterior; causes are predicted again from the body of the most probable set where it
+    moves otherwise than the prior's (a tilted floor pulls at the centre of mass that is there).
+    """
+    search = Search.of(rows, causes)
+    if rows.problem is None:
+        return search, infer(search)
+    found = infer(search, _contacts)
+    if not found.best.causes or not _predicts_otherwise(rows.problem, found.best.phi):
+        return search, found
+    kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
+    posed = rows.problem.with_parameters(found.best.phi)
+    every = causes_of(posed, rows.tolerances, kinds)
+    again = rows_of(posed, every, rows.tolerances, evidence)
+    search = Search.of(again, tuple(one for one in every if one.names[0] in asked))
+    return search, infer(search, _contacts)
+
+
+def _predicts_otherwise(posed: Problem, phi: Array) -> bool:
+    """Return whether the parameters ``phi`` (10N,) predict wrenches that differ from those in use by more than
+    `_STALE`.
+    """
+    both = np.zeros(2)
+    for case in posed.cases:
+        wrench = np.stack([case.needed(phi - case.phi), case.predicted], axis=2)
+        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
+    return bool(both[0] > _STALE**2 * both[1])
 
 
 def _contacts(search: Search, base: Hypothesis) -> tuple[Hypothesis, ...]:

@@ -23,7 +23,6 @@ from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
-from biodance.pipeline.another_body import beside_another_body
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
@@ -31,6 +30,7 @@ from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_window
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.results import MendedCopy, SessionResult
 from biodance.pipeline.undone import with_faults_undone
+from biodance.pipeline.unmodelled_joints import unmodelled_joints
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
@@ -198,13 +198,12 @@ def _judged(
                 *own.notes,
             )
             unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
-            reasons: dict[Reason, tuple[str, ...]] = {reason: () for reason, holds in unsure.items() if holds}
+            joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
+            reasons = unmodelled_joints(result.body, joints)
+            reasons |= {reason: () for reason, holds in unsure.items() if holds}
             bare, looked_at = replace(bare, notes=notes, why=reasons), seen.problem.looked_at
             simulate = simulate and not reasons
     found = judge(seen, evidence, own.tolerances if own else known, asked, bare, simulate=simulate)
-    if result.body is not None:
-        joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
-        found = beside_another_body(found, result.body, joints)
     tell("measuring what the findings change")
     told = replace(_with_gains(result, found), looked_at=looked_at)
     return replace(told, diagnosis=with_failed(failed, told.diagnosis)) if failed else told
