@@ -16,10 +16,12 @@ from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
+from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.left import adequacy
 from biodance.inference.rows import observed_causes, rows_of
 from biodance.inference.scales import fit, nominal, prior_sd, products
-from biodance.inference.sets import Hypothesis, Search, hypothesis, infer, with_unknown
+from biodance.inference.sets import Search, hypothesis, infer
+from biodance.inference.unknown import with_unknown
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
@@ -32,8 +34,8 @@ _SURE = 0.85
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the simulation of a session shows: its ``problem``, all ``causes`` with their columns, and whether it is only
-    quiet ``standing``, in which no cause of the simulation has a size.
+    """What the simulation of a session shows: its ``problem``, all ``causes`` with their columns, and whether it is
+    only quiet ``standing``, in which no cause of the simulation has a size.
     """
 
     problem: Problem
@@ -147,7 +149,10 @@ def _turned(
     if probability < _SURE or counting.contacts() < 2:
         return ()
     alike = tuple(Alias(*other, float(value)) for value, other in sorted(found, reverse=True) if best - value <= 3.0)
-    advice = f"With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then. {asked[name[0]].advice}"
+    advice = (
+        "With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then. "
+        f"{asked[name[0]].advice}"
+    )
     return (Finding(*name, (), alike, 1.0, advice=advice, probability=probability, kind=asked[name[0]]),)
 
 
