@@ -187,8 +187,8 @@ class Diagnosis:
         Why it says no more (only standing, an unusual body), each with what it concerns.
     witnesses : ObservedEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
-    probability : float
-        Of what the verdict says; NaN where nothing could be judged.
+    p_clean, p_unknown : float
+        Probability of no cause at all, and of one that nobody described; NaN where nothing could be judged.
 
     Examples
     --------
@@ -210,7 +210,8 @@ class Diagnosis:
     judged: tuple[Judged, ...] = ()
     why: Mapping[Reason, tuple[str, ...]] = field(default_factory=dict)
     witnesses: "ObservedEvidence | None" = None
-    probability: float = float("nan")
+    p_clean: float = float("nan")
+    p_unknown: float = float("nan")
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"
@@ -232,6 +233,19 @@ class Diagnosis:
     def status(self) -> DiagnosisStatus:
         """What it ends with."""
         return status_of(self.why, named=bool(self.faults), clean=self.verdict == "nothing wrong")
+
+    @property
+    def probability(self) -> float:
+        """Of what it ends with (`status`): of its most probable fault, of none, or of an unknown one, which is certain
+        where a limit is broken; NaN where nothing can be told.
+        """
+        if self.status is DiagnosisStatus.NAMED:
+            return max(one.probability for one in self.faults)
+        if self.status is DiagnosisStatus.CLEAN:
+            return self.p_clean
+        if self.status is DiagnosisStatus.CANNOT_TELL:
+            return float("nan")
+        return 1.0 if Reason.LIMIT_BROKEN in self.why else self.p_unknown
 
     @property
     def faults(self) -> tuple[Finding, ...]:

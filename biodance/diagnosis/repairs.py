@@ -129,7 +129,6 @@ def with_failed(failed: tuple[QualityCheck, ...], left: Diagnosis) -> Diagnosis:
         findings=(*map(failed_check, failed), *rest),
         notes=(note, *left.notes),
         why={reason: about for reason, about in left.why.items() if reason not in DOUBTS},
-        probability=1.0,
     )
 
 

@@ -162,11 +162,8 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
         tolerated=tuple(small),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
-        probability=posterior.unknown
-        if verdict == "unexplained"
-        else clean
-        if not named
-        else max(p.probability for p, _ in named),
+        p_clean=clean,
+        p_unknown=posterior.unknown,
     )
     return Inferred(told, search, posterior, tuple(p.cause for p, _ in named))
 

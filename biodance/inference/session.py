@@ -126,7 +126,8 @@ def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosi
     if not (bare.log_unknown > bare.log_posterior and any(row.matters and row.z > 0 for row in left)):
         return replace(one, adequacy=left)
     verdict: Verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
-    return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()})
+    unknown = float(1 / (1 + np.exp(bare.log_posterior - bare.log_unknown)))
+    return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()}, p_unknown=unknown)
 
 
 def _turned(
