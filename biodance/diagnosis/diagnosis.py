@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from biodance import display
-from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.consequence import Adequacy, Unobservable
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, DiagnosisStatus, Reason, status_of
 from biodance.effects import known_cause
@@ -137,22 +137,6 @@ class Finding:
         return self.set[0].log_bayes_factor
 
 
-@dataclass(frozen=True)
-class Unobservable:
-    """The smallest size ``limit`` (``unit``) of a cause that this session would see; infinite: it leaves no trace here.
-
-    ``told_from`` the size from which it is also told from every other cause, infinite if one looks the same;
-    ``typical`` size.
-    """
-
-    effect: str
-    target: str
-    limit: float
-    unit: str
-    told_from: float = float("nan")
-    typical: float = float("nan")
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What the simulation of a session gets wrong.
@@ -236,16 +220,13 @@ class Diagnosis:
 
     @property
     def probability(self) -> float:
-        """Of what it ends with (`status`): of its most probable fault, of none, or of an unknown one, which is certain
-        where a limit is broken; NaN where nothing can be told.
-        """
-        if self.status is DiagnosisStatus.NAMED:
-            return max(one.probability for one in self.faults)
-        if self.status is DiagnosisStatus.CLEAN:
-            return self.p_clean
-        if self.status is DiagnosisStatus.CANNOT_TELL:
-            return float("nan")
-        return 1.0 if Reason.LIMIT_BROKEN in self.why else self.p_unknown
+        """Of what it ends with (`status`), certain where a limit is broken; NaN where nothing can be told."""
+        ends = {
+            DiagnosisStatus.NAMED: max((one.probability for one in self.faults), default=float("nan")),
+            DiagnosisStatus.CLEAN: self.p_clean,
+            DiagnosisStatus.UNKNOWN: 1.0 if Reason.LIMIT_BROKEN in self.why else self.p_unknown,
+        }
+        return ends.get(self.status, float("nan"))
 
     @property
     def faults(self) -> tuple[Finding, ...]:

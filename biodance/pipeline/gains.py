@@ -2,7 +2,7 @@
 on its own what is lost on data that were not used when all findings but this one are accepted.
 
 Those data are the trials that were kept; where none was, each half of the movement, judged with the body that the
-other half gives. What makes them worse is no repair, whoever named it (`combined_with_witnesses`).
+other half gives. What makes them worse is no repair.
 """
 
 from collections.abc import Callable, Iterable, Mapping

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.consequence import LIMIT, Adequacy
-from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Finding, Unobservable
+from biodance.diagnosis.consequence import LIMIT, Adequacy, Unobservable
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY
