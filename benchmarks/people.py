@@ -23,7 +23,7 @@ from benchmarks.third_lab import make_session
 from biodance.body.body import Body
 from biodance.body.human.skeleton import SEGMENTS
 from biodance.identification.knowledge import SIGMAS, segment_quantities
-from biodance.identification.posterior import Posterior
+from biodance.identification.posterior import BodyPosterior
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.pipeline.results import SessionResult
@@ -214,7 +214,7 @@ def covered(row: Row) -> tuple[float, float]:
     return float(held[:, 0].mean()), float(held[:, 1:].mean())
 
 
-def expected_better(posterior: Posterior) -> Array:
+def expected_better(posterior: BodyPosterior) -> Array:
     """Return the probabilities (3,) that the ``posterior`` is nearer to the truth than its prior in mass, in CoM and in
     both: root mean squares over all segments, linearised about the prior.
 

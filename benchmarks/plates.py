@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.people import first_seed
 from benchmarks.walks import copied
-from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
+from biodance.diagnosis.archive.judge import ArchiveJudgement, judge_archive
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, placed
 from biodance.pipeline.plates import judge_plates
@@ -150,7 +150,7 @@ def row(step: Step, seeds: Iterable[int]) -> str:
     for seed in seeds:
         every = draw(seed, visits=AT + max(AFTER), step=step)
         for after in AFTER:
-            found = judge([one for one in every if int(one.visit.name[1:]) < AT + after])
+            found = judge_archive([one for one in every if int(one.visit.name[1:]) < AT + after])
             right[after].append(named(found, step))
             wrong.append(others(found, step) > 0)
         inside += covered(found, step)
@@ -163,7 +163,7 @@ def clean(seeds: Iterable[int], say: Callable[[str], None]) -> None:
     """Print how often an archive without fault raises an alarm."""
     alarms, strangers = [], []
     for seed in seeds:
-        found = judge(draw(seed))
+        found = judge_archive(draw(seed))
         alarms.append(bool(found.findings))
         strangers.append(len(found.strangers))
         if found.findings:

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from biodance.diagnosis.witness_inference import infer_causes
 from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.witness_evidence import ObservedEvidence, collect_evidence
-from biodance.diagnosis.witness_inference import infer_causes
 from biodance.effects import check_quality
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw

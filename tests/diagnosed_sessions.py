@@ -75,10 +75,10 @@ def windows(seed: int, *, trials: int = 4, hidden=nothing, unlike: float = 0.7) 
     """Return trials of a person whose parameters differ from the table by ``unlike`` of its own standard deviations;
     ``hidden`` changes the wrench.
     """
-    from biodance.uncertainty.caution import widened
+    from biodance.uncertainty.caution import widened_prior
 
     rng = np.random.default_rng(1000 + seed)
-    prior = widened(body().sip)
+    prior = widened_prior(body().sip)
     phi = prior.phi + unlike * symmetric_root(prior.covariance) @ rng.normal(size=prior.phi.size)
     found = []
     for k in range(trials):

@@ -223,7 +223,7 @@ def test_the_checks_see_what_is_wrong(tiny: dict[str, ast.Module]) -> None:
 
 NAMED_ELSEWHERE = {
     "biodance.lab.plates.faults": "the six faults whose formulas corrections and tolerances need below `effects`",
-    "biodance.lab.plates.read": "the reader's two defects, by the names of the causes that tell them (`Defect.effect`)",
+    "biodance.lab.plates.left_out": "the reader's two defects, named as the causes that tell them (`Defect.effect`)",
     "biodance.body.human.prior": "joint_centre, a row of the table of error sizes",
     "biodance.body.human.static_centres": "joint_centre, a row of the table of error sizes",
     "biodance.body.tables.choice": "trunk_joint, the body's optional joint",

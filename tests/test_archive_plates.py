@@ -12,9 +12,9 @@ import pytest
 from benchmarks.plates import Step, draw
 from biodance.cli import run
 from biodance.diagnosis.archive.conditions import pool
-from biodance.diagnosis.archive.judge import judge
+from biodance.diagnosis.archive.judge import judge_archive
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
-from biodance.diagnosis.archive.walking import StepRow, places
+from biodance.diagnosis.archive.walking import StepRow, plate_places
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session.archive import archive_folders, iso_date, read_index, read_plate_text, visit_date
 from biodance.pipeline.plates import judge_plates
@@ -37,7 +37,7 @@ def changes(found):
     [(Step("plate2", "place_y", 0.005, 8), 13), (Step("plate1", "offset_z", 5.0, 8), 10)],
 )
 def test_a_step_is_found_soon_with_its_date_and_size(step, visits):
-    found = changes(judge(draw(5, visits=visits, step=step)))
+    found = changes(judge_archive(draw(5, visits=visits, step=step)))
     change = found[step.plate, step.quantity]
     assert change.earliest.name <= "V08" <= change.latest.name
     assert change.interval[0] < step.size < change.interval[1]
@@ -46,16 +46,16 @@ def test_a_step_is_found_soon_with_its_date_and_size(step, visits):
 
 def test_a_step_of_all_plates_is_that_of_the_laboratory():
     moved = altered(draw(2), lambda one: 0.02 * (one.quantity == "place_x" and one.visit.name >= "V08"))
-    assert ("all plates", "place_x") in changes(judge(moved))
+    assert ("all plates", "place_x") in changes(judge_archive(moved))
 
 
 def test_an_archive_without_fault_raises_no_alarm():
-    assert sum(bool(judge(draw(seed)).findings) for seed in range(20, 24)) == 0
+    assert sum(bool(judge_archive(draw(seed)).findings) for seed in range(20, 24)) == 0
 
 
 def test_one_strange_visit_is_no_change_of_the_plate():
     odd = altered(draw(4), lambda one: 12.0 * (one.quantity == "offset_z" and one.visit.name == "V09"))
-    found = judge(odd)
+    found = judge_archive(odd)
     assert not changes(found)
     assert {one.visit for one in found.strangers if one.quantity == "offset_z"} == {"V09"}
 
@@ -73,7 +73,7 @@ def test_steps_of_both_feet_tell_the_plate_from_the_foot():
     """Feet that press 4 mm outwards on a plate 6 mm to the left: right steps read 2 mm to the right of it."""
     part = {"person feet": 0.004}
     rows = [StepRow("plate1", np.array([0.0, y]), 0.004 + 0.006 * y, 0.003, part) for y in (1.0, -1.0) * 20]
-    place, sd = places(rows)["plate1"]
+    place, sd = plate_places(rows)["plate1"]
     assert place[1] == pytest.approx(0.006, abs=2e-4)
     assert sd[1] < 0.001
     assert sd[0] > 0.1
@@ -131,7 +131,7 @@ def test_a_pad_that_was_not_zeroed_is_named_in_everybody(balance, tmp_path, caps
 
 
 def test_plates_are_drawn_in_two_columns_without_what_never_differs():
-    histories = judge(draw(20)).histories
+    histories = judge_archive(draw(20)).histories
     zero = next(one for one in histories if one.series.quantity == "offset_z")
     zero = replace(zero, series=replace(zero.series, value=0.0 * zero.series.value))
     others = [one for one in histories if one.series.quantity in ("place_x", "place_y", "delay")]

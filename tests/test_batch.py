@@ -24,7 +24,7 @@ from biodance.batch.engines import TRIES, _submitted
 from biodance.batch.outcome import Outcome, SessionStatus, SessionTask, fingerprint_of
 from biodance.batch.run import LEDGER, Ledger, run_batch
 from biodance.batch.summary import outliers, summary_table
-from biodance.batch.work import ROW_TYPES, process_session, rows_of
+from biodance.batch.work import ROW_TYPES, process_session, trial_rows
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.pipeline.trial import attempt
@@ -226,7 +226,7 @@ def test_what_moved_stands_beside_each_trial() -> None:
     trial |= {"marker_rms_m": None, "marker_max_m": None, "wrench": None, "warnings": []}
     document = {"mass_check": None, "diagnosis": None, "attention": [], "subject": {"mass_kg": 60.0}, "refused": {}}
     document |= {"trials": [{**trial, "name": "walk"}, {**trial, "name": "static"}], "movement": {"trials": [moved]}}
-    walk, static = rows_of(document)
+    walk, static = trial_rows(document)
     assert [walk[name] for name in ("gait_cycles", "squats", "rises", "foot_events")] == [2, 0, 1, 5]
     assert (walk["speed_m_per_s"], walk["knee_flexion_max_deg"], walk["hip_flexion_max_deg"]) == (1.2, 64.0, None)
     assert "gait_cycles" not in static
@@ -249,7 +249,7 @@ def test_plates_alone_have_no_verdict(seconds: float, status: str, findings: lis
     judged = [{"trial": "stand", "seconds": seconds, "why_not": None if seconds else "it has no markers"}]
     diagnosis = {"verdict": "unexplained", "status": status, "findings": findings, "judged": judged}
     document = {"mass_check": None, "diagnosis": diagnosis, "attention": [], "subject": {"mass_kg": 60.0}}
-    (row,) = rows_of(document | {"refused": {}, "trials": [trial], "movement": None})
+    (row,) = trial_rows(document | {"refused": {}, "trials": [trial], "movement": None})
     assert row["verdict"] == told
 
 

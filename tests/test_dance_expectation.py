@@ -13,7 +13,7 @@ from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Subject
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
@@ -36,7 +36,7 @@ def motion() -> Motion:
 
 def test_before_the_dance_stands_the_table_and_more_dance_is_never_worse(motion: Motion) -> None:
     found = expected_spread(BODY, motion, np.array([2.0, 4.0, 6.0]))
-    prior = widened(BODY.sip)
+    prior = widened_prior(BODY.sip)
     np.testing.assert_allclose(found.mass[0], np.sqrt(np.diag(prior.covariance)[::10]), rtol=1e-9)
     assert found.share[0].max() < 1e-12
     for values in (found.mass, found.com, found.inertia):
@@ -52,7 +52,7 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
     noise = typical_noise(wrench)
     fit = Fit("all", motion, wrench, motion.time < 6.0 - 1e-9)
     data = statistics(BODY, fit, noise).information(noise)
-    posterior = find_posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened(BODY.sip))
+    posterior = find_posterior(temper(data, mismatch(BODY, (fit,), noise), typical_sizes()), widened_prior(BODY.sip))
     found = expected_spread(BODY, motion, np.array([6.0]))
     for i in range(12):
         cut = slice(10 * i, 10 * i + 10)
@@ -60,4 +60,4 @@ def test_the_end_is_what_identification_would_say_of_data_that_agree_with_the_ta
         variance = np.diag(slope @ posterior.covariance[cut, cut] @ slope.T)
         assert found.mass[1, i] == pytest.approx(np.sqrt(variance[0]), rel=1e-6)
         assert found.com[1, i] == pytest.approx(np.sqrt(variance[1:4].mean()), rel=1e-6)
-    np.testing.assert_allclose(posterior.mean, widened(BODY.sip).phi, atol=1e-6)
+    np.testing.assert_allclose(posterior.mean, widened_prior(BODY.sip).phi, atol=1e-6)

@@ -16,7 +16,7 @@ from biodance.dance.scoring import PerformanceScore, score_performance
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import regressor
 from biodance.records import Motion
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 
 JOINTS = (
     "left_shoulder_flexion",
@@ -79,7 +79,7 @@ def test_what_was_not_danced_is_missing_and_proposed(dance: Dance) -> None:
 def test_repeating_what_is_proposed_gains_more_than_others(dance: Dance) -> None:
     motion = danced(dance, "left_shoulder_flexion", "right_elbow_flexion")
     chosen = scored(dance, motion).repeat
-    prior = widened(BODY.sip).covariance
+    prior = widened_prior(BODY.sip).covariance
     scale = np.sqrt(np.where(np.diag(prior) > 0, np.diag(prior), 1.0))
     noise = np.array([2.0, 2.0, 4.0, 1.0, 1.0, 0.5])
 

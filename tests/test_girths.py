@@ -19,7 +19,7 @@ from biodance.lab.session.file import read_session_file
 from biodance.lab.shape import legal_girths, usual_girths
 from biodance.records import Sip, Subject
 from biodance.settings import Settings
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 
 FEW = ("thigh", "shank", "upper_arm", "forearm", "waist", "hip", "chest")
 MAN = Subject(78.1, 1.777, "M", 30.0)
@@ -140,7 +140,7 @@ def compared(seeds: range) -> tuple[np.ndarray, np.ndarray]:
         person = generate_person(seed)
         truth = np.array([person.masses[segment] for segment in SEGMENTS])
         try:
-            found = [widened(sip) for sip in priors(person, np.random.default_rng(seed))]
+            found = [widened_prior(sip) for sip in priors(person, np.random.default_rng(seed))]
         except SessionRefused:
             continue
         errors.append([sip.mass - truth for sip in found])

@@ -18,13 +18,13 @@ from biodance.identification.statistics import Fit, Statistics, layout_for, stat
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 from biodance.uncertainty.noise import Noise
 
 BODY = human(Subject(70.0, 1.75, "M"))
 ABOUT = np.zeros(3)
 FAST = np.array(BANDS.edges[:-1]) >= 1.0
-TABLE = widened(BODY.sip)
+TABLE = widened_prior(BODY.sip)
 NOISE = Noise(np.tile(np.diag([9.0] * 3 + [4.0] * 3), (len(BANDS), 1, 1)), ABOUT, BANDS)
 
 

@@ -14,7 +14,7 @@ from biodance.errors import NotSolved
 from biodance.identification import physical
 from biodance.identification.information import Information, fold, information
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
-from biodance.identification.posterior import Posterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise
@@ -94,7 +94,9 @@ def test_segments_that_all_lie_at_their_edge() -> None:
         factor = np.diag(0.1 * np.abs(phi) + 1e-3)
         fits = []
         for mean in (phi, phi * (1 + MOVED * rng.normal(size=phi.size)), phi * (1 - MOVED)):
-            fits.append(physical_fit(Posterior(Sip(body.segments, phi, factor**2), mean, factor, 0.0, 0.0, 1), body))
+            fits.append(
+                physical_fit(BodyPosterior(Sip(body.segments, phi, factor**2), mean, factor, 0.0, 0.0, 1), body)
+            )
         for other in fits[1:]:
             assert_same(fits[0], other)
         assert fits[0].distance < 1e-3
@@ -110,7 +112,7 @@ def test_a_plate_whose_thickness_is_fixed_has_no_room_for_a_gap(seed: int) -> No
     mean = phi - 9.0 * factor[:, ::4].sum(axis=1)
     needed = smallest_eigenvalues(mean) < -1e-3
     assert needed.any(), "the case must need the constraint"
-    fit = physical_fit(Posterior(Sip(body.segments, phi, factor @ factor.T), mean, factor, 0.0, 0.0, 1), body)
+    fit = physical_fit(BodyPosterior(Sip(body.segments, phi, factor @ factor.T), mean, factor, 0.0, 0.0, 1), body)
     assert fit.status == "solved", fit.cause
     assert smallest_eigenvalues(fit.sip.phi).min() > -1e-7
     assert fit.moved[needed].all()
@@ -172,7 +174,7 @@ def test_a_centre_of_mass_outside_its_box_stops_at_the_wall() -> None:
     factor = 0.1 * np.eye(10)[:, 1:4]
     believed = round_one + 2.0 * np.array([0, 0.2, -0.3, 0.01, 0, 0, 0, 0, 0, 0])
     boxes = np.array([[[-0.03, -0.05, -0.02], [0.08, 0.07, 0.09]]])
-    posterior = Posterior(Sip(body.segments, round_one, factor @ factor.T), believed, factor, 0.0, 0.0, 1)
+    posterior = BodyPosterior(Sip(body.segments, round_one, factor @ factor.T), believed, factor, 0.0, 0.0, 1)
     fit = physical_fit(posterior, replace(body, com_boxes=boxes))
     np.testing.assert_allclose(fit.sip.phi[1:4] / 2.0, [0.08, -0.05, 0.01], atol=1e-5)
     assert fit.moved.tolist() == [True]
@@ -188,7 +190,7 @@ def test_a_body_that_is_outside_by_more_than_rounding_is_moved_inside(beyond: fl
 
     def fit_of(com: float) -> PhysicalFit:
         prior = Sip(body.segments, round_one, factor @ factor.T)
-        posterior = Posterior(prior, round_one + 2.0 * com * np.eye(10)[1], factor, 0.0, 0.0, 1)
+        posterior = BodyPosterior(prior, round_one + 2.0 * com * np.eye(10)[1], factor, 0.0, 0.0, 1)
         return physical_fit(posterior, replace(body, com_boxes=np.array([[[-0.05] * 3, [0.05] * 3]])))
 
     assert fit_of(0.05 + beyond).moved.all()

@@ -16,7 +16,7 @@ from biodance.identification.knowledge import known_together
 from biodance.identification.placement import matter_follows_joint, more_probable_table, with_matter_placed, with_sides
 from biodance.motion.ik.joint_unknowns import JointUnknowns, own_centre
 from biodance.records import Sip
-from biodance.uncertainty.caution import from_true_centres, misplaced, widened
+from biodance.uncertainty.caution import from_true_centres, misplaced, widened_prior
 
 TRUNK = 7
 
@@ -62,13 +62,13 @@ def test_matter_along_with_the_joint_keeps_its_mass_and_its_place_over_the_joint
 def test_the_more_probable_place_is_kept(along: bool, seed: int) -> None:
     body = low_joint()
     true = body.at_joint if along else body.sip
-    found, _, words = more_probable_table(moments(body, true, seed), widened(body.sip), body)
+    found, _, words = more_probable_table(moments(body, true, seed), widened_prior(body.sip), body)
     assert matter_follows_joint(found, body) == along
     assert ("along with the joint" in words[0]) == along
 
 
 def test_the_height_of_pelvis_and_trunk_is_known_to_the_way_between_cut_and_joint() -> None:
-    body, table = low_joint(), widened(low_joint().sip, low_joint().joint_errors)
+    body, table = low_joint(), widened_prior(low_joint().sip, low_joint().joint_errors)
     found, apart, _ = more_probable_table(moments(body, body.sip), table, body)
     assert not apart  # data that show no side leave the table as it is
     way = float(np.linalg.norm((body.at_joint.com - body.sip.com)[TRUNK]))
@@ -83,7 +83,7 @@ def test_the_height_of_pelvis_and_trunk_is_known_to_the_way_between_cut_and_join
 
 def test_a_prior_of_another_mass_is_placed_at_that_mass_and_back_again() -> None:
     body = low_joint()
-    placed, _, _ = more_probable_table(moments(body, body.sip), widened(body.sip), body)
+    placed, _, _ = more_probable_table(moments(body, body.sip), widened_prior(body.sip), body)
     heavy = Sip(body.segments, 1.1 * placed.phi, 1.21 * np.asarray(placed.covariance))
     there = with_matter_placed(heavy, body, along=True)
     np.testing.assert_allclose(there.com, body.at_joint.com, atol=1e-12)
@@ -106,7 +106,7 @@ def legs_of(body: Body, heavier: float) -> Information:
 
 def test_sides_are_alike_until_the_data_show_them_apart() -> None:
     body = replace(low_joint(), at_joint=None)
-    table = widened(body.sip)
+    table = widened_prior(body.sip)
     for heavier, apart in ((0.05, False), (2.0, True)):
         found, sides, words = more_probable_table(legs_of(body, heavier), table, body)
         assert sides == apart == bool(words)
@@ -122,7 +122,7 @@ def test_sides_are_alike_until_the_data_show_them_apart() -> None:
 def test_what_is_known_about_true_centres() -> None:
     placed = tuple(JointError(joint, 0.001, 0.0) for joint in ("trunk", "right_hip", "left_knee", "left_elbow"))
     body = replace(low_joint(), joint_errors=placed)
-    table = widened(body.sip, body.joint_errors)
+    table = widened_prior(body.sip, body.joint_errors)
     off = misplaced(table, body.joint_errors)
     nothing = from_true_centres(table, table, body.joint_errors).covariance
     np.testing.assert_allclose(nothing, table.covariance - off, atol=1e-7)  # what the table is off

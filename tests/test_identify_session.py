@@ -17,7 +17,7 @@ from biodance.identification.statistics import layout_for, standing_point, stati
 from biodance.identification.validation import residual_ratio, validate
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Sip, Wrench
-from biodance.uncertainty.caution import about_true_centres, widened
+from biodance.uncertainty.caution import about_true_centres, widened_prior
 
 
 def session(seed: int, *, frames: int = 1500):
@@ -106,7 +106,7 @@ def test_quantities_and_their_slope() -> None:
 
 def test_caution_widens_without_moving_or_breaking_the_scale() -> None:
     body, _, _ = person(4, spread=0.05)
-    for change in (widened, about_true_centres):
+    for change in (widened_prior, about_true_centres):
         wide = change(body.sip)
         np.testing.assert_array_equal(wide.phi, body.sip.phi)
         extra = wide.covariance - body.sip.covariance
@@ -117,7 +117,7 @@ def test_caution_widens_without_moving_or_breaking_the_scale() -> None:
     total = np.tile(np.eye(10)[0], 4)
     g = pinned @ total
     pinned -= np.outer(g, g) / (total @ g + 0.01**2)
-    wide = widened(Sip(body.segments, body.sip.phi, pinned))
+    wide = widened_prior(Sip(body.segments, body.sip.phi, pinned))
     assert np.sqrt(total @ wide.covariance @ total) < 0.25
     assert np.all(np.diag(wide.covariance)[::10] > np.diag(pinned)[::10])
 
@@ -207,7 +207,7 @@ def test_gain_has_the_known_ratio_in_its_interval() -> None:
 def test_learned_noise_is_used_when_given() -> None:
     body, _, fits = session(9, frames=600)
     total = statistics(body, fits[0], layout_for(standing_point(fits)))
-    noise, _ = learn_noise(total, with_unknown_load(body, widened(body.sip)))
+    noise, _ = learn_noise(total, with_unknown_load(body, widened_prior(body.sip)))
     np.testing.assert_allclose(
         conclude(body, total, ("t",), noise=noise).sip.phi, conclude(body, total, ("t",)).sip.phi
     )

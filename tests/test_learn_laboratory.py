@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biodance.cli import run
-from biodance.diagnosis.archive.norms import Seen, norms, usual_noise
+from biodance.diagnosis.archive.norms import SeenValue, norms, usual_noise
 from biodance.diagnosis.learning import Null, learn_tolerances, shown_by
 from biodance.errors import SessionRefused
 from biodance.lab.session.read import read_session
@@ -39,7 +39,7 @@ def null(seed: int) -> Null:
 @pytest.fixture(scope="module")
 def laboratory(tmp_path_factory) -> LearnedLaboratory:
     quiet = InstrumentNoise(5e-5, (0.01,) * 6, 0.008)
-    cameras = [Seen("camera_noise", f"S{i}", 5e-5 + 1e-6 * i, "m") for i in range(20)]
+    cameras = [SeenValue("camera_noise", f"S{i}", 5e-5 + 1e-6 * i, "m") for i in range(20)]
     sessions = [LearnedSession(one.session, null(i), quiet, (one,)) for i, one in enumerate(cameras)]
     return learned_together(tmp_path_factory.mktemp("lab") / "archive", sessions, {"S99": "a check failed"})
 
@@ -122,8 +122,10 @@ def test_recordings_beside_the_sessions_are_no_session_and_a_missing_folder_is_t
 
 
 def test_norms_are_medians_of_sessions_pooled():
-    rows = [Seen("sway", session, value, "m") for session, value in (("a", 1.0), ("a", 3.0), ("a", 2.0), ("b", 4.0))]
-    (found,) = norms([*rows, Seen("alone", "a", 1.0, "m")])
+    rows = [
+        SeenValue("sway", session, value, "m") for session, value in (("a", 1.0), ("a", 3.0), ("a", 2.0), ("b", 4.0))
+    ]
+    (found,) = norms([*rows, SeenValue("alone", "a", 1.0, "m")])
     assert (found.name, found.sessions, found.observations) == ("sway", 2, 4)
     assert found.value == pytest.approx(3.0)
     assert usual_noise([InstrumentNoise(0.0, (0.0,) * 6), InstrumentNoise(2e-4, (0.5,) * 6)]).camera == 2e-4

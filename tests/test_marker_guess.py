@@ -11,7 +11,7 @@ from standing_markers import OWN, stand
 
 from biodance.lab.markers.guess import dress, guess_set
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.markers.upright import axis_to_head
+from biodance.lab.markers.up_axis import axis_to_head
 from biodance.lab.read import read_trial
 from biodance.records import Markers, Source, Trial
 

@@ -22,7 +22,7 @@ from biodance.batch.work import rows_of
 from biodance.cli import run
 from biodance.cli.app import NOT_DONE
 from biodance.dance.problem.plan import read_plan
-from biodance.diagnosis.archive.judge import judge
+from biodance.diagnosis.archive.judge import judge_archive
 from biodance.lab.session.read import read_session
 from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.for_subject import account_for
@@ -98,7 +98,8 @@ def _of_archives(folder: Path) -> dict[str, Path]:
     (folder / "group").mkdir()
     write_summary(folder / "group", "archive", [*sessions, lost])
     evidence = draw(5, visits=13, step=Step("plate2", "place_y", 0.005, 8))
-    moved = PlatesJudged(folder, judge(evidence), evidence, {"V99": "is no recording."}, ("A date was guessed.",))
+    judged, refused = judge_archive(evidence), {"V99": "is no recording."}
+    moved = PlatesJudged(folder, judged, evidence, refused, ("A date was guessed.",))
     (folder / "plates.html").write_text(plates_page(moved, plates_document(moved)), encoding="utf-8")
     return {"group": folder / "group" / "report.html", "plates": folder / "plates.html"}
 

@@ -197,3 +197,35 @@ def test_a_trial_with_a_failed_check_is_not_ok() -> None:
         one = replace(trial, checks=(check,))
         assert one.status == "warning"
         assert check.what[1:] in one.reason
+
+
+SURE = replace(FOUND, probability=0.9712)
+NAMED = replace(
+    WHOLE, verdict="named, complete", findings=(SURE, replace(FOUND, effect="time_delay", probability=0.88))
+)
+ALONE = {Reason.FORCES_LEFT: ()}
+
+
+@pytest.mark.parametrize(
+    ("verdict", "probability", "said"),
+    [
+        (replace(WHOLE, p_clean=0.93, p_unknown=0.02), 0.93, "Nothing is wrong in what was judged: P = 0.93."),
+        (replace(WHOLE, p_clean=0.9999), 0.9999, "Nothing is wrong in what was judged: P &gt; 0.99."),
+        (NAMED, 0.9712, "there: P = 0.97."),
+        (replace(WHOLE, verdict="unexplained", why=ALONE, p_unknown=0.61), 0.61, "is not named: P = 0.61."),
+        (replace(WHOLE, verdict="unexplained", why={Reason.LIMIT_BROKEN: ()}, p_unknown=0.1), 1.0, "P &gt; 0.99."),
+        (replace(WHOLE, verdict="unexplained", why={Reason.ONLY_STANDING: ()}, p_unknown=0.7), None, ""),
+    ],
+    ids=("clean", "surely clean", "named", "unknown", "limit broken", "cannot tell"),
+)
+def test_page_and_json_give_the_probability_of_the_verdict_and_of_every_finding(
+    verdict: Diagnosis, probability: float | None, said: str
+) -> None:
+    found = SessionDiagnosis(verdict)
+    numbers = json.loads(to_text(diagnosis_document(found)))
+    assert numbers["probability"] == probability
+    assert [one["probability"] for one in numbers["findings"]] == [one.probability for one in verdict.findings]
+    facts = diagnosis_page(FULL, found, MADE).split("<details><summary>What was judged")[1]
+    assert said in facts
+    assert ("P = 0.97; more than" in facts) == bool(verdict.findings)
+    assert ("P = " in facts or "P &gt; " in facts) == (probability is not None)

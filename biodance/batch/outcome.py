@@ -15,7 +15,7 @@ from biodance.version import __version__
 
 OUTCOME = "outcome.json"
 """Written last into a session's folder: where it is, the session is done."""
-Rows = tuple[dict[str, Any], ...]
+TrialRows = tuple[dict[str, Any], ...]
 """One row of plain values for each trial."""
 
 
@@ -95,7 +95,7 @@ class Outcome:
     fingerprint: str
     status: SessionStatus
     reason: str = ""
-    rows: Rows = ()
+    rows: TrialRows = ()
     seconds: float = 0.0
     memory_mb: float = 0.0
     why: Why = Why.SESSION
@@ -117,7 +117,7 @@ def untold(task: SessionTask, status: SessionStatus, reason: str, why: Why) -> O
     return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why, limit=task.limit)
 
 
-def only_row(status: SessionStatus, reason: str) -> Rows:
+def only_row(status: SessionStatus, reason: str) -> TrialRows:
     """Return the one row of a session of which nothing but the reason can be told."""
     return ({"trial": "", "status": str(status), "reason": reason},)
 

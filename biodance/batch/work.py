@@ -18,9 +18,9 @@ from typing import Any
 from biodance.batch.outcome import (
     OUTCOME,
     Outcome,
-    Rows,
     SessionStatus,
     SessionTask,
+    TrialRows,
     Why,
     only_row,
     outcome_of,
@@ -103,7 +103,7 @@ def _hangs_on(error: BaseException) -> Why:
     return _hangs_on(cause) if cause else Why.SESSION
 
 
-def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, Rows]:
+def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, TrialRows]:
     """Return status, reason and rows of a session that goes through."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed
@@ -125,7 +125,7 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     read = {trial.source.path: trial.source.sha256 for trial in session.trials}
     write_manifest(folder, session.folder, inputs_of(read, session.folder), growing=_LOG)
     tell(f"{status}: {first}")
-    return status, first, rows_of(document)
+    return status, first, trial_rows(document)
 
 
 @contextmanager
@@ -168,7 +168,7 @@ _KINDS = {"gait": "gait_cycles", "squat": "squats", "sit_to_stand": "rises"}
 _OF_TRIAL = ("role", "status", "reason", "frames", "rate_hz", "gaps_percent", "marker_rms_m", "marker_max_m")
 
 
-def rows_of(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
+def trial_rows(document: dict[str, Any]) -> tuple[dict[str, Any], ...]:
     """Return one row for each trial of a session (results.json): what it is, how well it was followed, what its plates
     say, what moved; trials that were refused have a row, too.
     """

@@ -22,7 +22,7 @@ from biodance.dance.dance import Dance
 from biodance.identification.information import Information
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
-from biodance.identification.posterior import Posterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
 from biodance.motion.regressor import predict_wrench, regressor
@@ -30,7 +30,7 @@ from biodance.records import Array, Motion, Wrench
 from biodance.spatial import wrench_shift
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import BANDS, Bands
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 from biodance.uncertainty.noise import Noise
 
 _RATE = 12.5
@@ -107,7 +107,7 @@ def _danced() -> dict[str, Any]:
     return read_toml(locate("anthropometry/uncertainty", "dances"))
 
 
-def shares(posterior: Posterior) -> Array:
+def shares(posterior: BodyPosterior) -> Array:
     """Return the share (N,) of the table's variance that the data removed, mean over the parameters of a segment."""
     known = np.diag(posterior.prior.covariance).reshape(-1, 10) > 0
     removed = np.where(known, posterior.information.reshape(-1, 10), 0.0)
@@ -119,9 +119,9 @@ def gram_of(information: Information) -> Array:
     return information.triangle.T @ information.triangle
 
 
-def posterior_after(body: Body, H: Array, found: Mismatch) -> Posterior:
+def posterior_after(body: Body, H: Array, found: Mismatch) -> BodyPosterior:
     """Return the posterior after data of the information ``H`` (p, p) that agree with the table."""
-    prior = widened(body.sip)
+    prior = widened_prior(body.sip)
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     value, vector = np.linalg.eigh(H / np.outer(scale, scale))
     rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
@@ -132,7 +132,7 @@ def posterior_after(body: Body, H: Array, found: Mismatch) -> Posterior:
     return find_posterior(temper(data, found, typical_sizes()) if H.any() else data, prior)
 
 
-def parameter_deviations(posterior: Posterior) -> Array:
+def parameter_deviations(posterior: BodyPosterior) -> Array:
     """Return the standard deviations (N, 3) of mass kg, CoM m per axis and moments of inertia kg·m² of each segment."""
     out = []
     for first in range(0, posterior.prior.phi.size, 10):
@@ -195,7 +195,7 @@ def movement_information(dance: Dance) -> MovementInformation:
     plan = dance.motion(_RATE)
     noise = typical_noise(predict_wrench(dance.body, plan))
     weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
-    value, vector = np.linalg.eigh(widened(dance.body.sip).covariance)
+    value, vector = np.linalg.eigh(widened_prior(dance.body.sip).covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))
     return MovementInformation(
         _RATE, root, weights, noise.bands.edges, _FELT * _RATE * weights[0, _AT_REST], noise.about

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.diagnosis.gain import Gain
-from biodance.effects import Case, Transient
+from biodance.effects import Case, NamedCause, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
 from biodance.identification.validation import BLOCK_SECONDS
-from biodance.inference.causes import NamedCause
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
 from biodance.spatial import wrench_about_point

@@ -65,3 +65,19 @@ class Adequacy:
         if self.band_hz[0] == 0:
             return self.size >= PlateOffset.parameters[0].least_at(self.channel)
         return self.size >= (LEAST_MOMENT if self.channel.startswith("M") else LEAST_FORCE)
+
+
+@dataclass(frozen=True)
+class Unobservable:
+    """The smallest size ``limit`` (``unit``) of a cause that this session would see; infinite: it leaves no trace here.
+
+    ``told_from`` the size from which it is also told from every other cause, infinite if one looks the same;
+    ``typical`` size.
+    """
+
+    effect: str
+    target: str
+    limit: float
+    unit: str
+    told_from: float = float("nan")
+    typical: float = float("nan")

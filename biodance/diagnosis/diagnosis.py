@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from biodance import display
-from biodance.diagnosis.consequence import Adequacy
+from biodance.diagnosis.consequence import Adequacy, Unobservable
 from biodance.diagnosis.gain import Gain
 from biodance.diagnosis.reasons import DOUBTS, DiagnosisStatus, Reason, status_of
 from biodance.effects import known_cause
@@ -137,22 +137,6 @@ class Finding:
         return self.set[0].log_bayes_factor
 
 
-@dataclass(frozen=True)
-class Unobservable:
-    """The smallest size ``limit`` (``unit``) of a cause that this session would see; infinite: it leaves no trace here.
-
-    ``told_from`` the size from which it is also told from every other cause, infinite if one looks the same;
-    ``typical`` size.
-    """
-
-    effect: str
-    target: str
-    limit: float
-    unit: str
-    told_from: float = float("nan")
-    typical: float = float("nan")
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What the simulation of a session gets wrong.
@@ -187,8 +171,8 @@ class Diagnosis:
         Why it says no more (only standing, an unusual body), each with what it concerns.
     witnesses : ObservedEvidence or None
         What needs no model of the body: feet on plates, clocks, weights; None where there was nothing to see.
-    probability : float
-        Of what the verdict says; NaN where nothing could be judged.
+    p_clean, p_unknown : float
+        Probability of no cause at all, and of one that nobody described; NaN where nothing could be judged.
 
     Examples
     --------
@@ -210,7 +194,8 @@ class Diagnosis:
     judged: tuple[Judged, ...] = ()
     why: Mapping[Reason, tuple[str, ...]] = field(default_factory=dict)
     witnesses: "ObservedEvidence | None" = None
-    probability: float = float("nan")
+    p_clean: float = float("nan")
+    p_unknown: float = float("nan")
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.told})"
@@ -232,6 +217,16 @@ class Diagnosis:
     def status(self) -> DiagnosisStatus:
         """What it ends with."""
         return status_of(self.why, named=bool(self.faults), clean=self.verdict == "nothing wrong")
+
+    @property
+    def probability(self) -> float:
+        """Of what it ends with (`status`), certain where a limit is broken; NaN where nothing can be told."""
+        ends = {
+            DiagnosisStatus.NAMED: max((one.probability for one in self.faults), default=float("nan")),
+            DiagnosisStatus.CLEAN: self.p_clean,
+            DiagnosisStatus.UNKNOWN: 1.0 if Reason.LIMIT_BROKEN in self.why else self.p_unknown,
+        }
+        return ends.get(self.status, float("nan"))
 
     @property
     def faults(self) -> tuple[Finding, ...]:

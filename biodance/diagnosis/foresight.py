@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
-from biodance.diagnosis.diagnosis import Unobservable
+from biodance.diagnosis.consequence import Unobservable
 from biodance.diagnosis.model import build_model
 from biodance.diagnosis.observability import Visibility, detection_limits, hidden, visibility
 from biodance.diagnosis.problem import TrialWindow, problem

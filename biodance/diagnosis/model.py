@@ -1,17 +1,14 @@
-"""The problem under its tolerances: whitened rows, columns of all that is no fault, and the causes that were named
-so far.
-"""
+"""The problem under its tolerances, with no cause: whitened rows, and columns of all that is no fault."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.human.skeleton import kind_of
 from biodance.diagnosis.by_trial import ByTrial
-from biodance.diagnosis.candidates import SCALE, Candidate, candidates, removed, slopes
+from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.evidence import LinearPosterior, linear_posterior
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
@@ -19,103 +16,28 @@ from biodance.effects import Effect, effects
 from biodance.motion.kinematics import chains
 from biodance.records import Array
 from biodance.uncertainty.joints import joint_of
-from biodance.uncertainty.session_noise import with_own_noise
 from biodance.uncertainty.tolerances import HABIT, Tolerances, in_state, key_of, mean_key, whitened
-
-_HEAVIER = 0.3
-"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
-UNLIKE = 0.07
-"""Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at
-are no better at the upper edge of the bands."""
-_NOTICED = 0.1
-"""Share by which the noise of any channel and band must grow before it is taken for larger.
-"""
-_STALE = 0.03
-"""Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
-this share.
-"""
-
-
-@dataclass(frozen=True, eq=False)
-class NamedCause:
-    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the force while it
-    acts, and per trial the
-    ``course`` of its parameters, as in `Transient.local`.
-    """
-
-    effect: Effect
-    theta: Array
-    covariance: Array
-    course: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """``problem`` with the parameters in use, under ``tolerances``; ``posterior`` about all that is no fault, the
-    ``named`` causes and what is ``expected`` (r,) of a session without fault taken off; ``tolerated`` by effect and
-    target: where the columns of its tolerance lie in the posterior, and (p, k) what one of each is in its parameters.
-
-    ``log_likelihood`` of the target under it, up to a constant of the session.
+    """``problem`` under its ``tolerances``, with no cause: ``posterior`` about all that is no fault, and what is
+    ``expected`` (r,) of a session without fault, which is taken off its target.
     """
 
     problem: Problem
     tolerances: Tolerances
     posterior: LinearPosterior
     expected: Array
-    named: tuple[NamedCause, ...] = ()
-    tolerated: Mapping[tuple[str, str], tuple[slice, Array]] = field(default_factory=dict)
-
-    def whole(self, one: NamedCause) -> Array:
-        """Return the size (p,) of a named cause with what its own tolerance has taken of it: both look alike, and the
-        sum is what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
-        """
-        where, unit = self.tolerated.get(
-            (one.effect.name, one.effect.target), (slice(0), np.zeros((one.theta.size, 0)))
-        )
-        return one.theta + unit @ self.posterior.mean[where]
-
-    @property
-    def log_likelihood(self) -> float:
-        """-1/2 y' C^-1 y with C the covariance of the rows under everything that is no fault."""
-        return -0.5 * float(self.posterior.y @ self.posterior.residual)
 
     @property
     def phi(self) -> Array:
         """(10N,) posterior mean of the parameters."""
         return self.problem.prior.phi + self.problem.factor @ self.posterior.mean[: self.problem.factor.shape[1]]
 
-    @cached_property
-    def named_columns(self) -> Array:
-        """(r, k) whitened columns of the named causes, per prior standard deviation of a fault."""
-        parts = [
-            slopes(self.problem, one.effect, one.theta, of=one.effect.removed) * SCALE * one.effect.typical
-            for one in self.named
-        ]
-        return self.white(np.concatenate(parts, axis=1)) if parts else np.empty((self.posterior.y.size, 0))
-
-    @cached_property
-    def named_score(self) -> tuple[Array, Array]:
-        """Score (k,) and information (k, k) of the named causes at their current sizes."""
-        return self.posterior.score(self.named_columns)
-
     def white(self, rows: Array, *, out: Array | None = None) -> Array:
         """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
         return white(self.problem, self.tolerances, rows, out=out)
-
-    def length(self, Z: Array, rows: slice = slice(None)) -> float:
-        """Return the sum of squares of whitened columns ``Z`` (r, k), which are these ``rows`` of the session, had no
-        plate a zero: noise is always there, but a zero is an error, which hides what looks like it.
-        """
-        slow = np.flatnonzero(np.repeat(self.problem.spectrum.band, 6)[rows] == 0)
-        known, means = self.tolerances, Z[slow].reshape(-1, 6, Z.shape[1])
-        alone, both = np.linalg.cholesky(known.noise[0] - known.zeros[0]), np.linalg.cholesky(known.noise[0])
-        return float(np.sum(Z**2) - np.sum(means**2) + np.sum((np.linalg.solve(alone, both) @ means) ** 2))
-
-    def in_newtons(self, white: Array) -> Array:
-        """Return (m, 6) N, N·m: the plates' rows of whitened rows ``white`` (r,), as they were before."""
-        band = self.problem.spectrum.band
-        coloured = np.linalg.inv(self.tolerances.whiteners(_body_mass(self.problem)))
-        return np.asarray(np.einsum("mij,mj->mi", coloured[band], white[: 6 * band.size].reshape(-1, 6)))
 
     def white_by_trial(self, columns: ByTrial) -> ByTrial:
         """Return the whitened ``columns`` of the plates' rows, of which every trial has its own."""
@@ -125,26 +47,6 @@ class Model:
             for p in columns.parts
         )
         return replace(columns, parts=tuple(parts))
-
-    def under(self, tolerances: Tolerances) -> "Model":
-        """Return the model with the noise of the plates as in ``tolerances``, all else as it is."""
-        if tolerances is self.tolerances:
-            return self
-        band, mass = self.problem.spectrum.band, _body_mass(self.problem)
-        turn = tolerances.whiteners(mass) @ np.linalg.inv(self.tolerances.whiteners(mass))
-        both = np.concatenate([self.posterior.X, self.posterior.y[:, None]], axis=1)
-        wrench = both[: 6 * band.size].reshape(band.size, 6, -1)
-        for b, matrix in enumerate(turn.astype(both.dtype)):
-            wrench[band == b] = matrix @ wrench[band == b]
-        return replace(self, tolerances=tolerances, posterior=linear_posterior(both[:, :-1], both[:, -1]))
-
-    def without_causes(self, named: tuple[NamedCause, ...]) -> "Model":
-        """Return the model with the contributions of the causes ``named`` removed from the target."""
-        y = self.problem.target - self.expected
-        for one in named:
-            y = y - removed(self.problem, one.effect, one.theta)
-        X, factor = self.posterior.X, self.posterior.factor
-        return replace(self, posterior=LinearPosterior.for_target(X, factor, self.white(y[:, None])[:, 0]), named=named)
 
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:
@@ -224,7 +126,7 @@ def shown_left_out(expected: Array, marker_keys: tuple[str, ...]) -> Array:
 
 
 def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerances) -> Model:
-    """Return the model without any named cause; those of ``causes`` with a learned size are tolerances as well."""
+    """Return the model without any cause; those of ``causes`` with a learned size are tolerances as well."""
     known = nuisances(problem, tuple(one for one in causes if tolerances.size(key_of(*one.names)) > 0))
     both = np.concatenate([problem.sip, *known.parts, problem.target[:, None]], axis=1)  # the largest array, made once
     columns = both[:, problem.sip.shape[1] : -1]
@@ -234,49 +136,7 @@ def model(problem: Problem, causes: tuple[Candidate, ...], tolerances: Tolerance
     columns *= sizes
     both[:, -1] -= expected
     both = white(problem, tolerances, both, out=both)
-    first = problem.sip.shape[1]
-    own = {n: (slice(first + c.start, first + c.stop), u * sizes[c]) for n, (c, u) in known.causes.items()}
-    return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected, tolerated=own)
-
-
-def unlike(effect: Effect) -> float:
-    """Return the share of its size by which the wrench of a cause may be unlike its model: no cause is quite like it,
-    and some say that they are less so (`Effect.unlike`).
-    """
-    return max(UNLIKE, effect.unlike)
-
-
-def with_unlike_causes(found: Model, known: Tolerances) -> Model:
-    """Return the model with the noise of the ``known`` tolerances and, beside it, what the named causes leave because
-    no cause is quite like its model: the share `unlike` of what each adds to the wrench, per band. Causes that come and
-    go have a course of their own, which fits what is there.
-    """
-    band = found.problem.spectrum.band
-    added = np.zeros_like(known.noise)
-    for one in (one for one in found.named if not one.course):
-        whole = removed(found.problem, one.effect, one.effect.told_size(one.theta))
-        rows = unlike(one.effect) * whole[: 6 * band.size].reshape(-1, 6)
-        for b in range(1, len(added)):
-            added[b] += rows[band == b].T @ rows[band == b] / max(1, np.sum(band == b))
-    wider = with_own_noise(known, added, _body_mass(found.problem))
-    noise = np.diagonal(found.tolerances.noise, axis1=1, axis2=2)
-    grown = np.diagonal(wider.noise, axis1=1, axis2=2) / noise
-    return found.under(wider) if np.abs(grown - 1).max() > _NOTICED else found
-
-
-def is_much_heavier(found: Model) -> bool:
-    """Return whether any segment is so much heavier than its prior that its kinematic errors grow noticeably."""
-    before = found.problem.prior.mass
-    return bool(np.any(found.phi[::10] - before > _HEAVIER * before))
-
-
-def needs_rebuilding(found: Model) -> bool:
-    """Return whether the posterior mean predicts wrenches that differ from those in use by more than `_STALE`."""
-    both = np.zeros(2)
-    for case in found.problem.cases:
-        wrench = np.stack([case.needed(found.phi - case.phi), case.predicted], axis=2)
-        both += np.sum((wrench - wrench.mean(axis=0)) ** 2, axis=(0, 1))
-    return bool(both[0] > _STALE**2 * both[1])
+    return Model(problem, tolerances, linear_posterior(both[:, :-1], both[:, -1]), expected)
 
 
 def causes_of(problem: Problem, tolerances: Tolerances, chosen: Chosen[Effect]) -> tuple[Candidate, ...]:
@@ -293,6 +153,6 @@ def build_model(
     chosen: Chosen[Effect],
     every: tuple[Candidate, ...] | None = None,
 ) -> tuple[Model, tuple[Candidate, ...]]:
-    """Return the model without named causes, and the causes to search for; all others keep their tolerances."""
+    """Return the model without any cause, and the causes to search for; all others keep their tolerances."""
     family, every = effects(chosen), every or causes_of(problem, tolerances, chosen)
     return model(problem, every, tolerances), tuple(one for one in every if one.names[0] in family)

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import SCALE, TOGETHER, Candidate, bases_of, changes
-from biodance.diagnosis.consequence import least
-from biodance.diagnosis.diagnosis import Unobservable
+from biodance.diagnosis.consequence import Unobservable, least
 from biodance.diagnosis.evidence import smallest_detectable
 from biodance.diagnosis.model import Model
 from biodance.effects import unit_at

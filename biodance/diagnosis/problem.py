@@ -23,7 +23,7 @@ from biodance.identification.posterior import prior_factor
 from biodance.identification.statistics import Fit, usable
 from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, Sip, Trial, Wrench, runs
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 from biodance.uncertainty.sources import Errors, forward, of_clusters
 from biodance.uncertainty.tolerances import in_state
 
@@ -201,7 +201,7 @@ def problem(
     TrialRefused
         No trial has ``shortest`` s of believable, fully measured frames.
     """
-    before = prior or widened(body.sip)
+    before = prior or widened_prior(body.sip)
     used, about, notes = usable(body, tuple(window.fit for window in windows))
     kept = {fit.name: fit.use for fit in used}
     named = ((window, kept[window.trial.name]) for window in windows if window.trial.name in kept)

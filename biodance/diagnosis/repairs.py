@@ -131,7 +131,6 @@ def with_failed(failed: tuple[QualityCheck, ...], left: Diagnosis) -> Diagnosis:
         findings=(*raw, *rest, *(one for one in told if one not in raw)),
         notes=(note, *left.notes),
         why={reason: about for reason, about in left.why.items() if reason not in DOUBTS},
-        probability=1.0,
     )
 
 

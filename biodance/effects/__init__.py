@@ -15,6 +15,7 @@ from types import MappingProxyType
 from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.named_cause import NamedCause
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.transient import Transient
@@ -32,6 +33,7 @@ __all__ = [
     "Checked",
     "DiscreteEffect",
     "Effect",
+    "NamedCause",
     "Parameter",
     "QualityCheck",
     "Quantity",

@@ -12,7 +12,7 @@ from biodance.lab.filters import LowPass, low_pass
 from biodance.motion.regressor import predict_wrench, regressor
 from biodance.records import Array, Motion
 from biodance.spatial import skew
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 
 BAND = 3.0
 """Hz: above, soft tissue decides how large accelerations seem."""
@@ -156,7 +156,7 @@ def clock_beside_body(cases: list[Case]) -> tuple[float, float]:
     by Gauss-Newton steps.
     """
     body = cases[0].body
-    factor, phi, square = prior_factor(widened(body.sip)), body.sip.phi, 1.0
+    factor, phi, square = prior_factor(widened_prior(body.sip)), body.sip.phi, 1.0
     measured, heavy, driven = (np.concatenate(parts) for parts in zip(*map(_slow_parts, cases), strict=True))
     away = np.zeros(factor.shape[1])
     for _ in range(_STEPS):

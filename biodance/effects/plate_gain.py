@@ -30,8 +30,8 @@ public laboratories lie 0.5 to 4 mm off, two simulated persons 4 to 6 mm), and b
 _LASTS = 1.0
 """s that a trial tells: within a step or two the place wanders by 16 mm."""
 _NAMED, _TOLD = 4.0, 9.0
-"""Differences of squared deviations: two in natural logarithm of the evidence for a name, as everywhere
-(`witness_inference.THRESHOLD`); three standard deviations from which two causes are told apart."""
+"""Differences of squared deviations: two in natural logarithm of the evidence for a name; three standard deviations
+from which two causes are told apart."""
 _LEAST = 0.005
 """Gain that matters: makers' accuracy, 0.2 to 0.5 % of full scale."""
 _USUAL = 0.02

@@ -19,7 +19,7 @@ from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, evident_sizes, temper
 from biodance.identification.placement import more_probable_table
-from biodance.identification.posterior import Posterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import Statistics
 from biodance.records import Array, Sip
 from biodance.uncertainty.noise import Noise
@@ -88,7 +88,7 @@ _MOST = 0.6
 interval counts that: they are too short by a sixth at most."""
 
 
-def gains_move_masses(before: Posterior, after: Posterior) -> bool:
+def gains_move_masses(before: BodyPosterior, after: BodyPosterior) -> bool:
     """Whether giving back what noise takes moves a mass by more than `_MOST` of its standard deviations.
 
     A gain and the mass under which it is measured stand in for each other: where movement is slow and noise is most of
@@ -156,7 +156,7 @@ def undo_dilution(
     return now
 
 
-def _with_probable_load(posterior: Posterior, data: Information, body: Body) -> Posterior:
+def _with_probable_load(posterior: BodyPosterior, data: Information, body: Body) -> BodyPosterior:
     """Return the posterior with a load where the data make one more probable: arms that are too light for what they
     carry show more than is predicted, and no dilution.
     """

@@ -22,11 +22,11 @@ from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.placement import more_probable_table
-from biodance.identification.posterior import Posterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics_together, usable
 from biodance.records import Sip
 from biodance.threads import Sendable, one_thread
-from biodance.uncertainty.caution import from_true_centres, widened
+from biodance.uncertainty.caution import from_true_centres, widened_prior
 from biodance.uncertainty.noise import Noise
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Identification(Sendable):
     ----------
     body : Body
         As given, with the table as its inertial parameters.
-    posterior : Posterior
+    posterior : BodyPosterior
         The Gaussian posterior before the consistency constraint.
     data : Information
         What the trials alone say: whitened, disturbances discounted.
@@ -87,7 +87,7 @@ class Identification(Sendable):
     """
 
     body: Body
-    posterior: Posterior
+    posterior: BodyPosterior
     data: Information
     base: BaseEstimate
     noise: Noise
@@ -227,7 +227,7 @@ def conclude_trials(
     Where movement is so slow that what its fastest band shows cannot be told from noise in the kinematics (regression
     dilution that cannot be given back, `dilution.gains_move_masses`), that band is left out.
     """
-    room = with_unknown_load(body, prior or widened(body.sip, body.joint_errors))
+    room = with_unknown_load(body, prior or widened_prior(body.sip, body.joint_errors))
     softer = softness(body, fits, total.layout.bands)
 
     def concluded(some: Statistics) -> Identification:
@@ -258,7 +258,7 @@ def conclude(
     ``noise`` as learned (learned here if None); ``found`` what twins and plates disturb: without it the intervals count
     noise alone, far too short, and the notes say so.
     """
-    before = prior or widened(body.sip, body.joint_errors)
+    before = prior or widened_prior(body.sip, body.joint_errors)
     room = before if machine else with_unknown_load(body, before)
     got = discounted(total, noise or learn_noise(total, room)[0], found, room)
     if found is not None and not machine:

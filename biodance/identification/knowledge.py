@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance.body.inertia import TENSOR
 from biodance.display import Interval
-from biodance.identification.posterior import Posterior
+from biodance.identification.posterior import BodyPosterior
 from biodance.records import Array, Sip
 
 QUANTITIES = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -83,7 +83,7 @@ def segment_quantities(phi: Array) -> tuple[Array, Array]:
     return value, slope
 
 
-def knowledge(after: Sip, before: Sip, posterior: Posterior | None = None) -> tuple[Known, ...]:
+def knowledge(after: Sip, before: Sip, posterior: BodyPosterior | None = None) -> tuple[Known, ...]:
     """Return all quantities of all segments, in order.
 
     ``after`` and ``before`` with covariances about the true joint centres; what the data removed of the variance is

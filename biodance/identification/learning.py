@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from biodance.identification.posterior import Posterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import Statistics
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
@@ -22,7 +22,7 @@ _SETTLED = 1e-3
 
 
 @one_thread()
-def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, start: Array = START) -> tuple[Noise, Posterior]:
+def learn_noise(data: Statistics, prior: Sip, *, rounds: int = 12, start: Array = START) -> tuple[Noise, BodyPosterior]:
     """Return the noise of the session and the posterior under it, after at most ``rounds`` or once nothing changes
     beyond a thousandth; ``start`` (6, 6) N², N·m, N²·m² as for people by default.
     """

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from biodance.body.inertia import PSEUDO_INERTIA, pseudo_inertia, smallest_eigenvalues
 from biodance.errors import NotSolved
-from biodance.identification.posterior import Posterior
+from biodance.identification.posterior import BodyPosterior
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 
@@ -60,7 +60,7 @@ RELATIVE_FLOOR = 1e-3
 contradicts the tables).
 """
 
-TOLERANCE = 1e-7
+_TOLERANCE = 1e-7
 """How far outside its limits a segment may lie by rounding, in its own units (CoM in m): ten times the solver's
 tolerance.
 """
@@ -106,7 +106,7 @@ class FailedFit:
 
 
 @one_thread()
-def physical_fit(posterior: Posterior, body: "Body") -> PhysicalFit | FailedFit:
+def physical_fit(posterior: BodyPosterior, body: "Body") -> PhysicalFit | FailedFit:
     """Return the physically consistent parameters nearest to the posterior mean, CoM inside ``body.com_boxes``; look at
     ``status``.
 
@@ -116,7 +116,7 @@ def physical_fit(posterior: Posterior, body: "Body") -> PhysicalFit | FailedFit:
     prior, limits = posterior.prior, _limits(posterior.prior, body)
     bound = np.zeros(len(prior.segments), dtype=bool)
     phi, distance = posterior.mean, 0.0
-    while (outside := limits.room(phi) < -TOLERANCE).any():
+    while (outside := limits.room(phi) < -_TOLERANCE).any():
         bound = bound | outside
         x, word = _nearest(posterior, limits, np.flatnonzero(bound))
         if x is None:
@@ -165,7 +165,7 @@ def _limits(prior: Sip, body: "Body") -> _Limits:
     return _Limits(weight.reshape(-1, 16, 1) * PSEUDO_INERTIA, least[:, None, None] * np.eye(4) * weight, sides)
 
 
-def _nearest(posterior: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
+def _nearest(posterior: BodyPosterior, limits: _Limits, bound: NDArray[np.intp]) -> tuple[Array | None, str]:
     """Solve min |x|² s.t. the segments ``bound`` of mean + factor x are inside their limits; return x (k,) and the
     solver's word.
 
@@ -181,7 +181,7 @@ def _nearest(posterior: Posterior, limits: _Limits, bound: NDArray[np.intp]) -> 
         z, word = _solve(local * unit, mean, limits, bound)
         if z is not None:
             x = span @ z * unit
-            if limits.room(posterior.mean + posterior.factor @ x)[bound].min() >= -TOLERANCE:
+            if limits.room(posterior.mean + posterior.factor @ x)[bound].min() >= -_TOLERANCE:
                 return x, word
             word = "outside the limits"
         words.append(word)

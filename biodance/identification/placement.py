@@ -14,7 +14,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.posterior import find_posterior
 from biodance.records import Sip
-from biodance.uncertainty.caution import shift_slope, widened
+from biodance.uncertainty.caution import shift_slope, widened_prior
 
 _ALONG = 1
 """The axis along the spine in the frames of pelvis and trunk."""
@@ -56,7 +56,7 @@ def _at(body: Body, mass: float, *, along: bool) -> Sip:
         cut = slice(10 * i, 10 * i + 10)
         slope = way * shift_slope(table.phi[cut])[:, _ALONG]
         covariance[cut, cut] += np.outer(slope, slope)
-    other = widened(replace(table, covariance=covariance), body.joint_errors)
+    other = widened_prior(replace(table, covariance=covariance), body.joint_errors)
     ratio = mass / float(other.mass.sum())
     return replace(other, phi=ratio * other.phi, covariance=ratio**2 * np.asarray(other.covariance))
 

@@ -18,7 +18,7 @@ from biodance.records import Array, Sip
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class BodyPosterior:
     """Gaussian posterior about the 10N SIP after the data.
 
     ``mean`` (p,), ``factor`` (p, k) with ``covariance = factor @ factor.T``; ``prior`` as given; ``log_evidence`` of
@@ -72,7 +72,7 @@ def _factor_of(covariance: bytes) -> Array:
     return np.asarray(factor)
 
 
-def find_posterior(data: Information, prior: Sip) -> Posterior:
+def find_posterior(data: Information, prior: Sip) -> BodyPosterior:
     """Return the maximum a posteriori estimate and its covariance for whitened ``data`` and a table ``prior``."""
     S = prior_factor(prior)
     A = data.triangle @ S
@@ -87,4 +87,4 @@ def find_posterior(data: Information, prior: Sip) -> Posterior:
     log_evidence = -0.5 * penalised - float(np.sum(np.log(np.abs(np.diag(U)))))
     factor = S @ solve_triangular(U, np.eye(k))
     chi2 = float(np.sum((A @ u - b) ** 2)) + data.misfit
-    return Posterior(prior, prior.phi + S @ u, factor, log_evidence, chi2, data.frames)
+    return BodyPosterior(prior, prior.phi + S @ u, factor, log_evidence, chi2, data.frames)

@@ -13,7 +13,7 @@ from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, UNITS, segment_quantities
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.physical import physical_fit
-from biodance.identification.posterior import Posterior, find_posterior
+from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.unloaded_body import scaled_to_mass, table_like
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
@@ -92,7 +92,7 @@ def differences(earlier: Identification, later: Identification) -> tuple[Differe
     return tuple(rows)
 
 
-def _prior_influence(posterior: Posterior) -> Array:
+def _prior_influence(posterior: BodyPosterior) -> Array:
     """Return A (p, p) = C P^-1 of a posterior with covariance C: what of a step of the prior's mean is still in its
     mean.
 
@@ -104,7 +104,7 @@ def _prior_influence(posterior: Posterior) -> Array:
     return posterior.covariance @ (unit[:, None] * inverse * unit)
 
 
-def _possible(posterior: Posterior, one: Identification) -> Array:
+def _possible(posterior: BodyPosterior, one: Identification) -> Array:
     """Return the parameters (10N,) of the possible body nearest to ``posterior`` of session ``one``."""
     fit = physical_fit(posterior, one.body)
     if fit.status == "failed":
@@ -112,7 +112,7 @@ def _possible(posterior: Posterior, one: Identification) -> Array:
     return fit.sip.phi
 
 
-def _with_room(table: Sip, one: Identification, other: Identification) -> Posterior:
+def _with_room(table: Sip, one: Identification, other: Identification) -> BodyPosterior:
     """Return the posterior of session ``one`` after its ``table`` with room for the loads that it carries beyond
     ``other``.
     """

@@ -1,26 +1,10 @@
-"""A cause with its size: what hypotheses hold, and what accepting it undoes."""
+"""How causes are told apart, and how far each may be unlike its model."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-
-from biodance.effects import Effect
-from biodance.records import Array
+from biodance.effects import Effect, NamedCause
 
 UNLIKE = 0.07
 """Share of its size by which every cause is unlike its model at least: derivatives at the samples that are looked at
 are no better at the upper edge of the bands."""
-
-
-@dataclass(frozen=True, eq=False)
-class NamedCause:
-    """A cause of size ``theta`` (p,) with ``covariance`` (p, p); for a cause that comes and goes the force while it
-    acts, and per trial the ``course`` of its parameters, as in `Transient.local`.
-    """
-
-    effect: Effect
-    theta: Array
-    covariance: Array
-    course: Mapping[str, Array] = field(default_factory=dict)
 
 
 def cause_key(one: NamedCause) -> tuple[str, str]:

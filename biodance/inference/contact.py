@@ -12,11 +12,12 @@ import numpy as np
 from scipy.linalg import solve
 
 from biodance.diagnosis.candidates import local_basis
-from biodance.effects import Transient
-from biodance.inference.causes import NamedCause, cause_key
+from biodance.effects import NamedCause, Transient
+from biodance.inference.causes import cause_key
+from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
 from biodance.inference.scales import fit, posterior, prior_sd, widened
-from biodance.inference.sets import Hypothesis, Search
+from biodance.inference.sets import Search
 from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)

@@ -1,8 +1,8 @@
 """What a session ends with: the posterior and what matters, decided once.
 
 A cause is named where it, or a look-alike in its place, is there with at least the probability `NAMED`, and what it
-does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place. Its size is averaged over
-all sets of causes that hold it.
+does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place. Its size is averaged
+over all sets of causes that hold it.
 """
 
 from collections.abc import Mapping
@@ -15,15 +15,17 @@ from biodance.diagnosis.candidates import changes
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
-from biodance.effects import unit_at
+from biodance.effects import NamedCause, unit_at
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.toe_landmark import ToeLandmark
-from biodance.inference.causes import NamedCause, cause_key
+from biodance.inference.causes import cause_key
+from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.inference.scales import prior_sd
-from biodance.inference.sets import UNKNOWN, Hypothesis, Posterior, Search, hypothesis
+from biodance.inference.sets import Search, hypothesis
+from biodance.inference.unknown import UNKNOWN
 from biodance.observations import LANDMARK, shift_per_sd
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
@@ -160,11 +162,8 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
         tolerated=tuple(small),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
-        probability=posterior.unknown
-        if verdict == "unexplained"
-        else clean
-        if not named
-        else max(p.probability for p, _ in named),
+        p_clean=clean,
+        p_unknown=posterior.unknown,
     )
     return Inferred(told, search, posterior, tuple(p.cause for p, _ in named))
 

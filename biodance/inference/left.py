@@ -7,8 +7,9 @@ from scipy.ndimage import uniform_filter1d
 
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.problem import Problem
+from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
-from biodance.inference.sets import OWN, Hypothesis, energies
+from biodance.inference.unknown import OWN, energies
 from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
 
@@ -17,8 +18,8 @@ _TIE = 1e-9
 
 
 def adequacy(one: Hypothesis, rows: Rows) -> tuple[Adequacy, ...]:
-    """Return how far what is left in every band of every channel is from what laboratories leave, in standard deviations
-    of the logarithm of its size, worst first; the worst, and the worst that matters, with its second.
+    """Return how far what is left in every band of every channel is from what laboratories leave, in standard
+    deviations of the logarithm of its size, worst first; the worst, and the worst that matters, with its second.
     """
     assert rows.problem is not None
     where, names = rows.problem.spectrum, [case.trial.name for case in rows.problem.cases]

@@ -18,6 +18,7 @@ from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Effect
+from biodance.effects.filter_mismatch import FilterMismatch
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
@@ -27,7 +28,7 @@ _Units = Mapping[tuple[str, str], tuple[slice, Array]]
 BODY, OBSERVED, TOLERATED = "body", "observed", "tolerances"
 """Groups of columns: the parameters of the body, errors that several observations share, and causes within their
 tolerance: a laboratory is careful in all of them, or in none."""
-SOFT = ("slide", "flesh", "sag", "tilt", "filter_mismatch")
+SOFT = ("slide", "flesh", "sag", "tilt", FilterMismatch.name)
 """Groups of soft tissue, and of the filter that noise of markers in the needed wrench looks like."""
 
 

@@ -55,9 +55,9 @@ class Scales:
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Inner products of columns and target, all that the posterior needs: ``plates`` and ``markers`` (K + 1, K + 1) with
-    the target last, ``observed`` (n, K + 1) the observations' rows, of which only the columns ``used`` are not zero;
-    ``count`` plates' rows; ``group`` (K,) of each column, -1 for a fixed scale.
+    """Inner products of columns and target, all that the posterior needs: ``plates`` and ``markers`` (K + 1, K + 1)
+    with the target last, ``observed`` (n, K + 1) the observations' rows, of which only the columns ``used`` are not
+    zero; ``count`` plates' rows; ``group`` (K,) of each column, -1 for a fixed scale.
     """
 
     plates: Array
@@ -80,7 +80,7 @@ class Curvature:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ScaledFit:
     """Posterior of the coefficients: ``lower`` Cholesky factor of A; ``u`` (K,) posterior mean per scaled column;
     ``size`` (K,) of the columns; ``scales``; ``log_evidence`` up to a constant of the session; ``square`` of the
     plates' rows that is left.
@@ -164,7 +164,7 @@ def prior_sd(rows: Rows) -> Array:
     return np.array([known.get(name, TOLERANCE) for name in rows.groups])
 
 
-def fit(found: Products, sd: Array, start: Scales, *, steps: int = _STEPS, least: float = -np.inf) -> Fit:
+def fit(found: Products, sd: Array, start: Scales, *, steps: int = _STEPS, least: float = -np.inf) -> ScaledFit:
     """Return the posterior at the most probable scales, whose logarithms have prior standard deviations ``sd`` (G,),
     searched for from ``start``; the noise is at least ``least`` and no less than where everything was learned.
     """
@@ -180,7 +180,7 @@ def fit(found: Products, sd: Array, start: Scales, *, steps: int = _STEPS, least
     return one
 
 
-def posterior(found: Products, sd: Array, at: Scales) -> Fit:
+def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     """Return the posterior under given scales, with its evidence."""
     K = found.group.size
     size = np.where(found.group < 0, 1.0, np.exp(at.groups[found.group]))
@@ -197,10 +197,10 @@ def posterior(found: Products, sd: Array, at: Scales) -> Fit:
     tails = -0.5 * (TAIL + 1) * float(np.log1p((found.observed @ w) ** 2 / TAIL).sum())
     value = tails - 0.5 * (square * loud + markers + u @ u) - np.log(np.diag(lower)).sum() - found.count * at.noise
     value -= 0.5 * (np.sum((at.groups / sd) ** 2) + (at.noise / LOUD) ** 2)
-    return Fit(lower, u, size, at, float(value), square, found)
+    return ScaledFit(lower, u, size, at, float(value), square, found)
 
 
-def _moved(one: Fit, sd: Array, known: Curvature) -> tuple[float, Scales]:
+def _moved(one: ScaledFit, sd: Array, known: Curvature) -> tuple[float, Scales]:
     """Return how far the scales move in one step of Fisher scoring, and where to."""
     at, found, free = one.scales, one.products, one.products.group >= 0
     own = np.bincount(found.group[free], minlength=sd.size)

@@ -16,10 +16,12 @@ from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
+from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.left import adequacy
 from biodance.inference.rows import Rows, observed_causes, rows_of
 from biodance.inference.scales import fit, nominal, prior_sd, products
-from biodance.inference.sets import Hypothesis, Posterior, Search, hypothesis, infer, with_unknown
+from biodance.inference.sets import Hypothesis, Posterior, Search, hypothesis, infer
+from biodance.inference.unknown import with_unknown
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances
@@ -38,8 +40,8 @@ this share.
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the simulation of a session shows: its ``problem``, all ``causes`` with their columns, and whether it is only
-    quiet ``standing``, in which no cause of the simulation has a size.
+    """What the simulation of a session shows: its ``problem``, all ``causes`` with their columns, and whether it is
+    only quiet ``standing``, in which no cause of the simulation has a size.
     """
 
     problem: Problem
@@ -161,7 +163,8 @@ def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosi
     if not (bare.log_unknown > bare.log_posterior and any(row.matters and row.z > 0 for row in left)):
         return replace(one, adequacy=left)
     verdict: Verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
-    return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()})
+    unknown = float(1 / (1 + np.exp(bare.log_posterior - bare.log_unknown)))
+    return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()}, p_unknown=unknown)
 
 
 def _turned(
@@ -184,7 +187,10 @@ def _turned(
     if probability < _SURE or counting.contacts() < 2:
         return ()
     alike = tuple(Alias(*other, float(value)) for value, other in sorted(found, reverse=True) if best - value <= 3.0)
-    advice = f"With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then. {asked[name[0]].advice}"
+    advice = (
+        "With this sign turned back, the pressure lies under the feet and a step brakes first and pushes then. "
+        f"{asked[name[0]].advice}"
+    )
     return (Finding(*name, (), alike, 1.0, advice=advice, probability=probability, kind=asked[name[0]]),)
 
 

@@ -14,118 +14,23 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
-from biodance.effects import Effect
-from biodance.inference.causes import NamedCause, cause_key, unlike
+from biodance.effects import Effect, NamedCause
+from biodance.inference.causes import cause_key, unlike
+from biodance.inference.hypotheses import Hypothesis, Posterior, Scored
 from biodance.inference.rows import Rows
-from biodance.inference.scales import LOUD, TAIL, Fit, Products, Scales, fit, nominal, prior_sd, products, widened
+from biodance.inference.scales import TAIL, Products, ScaledFit, Scales, fit, nominal, prior_sd, products, widened
+from biodance.inference.unknown import UNKNOWN, energies, with_unknown
 from biodance.records import CHANNELS, Array
 
-P_UNKNOWN, UNKNOWN = 0.1, 0.5
-"""Probability of an unknown cause in a session, before any data, and from which there is one; those of causes stand in their effects
-(`Effect.prior`).
-"""
 MOST, _REFINED, _BRANCHES = 3, 6, 2
-OWN, EXCESS = 0.4, 1.4
-"""Standard deviation of the logarithm of the noise of one band and channel beside that of the session: without fault,
-and with an unknown cause.
-"""
 _ROUNDS, _STEPS, _SETTLED = 4, 3, 0.02
 _AGAIN = 1
 _LEAST, _BEHIND = -3.0, 6.0
-"""Log posterior gain below which a cause is not fitted, and by how much a set may lie behind the best and be widened."""
+"""Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
 _FELT = 0.05
 """Share of the noise below which what a cause is unlike its model is none."""
-
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """A set of causes with their sizes: ``log_posterior`` up to a constant of the session, and of the unknown beside
-    it (``log_unknown``); ``Z`` (r, k) columns and ``y`` (r,) target beside all that is no fault; ``surety`` (r,) by
-    which rows are scaled because no cause is quite like its model.
-    """
-
-    causes: tuple[NamedCause, ...]
-    rows: Rows
-    fit: Fit
-    log_posterior: float
-    Z: Array
-    y: Array
-    surety: Array
-    log_unknown: float = -np.inf
-    where_unknown: tuple[int, int] = (0, 0)
-
-    @property
-    def names(self) -> frozenset[tuple[str, str]]:
-        """Effect and target of its causes."""
-        return frozenset(cause_key(one) for one in self.causes)
-
-    @property
-    def left(self) -> Array:
-        """(r,) whitened rows that the posterior mean leaves, in units of their noise."""
-        K, size = self.rows.X.shape[1], self.fit.coefficients
-        return np.asarray(self.surety * (self.y - self.rows.X @ size[:K] - self.Z @ size[K:]))
-
-    @property
-    def phi(self) -> Array:
-        """(10N,) posterior mean of the body's parameters; empty where only observations judge."""
-        found = self.rows.problem
-        return (
-            np.empty(0)
-            if found is None
-            else found.prior.phi + found.factor @ self.fit.coefficients[: found.factor.shape[1]]
-        )
-
-    def whole(self, one: NamedCause) -> Array:
-        """Return the size (p,) of a cause with what its own tolerance has taken of it: both look alike, and the sum is
-        what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
-        """
-        where, unit = self.rows.tolerated.get(cause_key(one), (slice(0), np.zeros((one.theta.size, 0))))
-        return np.asarray(one.theta + unit @ self.fit.coefficients[where])
-
-
-@dataclass(frozen=True, eq=False)
-class Scored:
-    """A cause added to a hypothesis by the score test: its log posterior gain, and the size to begin with."""
-
-    effect: Effect
-    gain: float
-    start: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone."""
-
-    hypotheses: tuple[Hypothesis, ...]
-    screened: tuple[Scored, ...]
-    known_unknown: float = 0.0
-
-    @property
-    def unknown(self) -> float:
-        """Probability of an unknown cause."""
-        return max(self.known_unknown, float(self.weights[:, 1].sum()))
-
-    @property
-    def weights(self) -> Array:
-        """(H, 2) probability of every hypothesis, without and with the unknown."""
-        both = np.array([[one.log_posterior, one.log_unknown] for one in self.hypotheses])
-        return np.asarray(np.exp(both - logsumexp(both)))
-
-    @property
-    def best(self) -> Hypothesis:
-        """The most probable hypothesis."""
-        return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
-
-    def probabilities(self) -> dict[tuple[str, str], float]:
-        """Return the probability of every cause."""
-        out: dict[tuple[str, str], float] = {}
-        for one, weight in zip(self.hypotheses, self.weights.sum(axis=1), strict=True):
-            for name in one.names:
-                out[name] = out.get(name, 0.0) + float(weight)
-        return dict(sorted(out.items(), key=lambda pair: -pair[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +86,7 @@ class Search:
         return base.surety**2 * np.concatenate([loud, np.ones(r - n), found.scales.weights])
 
     @cached_property
-    def start(self) -> Fit:
+    def start(self) -> ScaledFit:
         """The posterior without any cause."""
         return fit(self.inner, prior_sd(self.rows), nominal(self.rows), least=self.least)
 
@@ -266,14 +171,20 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
         surety = _surety(rows, causes, taken)
-        Z = np.concatenate([rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes], axis=1)
+        Z = np.concatenate(
+            [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes], axis=1
+        )
         y = rows.y - np.sum(taken, axis=0) + Z @ u0
         inner, X = search.inner, rows.X
         if (surety < 1).any():
             X = surety[:, None] * rows.X
             inner = products(rows, X, y, rows.group)
         found = fit(
-            widened(inner, rows, X, surety[:, None] * Z, surety * y), prior_sd(rows), at, steps=_STEPS, least=search.least
+            widened(inner, rows, X, surety[:, None] * Z, surety * y),
+            prior_sd(rows),
+            at,
+            steps=_STEPS,
+            least=search.least,
         )
         settled = found.scales.far(at) < _SETTLED
         at = found.scales
@@ -339,8 +250,8 @@ def screen(search: Search, one: Hypothesis) -> list[Scored]:
 
 def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[float, Array]]:
     """Return what a cause gains near each of the sizes at which it is screened because it is far from proportion to its
-    size, and that size (1,): its prior there, and the volume that the data leave of it (Laplace, the slope taken as that
-    of the way from none).
+    size, and that size (1,): its prior there, and the volume that the data leave of it (Laplace, the slope taken as
+    that of the way from none).
     """
     out = []
     for share in effect.screened_at:
@@ -361,43 +272,3 @@ def _told_by_outliers(left: Array, z: Array) -> tuple[float, float]:
         weight = (TAIL + 1) / (TAIL + (left - z * size) ** 2)
     gained = np.log1p(left**2 / TAIL) - np.log1p((left - z * size) ** 2 / TAIL)
     return float(0.5 * (TAIL + 1) * gained.sum() - 0.5 * size**2 - 0.5 * np.log1p((weight * z) @ z)), size
-
-
-def energies(one: Hypothesis) -> tuple[Array, Array]:
-    """Return the mean square (Q,) of what is left of the plates' rows in each band and channel in units of the session's
-    noise, and the number (Q,) of rows.
-    """
-    n = one.rows.plates
-    left = one.left[:n]
-    count = np.bincount(one.rows.block[:n]).astype(float)
-    loud = np.exp(2 * one.fit.scales.noise)
-    return np.bincount(one.rows.block[:n], weights=left**2) / np.maximum(count, 1) / loud, count
-
-
-def with_unknown(one: Hypothesis) -> Hypothesis:
-    """Return a hypothesis with the log posterior of an unknown cause beside it: the noise of one band and channel, of
-    the whole session, or the size of a group of what is no fault is larger than anywhere, its logarithm
-    ~ N(0, `EXCESS`^2) in place of its usual spread.
-    """
-    square, count = energies(one)
-    if not count.any():
-        return one
-    blocks = 0.5 * np.log(np.maximum(square[count > 0], 1e-12))
-    kinds = (
-        (blocks, np.sqrt(OWN**2 + 0.5 / count[count > 0])),
-        (np.array([one.fit.scales.noise]), np.array([LOUD])),
-        (one.fit.scales.groups, prior_sd(one.rows)),
-    )
-    each = [float(logsumexp(_excess(away, usual))) - np.log(len(away)) for away, usual in kinds]
-    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / len(kinds))
-    at = np.flatnonzero(count)[int(np.argmax(_excess(*kinds[0])))]
-    told = one.log_posterior + float(logsumexp(each)) + price
-    return replace(one, log_unknown=told, where_unknown=divmod(int(at), len(CHANNELS)))
-
-
-def _excess(away: Array, usual: Array) -> Array:
-    """Return the log Bayes factors of scales whose logarithms are ``away`` from usual for being larger than anywhere:
-    N(0, `EXCESS`^2) against N(0, ``usual``^2).
-    """
-    wide = np.hypot(EXCESS, usual)
-    return np.asarray(0.5 * np.maximum(away, 0.0) ** 2 * (usual**-2 - wide**-2) - np.log(wide / usual))

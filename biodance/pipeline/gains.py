@@ -2,7 +2,7 @@
 on its own what is lost on data that were not used when all findings but this one are accepted.
 
 Those data are the trials that were kept; where none was, each half of the movement, judged with the body that the
-other half gives. What makes them worse is no repair, whoever named it (`combined_with_witnesses`).
+other half gives. What makes them worse is no repair.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -15,11 +15,10 @@ from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.gain import Gain
-from biodance.effects import Case
+from biodance.effects import Case, NamedCause
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
-from biodance.inference.causes import NamedCause
 from biodance.inference.decision import Inferred
 from biodance.lab.corrections import PlateCorrection
 from biodance.lab.plates.faults import PLATE_FAULTS

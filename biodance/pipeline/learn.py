@@ -8,7 +8,7 @@ from biodance import display
 from biodance.cycles.curves import CurveGroup, NormalCurve, normal_curves
 from biodance.diagnosis.archive.norms import (
     Norm,
-    Seen,
+    SeenValue,
     noise_of_instruments,
     norms,
     seen_by_witnesses,
@@ -47,7 +47,7 @@ class LearnedSession:
     name: str
     null: Null
     instruments: InstrumentNoise
-    seen: tuple[Seen, ...]
+    seen: tuple[SeenValue, ...]
     person: str = ""
     curves: tuple[CurveGroup, ...] = ()
 
@@ -172,7 +172,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     name = session.folder.resolve().name
     mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
     own = noise_of_instruments(session.trials, soft_tissue(windows), skin_of(result.body, windows))
-    seen = [Seen("camera_noise", name, own.camera, "m"), Seen("plate_noise_fz", name, own.plate[2], "N/rtHz")]
+    seen = [SeenValue("camera_noise", name, own.camera, "m"), SeenValue("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)
     curves = tuple(group for one in session_movement(result) for group in one.groups)
@@ -180,18 +180,18 @@ def learned_session(result: SessionResult) -> LearnedSession:
     return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)), person, curves)
 
 
-def _standing(result: SessionResult, name: str) -> list[Seen]:
+def _standing(result: SessionResult, name: str) -> list[SeenValue]:
     """Return how the person of a session stands."""
     one = result.standing
     assert one is not None
-    found = [Seen("standing sway", name, sway(one.cop), "m")]
+    found = [SeenValue("standing sway", name, sway(one.cop), "m")]
     if one.com.size:
         found += [
-            Seen("standing centre of mass ahead of pressure", name, one.com_ahead, "m"),
-            Seen("standing centre of mass left of pressure", name, one.com_left, "m"),
+            SeenValue("standing centre of mass ahead of pressure", name, one.com_ahead, "m"),
+            SeenValue("standing centre of mass left of pressure", name, one.com_left, "m"),
         ]
     if "mass" not in result.session.subject.guessed:
-        found.append(Seen("plates less declared mass", name, one.mass - result.session.subject.mass, "kg"))
+        found.append(SeenValue("plates less declared mass", name, one.mass - result.session.subject.mass, "kg"))
     return found
 
 

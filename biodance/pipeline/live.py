@@ -29,7 +29,7 @@ from biodance.motion.smoothing import smooth
 from biodance.motion.track import upright_trunk
 from biodance.pipeline.live_watch import StreamWatch
 from biodance.records import Array, Markers, Motion, Trial, Wrench
-from biodance.uncertainty.caution import widened
+from biodance.uncertainty.caution import widened_prior
 
 _WINDOW, _DELAY, _HOP = 1.0, 0.3, 0.1
 """s: what the filter sees, how long it waits for what follows, how often."""
@@ -110,7 +110,7 @@ class LiveSession:
         self._done = 0
         self._taken: list[Fit] = []
         self._pressure = np.zeros(4)
-        self.posterior: RecursivePosterior = initial_posterior(widened(body.sip))
+        self.posterior: RecursivePosterior = initial_posterior(widened_prior(body.sip))
         self._weight = -float(body.gravity[2] * body.sip.mass.sum())
         self._watch = StreamWatch(trial, self._follower, weight=self._weight)
         self._warm_up()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.diagnosis.archive.evidence import plainly_named, plate_evidence
-from biodance.diagnosis.archive.judge import ArchiveJudgement, judge
+from biodance.diagnosis.archive.judge import ArchiveJudgement, judge_archive
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.errors import BiodanceError, SessionRefused
 from biodance.lab.session.archive import (
@@ -129,7 +129,7 @@ def judge_plates(archive: str | Path, *, tell: _Tell = lambda _: None) -> Plates
         raise SessionRefused(f"{folder}: no session says anything of a plate. {why}")
     tell("judging the plates")
     named = plainly_named(observations)
-    judged = judge(named)
+    judged = judge_archive(named)
     undated = [visit.name for visit in judged.visits if not visit.date]
     notes = (
         (

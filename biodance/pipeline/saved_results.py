@@ -26,7 +26,7 @@ from biodance.records import Array, Motion, Session, Trial
 from biodance.records.motion import BY_FRAME
 from biodance.settings import Value
 
-BODY = "body.json"
+BODY_FILE = "body.json"
 """File in which `biodance identify` and `report` keep the identified body."""
 SCALED = "scaled_body.json"
 """The same where nothing was identified: scaled, with the table's parameters; nobody's earlier body (``--body``)."""
@@ -81,7 +81,7 @@ def kept_body(folder: Path) -> Path:
     return (
         folder
         if folder.is_file()
-        else next((folder / name for name in (BODY, SCALED) if (folder / name).is_file()), folder / BODY)
+        else next((folder / name for name in (BODY_FILE, SCALED) if (folder / name).is_file()), folder / BODY_FILE)
     )
 
 
@@ -94,7 +94,7 @@ def read_kept_body(folder: Path) -> tuple[Body, str]:
         The file is no body, or not the one that the run of the folder wrote.
     """
     if folder.is_dir():
-        refuse_mixture(folder, (BODY, SCALED))
+        refuse_mixture(folder, (BODY_FILE, SCALED))
     return read_body(kept_body(folder))
 
 
@@ -109,7 +109,11 @@ def known_body(body: Body | str | Path | None) -> Body | None:
     if body is None or isinstance(body, Body):
         return body
     path = Path(body)
-    return read_kept_body(path)[0] if (path / BODY).is_file() else read_body(path / BODY if path.is_dir() else path)[0]
+    return (
+        read_kept_body(path)[0]
+        if (path / BODY_FILE).is_file()
+        else read_body(path / BODY_FILE if path.is_dir() else path)[0]
+    )
 
 
 def read_kept(folder: Path) -> KeptResults:

@@ -83,8 +83,8 @@ CHECKS = ("what", "where", "value", "limit", "inside", "advice")
 _MARKERS = ("trial", "marker", "rms_m", "max_m", "gaps_percent", "longest_gap_s")
 _STATES = ("trial", "joint", "state", "start_s", "end_s")
 FINDINGS = (
-    "effect", "target", "parameter", "value", "sd", "unit", "visible_fraction", "log_bayes_factor", "gain_low",
-    "gain_high", "advice",
+    "effect", "target", "parameter", "value", "sd", "unit", "probability", "visible_fraction", "log_bayes_factor",
+    "gain_low", "gain_high", "advice",
 )  # fmt: skip
 UNSEEN = ("effect", "target", "limit", "unit", "told_from", "typical")
 ADEQUACY = ("channel", "band_low_hz", "band_high_hz", "z", "trial", "second_s")
@@ -235,7 +235,7 @@ def _diagnosed(one: Diagnosis) -> dict[str, "DataFrame"]:
     rows = []
     for finding in one.findings:
         gain = finding.gain.ci95 if finding.gain else (float("nan"), float("nan"))
-        about = (finding.visible_fraction, finding.log_bayes_factor, *gain, finding.advice)
+        about = (finding.probability, finding.visible_fraction, finding.log_bayes_factor, *gain, finding.advice)
         rows += [(finding.effect, finding.target, p.name, p.value, p.sd, p.unit, *about) for p in finding.parameters]
     return {
         "findings": _frame(rows, FINDINGS),

@@ -7,7 +7,7 @@ from biodance.body.body_file import body_text
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.robot_trials import MatchedTrial
-from biodance.pipeline.saved_results import BODY
+from biodance.pipeline.saved_results import BODY_FILE
 from biodance.report.documents.diagnosis import attention_document, judged_document
 from biodance.report.documents.identification import agreement, identification_document
 from biodance.report.documents.plain import keyed, plain_values, to_text
@@ -80,7 +80,9 @@ def write_robot(result: RobotResult, folder: Path) -> dict[str, Any]:
     content = {"results.json": to_text(numbers), PAGE: _page(result, numbers)}
     done = result.identified.identification
     if done.status == "solved":
-        content[BODY] = body_text(done.identified, f"Recording {result.recording.folder.name} of {result.body.name}.")
+        content[BODY_FILE] = body_text(
+            done.identified, f"Recording {result.recording.folder.name} of {result.body.name}."
+        )
     write_files(folder, content)
     return dict(plain_values(numbers))
 

@@ -20,7 +20,7 @@ from biodance.pipeline.lab_file import LAB, lab_text
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance, now, provenance
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.saved_results import BODY, SCALED, keep_motions
+from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions
 from biodance.pipeline.session_frames import frames_of
 from biodance.records.attention import Attention
 from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
@@ -72,7 +72,7 @@ def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
     if result.body is None or (fit is not None and fit.status != "solved"):
         return {}
     keep_motions(result, folder)
-    return {BODY if fit is not None else SCALED: body_text(*body_of_result(result))}
+    return {BODY_FILE if fit is not None else SCALED: body_text(*body_of_result(result))}
 
 
 def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
@@ -156,8 +156,8 @@ def _accepted(
     body, proven = found.accepted, found.gain is not None and found.gain.proven
     if body is not None and body.status == "solved" and proven:
         named = ", ".join(_cause(one) for one in findings if one.changes)
-        files[BODY] = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
-        written = (*written, Written(BODY, f"the body identified with {named} accepted"))
+        files[BODY_FILE] = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
+        written = (*written, Written(BODY_FILE, f"the body identified with {named} accepted"))
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
     if made and (text := lab_text(earlier, made)):
         files[LAB] = text

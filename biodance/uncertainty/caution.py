@@ -29,7 +29,7 @@ JOINT = {
 """The joint at the origin of each segment's frame."""
 
 
-def widened(prior: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
+def widened_prior(prior: Sip, calibrated: tuple[JointError, ...] = ()) -> Sip:
     """Return ``prior``, known about the true joint centres, with the same values and a covariance that holds for frames
     that are turned and centres that are displaced: as far as the functional calibration that ``calibrated`` the joints
     leaves them, or as joints usually are.
@@ -77,7 +77,7 @@ def _centre_size(segment: str, calibrated: set[str]) -> float:
 
 
 def from_true_centres(sip: Sip, table: Sip, calibrated: tuple[JointError, ...]) -> Sip:
-    """Return ``sip``, believed in the model's frames after the prior ``table`` (`widened` for joints that were
+    """Return ``sip``, believed in the model's frames after the prior ``table`` (`widened_prior` for joints that were
     ``calibrated``), with a covariance about the true joint centres.
 
     With the prior covariance P in the model's frames, D of it from misplaced centres and B of the posterior, the error

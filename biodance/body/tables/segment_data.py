@@ -54,7 +54,7 @@ class Number:
         return self.value + self.per_kg * subject.mass + self.per_m * subject.stature
 
 
-Key = tuple[str, str, str, str, str]
+NumberKey = tuple[str, str, str, str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class SegmentTable:
     """
 
     name: str
-    numbers: Mapping[Key, Number]
+    numbers: Mapping[NumberKey, Number]
     groups: Mapping[tuple[str, str], str] = field(default_factory=dict)
     layout: str = "model"
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -134,7 +134,7 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
     provenance = read_toml(beside) if beside.is_file() else {}
     if "sha256" in provenance:
         refuse_changed(path, provenance["sha256"])
-    numbers: dict[Key, Number] = {}
+    numbers: dict[NumberKey, Number] = {}
     groups: dict[tuple[str, str], str] = {}
     for line, row in _rows(path):
         for sex in row["sex"]:

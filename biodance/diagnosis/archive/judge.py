@@ -186,7 +186,7 @@ class ArchiveJudgement:
 
 
 @one_thread()
-def judge(observations: Sequence[PlateEvidence]) -> ArchiveJudgement:
+def judge_archive(observations: Sequence[PlateEvidence]) -> ArchiveJudgement:
     """Return what the observations of an archive say about its plates, kinds of trial and people; none gives an empty
     judgement.
     """

@@ -29,7 +29,7 @@ class Norm:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenValue:
     """One number that one ``session`` shows of ``name``."""
 
     name: str
@@ -74,24 +74,24 @@ def _middle(some: Sequence[float], usual: float) -> float:
     return float(np.median([one for one in some if one > 0] or [usual]))
 
 
-def seen_by_witnesses(trials: Sequence[Trial], session: str, mass: float) -> list[Seen]:
+def seen_by_witnesses(trials: Sequence[Trial], session: str, mass: float) -> list[SeenValue]:
     """Return what the witnesses of a session see beyond what they expect, each kind of observation by its name."""
     found = []
     for trial in trials:
         for one in observe(recording(trial, mass=mass)) if trial.plates else ():
-            found.append(Seen(one.kind, session, one.value - one.expected, one.unit, one.sd))
+            found.append(SeenValue(one.kind, session, one.value - one.expected, one.unit, one.sd))
     return found
 
 
-def norms(found: Sequence[Seen]) -> tuple[Norm, ...]:
+def norms(found: Sequence[SeenValue]) -> tuple[Norm, ...]:
     """Return what is usual of everything that two sessions or more show, by name."""
-    names: dict[str, dict[str, list[Seen]]] = {}
+    names: dict[str, dict[str, list[SeenValue]]] = {}
     for one in found:
         names.setdefault(one.name, {}).setdefault(one.session, []).append(one)
     return tuple(_norm(name, sessions) for name, sessions in sorted(names.items()) if len(sessions) > 1)
 
 
-def _norm(name: str, sessions: Mapping[str, Sequence[Seen]]) -> Norm:
+def _norm(name: str, sessions: Mapping[str, Sequence[SeenValue]]) -> Norm:
     """Return what is usual of one thing: medians of the sessions, pooled."""
     value = np.array([np.median([one.value for one in some]) for some in sessions.values()])
     known = np.array([np.mean([one.sd for one in some]) / np.sqrt(len(some)) for some in sessions.values()])

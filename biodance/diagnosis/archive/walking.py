@@ -64,7 +64,7 @@ def step_rows(seen: SeenTrial, labels: Mapping[str, str]) -> list[StepRow]:
     return out
 
 
-def places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
+def plate_places(rows: Sequence[StepRow]) -> dict[str, tuple[Array, Array]]:
     """Return place (2,) m along x and y of the laboratory beside where the file says, and its standard deviation, of
     every plate that the steps of one visit fell on.
 
@@ -93,7 +93,7 @@ def placed(rows: Sequence[StepRow], visit: PlateVisit, trial: str) -> list[Plate
     """Return the places that the steps of a visit know as evidence, named after ``trial``."""
     return [
         PlateEvidence(f"place_{axis}", {plate: 1.0}, float(place[i]), float(error[i]), visit, trial, {}, "steps")
-        for plate, (place, error) in (places(rows) if rows else {}).items()
+        for plate, (place, error) in (plate_places(rows) if rows else {}).items()
         for i, axis in enumerate("xy")
         if error[i] < _BLIND
     ]

@@ -15,7 +15,7 @@ from biodance.lab.c3d.length import metres_per_unit
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.subject import MarkerLabels, marker_labels, measurements_of, poses_only
 from biodance.lab.markers.sets import MarkerSet, recognise
-from biodance.lab.markers.upright import axis_to_head, clear_axis, turn_to
+from biodance.lab.markers.up_axis import axis_to_head, clear_axis, turn_to
 from biodance.lab.plates.corners import is_rectangle
 from biodance.lab.plates.told import Told
 from biodance.records import Array, Markers, Role, Source, Trial, spread_frames

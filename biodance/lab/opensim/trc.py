@@ -17,7 +17,7 @@ from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.resampled import resampled
 from biodance.lab.markers.sets import recognise
 from biodance.lab.markers.time_axis import time_axis
-from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z
+from biodance.lab.markers.up_axis import axis_to_head, body_is_tall_along_z
 from biodance.lab.opensim import Y_UP_TO_Z_UP
 from biodance.lab.plain_text import (
     COMMAS_READ,

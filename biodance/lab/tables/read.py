@@ -12,7 +12,7 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.resampled import resampled
 from biodance.lab.markers.sets import MarkerSet, read_marker_set, recognise
 from biodance.lab.markers.time_axis import TimeAxis, time_axis
-from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z, turn_to
+from biodance.lab.markers.up_axis import axis_to_head, body_is_tall_along_z, turn_to
 from biodance.lab.plain_text import read_bytes, sha256
 from biodance.lab.plates.told import Told
 from biodance.lab.tables.cells import Cells, read_cells

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.consequence import LIMIT, Adequacy
-from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Unobservable
+from biodance.diagnosis.consequence import LIMIT, Adequacy, Unobservable
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Finding
+from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY
 from biodance.pipeline.diagnosis import SessionDiagnosis
@@ -140,6 +141,30 @@ def odds(log_bayes_factor: float) -> str:
     return f"{format_number(2.718281828**log_bayes_factor, 0)} times as probable as nothing wrong"
 
 
+_ENDINGS = {
+    DiagnosisStatus.CLEAN: "nothing is wrong in what was judged",
+    DiagnosisStatus.NAMED: "the cause named, or one that looks like it, is there",
+    DiagnosisStatus.UNKNOWN: "something is wrong that is not named",
+    DiagnosisStatus.CANNOT_TELL: "nobody can tell",
+}
+"""What the probability of a diagnosis is the probability of."""
+
+
+def probable(probability: float) -> str:
+    """Return a probability as text, such as "P = 0.97"; near 0 and 1 by its bound."""
+    if 0.005 <= probability < 0.995:
+        return f"P = {format_number(probability, 2)}"
+    return "P > 0.99" if probability > 0.5 else "P < 0.01"
+
+
+def how_sure(one: Finding) -> str:
+    """Return how sure a finding is: its probability and its odds against nothing wrong, or that a check shows it."""
+    said = odds(one.log_bayes_factor)
+    if not np.isfinite(one.log_bayes_factor):
+        return f"{first_upper(said)}."
+    return f"{probable(one.probability)}; {said}."
+
+
 def diagnosis_section(found: SessionDiagnosis) -> str:
     """Return the section of the session's report on what the simulation gets wrong, as HTML text."""
     from markupsafe import Markup
@@ -186,7 +211,8 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         filters={
             "sized": sized,
             "estimated": estimated,
-            "odds": odds,
+            "how_sure": how_sure,
+            "probable": probable,
             "share": share_of,
             "first_upper": first_upper,
         },
@@ -197,6 +223,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         never=causes_by_effect((row.effect, row.target) for row, size in unseen if size == NEVER),
         result=result,
         one=one,
+        ending=_ENDINGS[one.status],
         headline=next((said for said in one.attention if said.about == ABOUT), None),
         others=[(trial_and_subject(said), said.text) for said in others if said.level != "note"],
         noted=[(trial_and_subject(said), said.text) for said in others if said.level == "note"],

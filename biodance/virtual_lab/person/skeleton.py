@@ -141,10 +141,10 @@ MARKER_RADIUS = 0.007
 SKIN_PLANE = np.array([1.0, 1.0, 0.35])
 """Placement errors are along the skin; through it (z of the limbs' lateral markers) bone holds the marker."""
 
-Place = tuple[str, tuple[float, float, float]]
+MarkerPlace = tuple[str, tuple[float, float, float]]
 
 
-def _paired(size: Proportions) -> dict[str, Place]:
+def _paired(size: Proportions) -> dict[str, MarkerPlace]:
     """Return the places (segment, (3,) m) of the markers that exist on both sides, for the right side."""
     s = size["stature"]
     shoulder = size["thorax"] - size["shoulder_drop"]
@@ -170,7 +170,7 @@ def _paired(size: Proportions) -> dict[str, Place]:
     }
 
 
-def _single(size: Proportions) -> dict[str, Place]:
+def _single(size: Proportions) -> dict[str, MarkerPlace]:
     """Return the places of the markers on the midline and of RBAK."""
     s = size["stature"]
     shoulder = size["thorax"] - size["shoulder_drop"]

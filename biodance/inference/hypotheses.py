@@ -1,0 +1,100 @@
+"""What a search over sets of causes finds: each set with its sizes and scales, and the probability of each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from biodance.effects import Effect, NamedCause
+from biodance.inference.causes import cause_key
+from biodance.inference.rows import Rows
+from biodance.inference.scales import ScaledFit
+from biodance.records import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of causes with their sizes: ``log_posterior`` up to a constant of the session, and of the unknown beside
+    it (``log_unknown``); ``Z`` (r, k) columns and ``y`` (r,) target beside all that is no fault; ``surety`` (r,) by
+    which rows are scaled because no cause is quite like its model.
+    """
+
+    causes: tuple[NamedCause, ...]
+    rows: Rows
+    fit: ScaledFit
+    log_posterior: float
+    Z: Array
+    y: Array
+    surety: Array
+    log_unknown: float = -np.inf
+    where_unknown: tuple[int, int] = (0, 0)
+
+    @property
+    def names(self) -> frozenset[tuple[str, str]]:
+        """Effect and target of its causes."""
+        return frozenset(cause_key(one) for one in self.causes)
+
+    @property
+    def left(self) -> Array:
+        """(r,) whitened rows that the posterior mean leaves, in units of their noise."""
+        K, size = self.rows.X.shape[1], self.fit.coefficients
+        return np.asarray(self.surety * (self.y - self.rows.X @ size[:K] - self.Z @ size[K:]))
+
+    @property
+    def phi(self) -> Array:
+        """(10N,) posterior mean of the body's parameters; empty where only observations judge."""
+        found = self.rows.problem
+        return (
+            np.empty(0)
+            if found is None
+            else found.prior.phi + found.factor @ self.fit.coefficients[: found.factor.shape[1]]
+        )
+
+    def whole(self, one: NamedCause) -> Array:
+        """Return the size (p,) of a cause with what its own tolerance has taken of it: both look alike, and the sum is
+        what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
+        """
+        where, unit = self.rows.tolerated.get(cause_key(one), (slice(0), np.zeros((one.theta.size, 0))))
+        return np.asarray(one.theta + unit @ self.fit.coefficients[where])
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A cause added to a hypothesis by the score test: its log posterior gain, and the size to begin with."""
+
+    effect: Effect
+    gain: float
+    start: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    screened: tuple[Scored, ...]
+    known_unknown: float = 0.0
+
+    @property
+    def unknown(self) -> float:
+        """Probability of an unknown cause."""
+        return max(self.known_unknown, float(self.weights[:, 1].sum()))
+
+    @property
+    def weights(self) -> Array:
+        """(H, 2) probability of every hypothesis, without and with the unknown."""
+        both = np.array([[one.log_posterior, one.log_unknown] for one in self.hypotheses])
+        return np.asarray(np.exp(both - logsumexp(both)))
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable hypothesis."""
+        return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
+
+    def probabilities(self) -> dict[tuple[str, str], float]:
+        """Return the probability of every cause."""
+        out: dict[tuple[str, str], float] = {}
+        for one, weight in zip(self.hypotheses, self.weights.sum(axis=1), strict=True):
+            for name in one.names:
+                out[name] = out.get(name, 0.0) + float(weight)
+        return dict(sorted(out.items(), key=lambda pair: -pair[1]))

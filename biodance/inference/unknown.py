@@ -1,0 +1,60 @@
+"""A cause that nobody described: more is left in one band and channel, in the whole session, or of what is no fault,
+than laboratories have.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from biodance.inference.hypotheses import Hypothesis
+from biodance.inference.scales import LOUD, prior_sd
+from biodance.records import CHANNELS, Array
+
+P_UNKNOWN, UNKNOWN = 0.1, 0.5
+"""Probability of an unknown cause in a session, before any data, and from which there is one; those of causes stand in
+their effects (`Effect.prior`)."""
+OWN, EXCESS = 0.4, 1.4
+"""Standard deviation of the logarithm of the noise of one band and channel beside that of the session: without fault,
+and with an unknown cause.
+"""
+
+
+def energies(one: Hypothesis) -> tuple[Array, Array]:
+    """Return the mean square (Q,) of what is left of the plates' rows in each band and channel in units of the
+    session's noise, and the number (Q,) of rows.
+    """
+    n = one.rows.plates
+    left = one.left[:n]
+    count = np.bincount(one.rows.block[:n]).astype(float)
+    loud = np.exp(2 * one.fit.scales.noise)
+    return np.bincount(one.rows.block[:n], weights=left**2) / np.maximum(count, 1) / loud, count
+
+
+def with_unknown(one: Hypothesis) -> Hypothesis:
+    """Return a hypothesis with the log posterior of an unknown cause beside it: the noise of one band and channel, of
+    the whole session, or the size of a group of what is no fault is larger than anywhere, its logarithm
+    ~ N(0, `EXCESS`^2) in place of its usual spread.
+    """
+    square, count = energies(one)
+    if not count.any():
+        return one
+    blocks = 0.5 * np.log(np.maximum(square[count > 0], 1e-12))
+    kinds = (
+        (blocks, np.sqrt(OWN**2 + 0.5 / count[count > 0])),
+        (np.array([one.fit.scales.noise]), np.array([LOUD])),
+        (one.fit.scales.groups, prior_sd(one.rows)),
+    )
+    each = [float(logsumexp(_excess(away, usual))) - np.log(len(away)) for away, usual in kinds]
+    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / len(kinds))
+    at = np.flatnonzero(count)[int(np.argmax(_excess(*kinds[0])))]
+    told = one.log_posterior + float(logsumexp(each)) + price
+    return replace(one, log_unknown=told, where_unknown=divmod(int(at), len(CHANNELS)))
+
+
+def _excess(away: Array, usual: Array) -> Array:
+    """Return the log Bayes factors of scales whose logarithms are ``away`` from usual for being larger than anywhere:
+    N(0, `EXCESS`^2) against N(0, ``usual``^2).
+    """
+    wide = np.hypot(EXCESS, usual)
+    return np.asarray(0.5 * np.maximum(away, 0.0) ** 2 * (usual**-2 - wide**-2) - np.log(wide / usual))
