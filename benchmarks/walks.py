@@ -111,10 +111,8 @@ def copied(files: list[Path], folder: Path, text: str) -> Path:
 
 def named(session: Session, evidence: ObservedEvidence) -> tuple[Finding, ...]:
     """Return what checks and witnesses name in a session."""
-    checks = [
-        quality for quality in check_quality(session) if not quality.ok and quality.effect in ("clipping", "axis_error")
-    ]
-    failed = tuple(Finding(quality.effect, quality.target, (), (), 1.0) for quality in checks)
+    checks = check_quality(session, chosen=("clipping", "axis_error"))
+    failed = tuple(Finding(one.effect, one.target, (), (), 1.0) for one in checks if not one.ok)
     said = judge(None, evidence, shipped(), causes(), Diagnosis("unexplained", ())).diagnosis.findings
     return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
 
