@@ -24,6 +24,8 @@ ROWS = (
     (STATIC, STEPS),
     (STATIC, MISSED),
     (STATIC, *(replace(MISSED, trial=f"trial_{k}") for k in range(30))),
+    (STATIC, STEPS, WALKED),
+    (STATIC, STEPS, WALKED, *(replace(MISSED, trial=f"trial_{k}") for k in range(7))),
 )
 ATTENTION = ((), (Attention("warn", "Look."),), (Attention("note", "Nothing to do."),))
 TARGETS = {
@@ -71,7 +73,7 @@ def found() -> list[Diagnosis]:
     return out
 
 
-@pytest.mark.parametrize("judged", ROWS, ids=("whole", "steps", "missed", "many"))
+@pytest.mark.parametrize("judged", ROWS, ids=("whole", "steps", "missed", "many", "all kinds", "all kinds and missed"))
 def test_every_headline_is_short_plain_and_has_one_thing_to_do(judged: tuple[Judged, ...]) -> None:
     for one, others in itertools.product(found(), ATTENTION):
         said = headline(one, judged, frozenset({"static"}), others)

@@ -20,6 +20,7 @@ from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.session_frames import frames_of
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
+from biodance.records.motion import BY_FRAME
 from biodance.report.figures import solid
 from biodance.report.figures.solid import sheet_png
 from biodance.report.figures.still import RESIDUAL_SCALE, VIEWS, still_figure
@@ -181,6 +182,5 @@ def test_a_replay_shows_the_load_that_was_found_and_stays_small(result, monkeypa
     assert frames_of(replace(result, body=None)) is None
     first, *others = result.trials
     motion = first.motion
-    kept = ("time", "q", "v", "a", "residual", "determined")
-    still = replace(first, motion=replace(motion, **{name: getattr(motion, name)[:1] for name in kept}))
+    still = replace(first, motion=replace(motion, **{name: getattr(motion, name)[:1] for name in BY_FRAME}))
     assert first.name not in [one.name for one in frames_of(replace(result, trials=(still, *others))).trials]

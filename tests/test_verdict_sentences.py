@@ -9,7 +9,7 @@ from example_results import FOUND, VERDICTS, full_session
 
 from biodance.diagnosis.diagnosis import ABOUT, Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
-from biodance.diagnosis.repairs import by_checks
+from biodance.diagnosis.repairs import with_failed
 from biodance.effects import QualityCheck
 from biodance.pipeline.attention import (
     identified_attention,
@@ -99,7 +99,7 @@ def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
 def test_a_unit_whose_factor_has_no_interval_is_told_in_words() -> None:
     said = "The plates carry 0.4536 times the declared weight: pounds declared as kilograms."
     quality = QualityCheck("weight on the plates", False, said, "unit_error", "", 0.4536, "factor", "1")
-    one = by_checks((quality,))
+    one = with_failed((quality,), Diagnosis("unexplained", ()))
     assert (
         headline(one, (), frozenset()).text == "A unit is mistaken by a factor of 0.45. Correct it, and run this again."
     )

@@ -70,17 +70,19 @@ def amount(judged: Sequence[Judged], static: frozenset[str]) -> str:
 
 
 def _clean(seen: str, missed: Sequence[str], *, well: bool) -> Iterator[str]:
-    """Yield that nothing is wrong in what was ``seen``, and what was ``missed`` or needs somebody all the same."""
-    found = f"Nothing wrong was found in {seen}"
+    """Yield that nothing is wrong in what was ``seen``, and what was ``missed`` or needs somebody all the same, ever
+    shorter.
+    """
     again = f'Record {"it" if len(missed) == 1 else "them"} again, or set role = "skip".'
-    if missed:
-        if len(missed) == 1:
-            yield f"{found}, but {missed[0]} could not be judged. {again}"
-        yield f"{found}, but {len(missed)} of the files could not be judged. {again}"
-    elif not well:
-        yield f"{found}, but something else needs you. {_MEND}"
-    else:
-        yield f"{found}."
+    for found in (f"Nothing wrong was found in {seen}", "Nothing wrong was found"):
+        if missed:
+            if len(missed) == 1:
+                yield f"{found}, but {missed[0]} could not be judged. {again}"
+            yield f"{found}, but {len(missed)} of the files could not be judged. {again}"
+        elif not well:
+            yield f"{found}, but something else needs you. {_MEND}"
+        else:
+            yield f"{found}."
 
 
 def _named(one: Diagnosis) -> Iterator[str]:
