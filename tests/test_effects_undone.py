@@ -7,11 +7,11 @@ import pytest
 from human_cases import human_case
 from scipy.signal import butter, filtfilt
 
-from biodance.diagnosis.transient_contact import one_sided, quick
 from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import REFERENCE, STRENGTH
 from biodance.effects.sloshing_load import _FREQUENCY
 from biodance.effects.time_delay import moved_in_time
+from biodance.inference.contact import one_sided, quick
 from biodance.records import Array, Wrench
 
 INSIDE = slice(30, -30)
