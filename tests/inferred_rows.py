@@ -72,13 +72,14 @@ def rows(
     markers: int = 12,
     observations: int = 5,
     width: int = 4,
+    blocks: int = 12,
     causes: dict[str, Array] | None = None,
 ) -> DrawnRows:
     """Return rows with columns of three groups of ``width`` each and a target of unit noise."""
     count = plates + markers + observations
     group = np.repeat(np.arange(len(GROUPS)), width)
     X = rng.normal(size=(count, group.size))
-    block = np.concatenate([np.arange(plates) % 12, np.full(markers, 6 * len(BANDS)), np.full(observations, -1)])
+    block = np.concatenate([np.arange(plates) % blocks, np.full(markers, 6 * len(BANDS)), np.full(observations, -1)])
     empty = Tolerances({}, np.zeros((0, 6, 6)), np.zeros((0, 6)), np.zeros((0, 6)), 10.0)
     return DrawnRows(None, empty, None, X, rng.normal(size=count), group, block, GROUPS, columns=causes or {})
 
