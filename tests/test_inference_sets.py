@@ -75,11 +75,11 @@ def test_targets_of_one_effect_share_its_prior() -> None:
 
 
 def test_every_cause_is_unlike_its_model_in_each_band_and_channel_by_itself() -> None:
-    """A cause of 160 noise deviations has 7 % of its own in each of twelve blocks: its size is known to two or three
-    per cent, not to a 160th.
+    """A cause of 240 noise deviations has 7 % of its own in each of twelve blocks: its size is known to two per cent,
+    not to a 240th.
     """
-    some = search(drawn(3, {"a": 8.0}, visible=20.0, observations=0))
-    one = hypothesis(some, (named("a", 8.0),))
+    some = search(drawn(3, {"a": 8.0}, visible=30.0, markers=0, observations=0))
+    one = hypothesis(some, (named("a", 8.0),), nominal(some.rows))
     errors, taken = one.Z[:, :-1], some.rows.added(Drawn("a"), one.causes[0].theta)
     n = some.rows.plates
     np.testing.assert_allclose(errors.sum(axis=1)[:n], UNLIKE * taken[:n], rtol=0.02)
