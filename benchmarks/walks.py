@@ -3,7 +3,7 @@
     BIODANCE_DATA=folder python -m benchmarks walks [--whole] [--only SESSION ...]
 
 The folder holds the public sessions named below. One fault at a time is in every file of a copy, as in a laboratory.
-What observations name needs no inverse kinematics: a session takes two seconds; ``--whole`` runs the whole diagnosis.
+What witnesses name needs no inverse kinematics: a session takes two seconds; ``--whole`` runs the whole diagnosis.
 """
 
 import argparse
@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from inject import inject
 
-from biodance.diagnosis.diagnosis import Diagnosis, Finding
+from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.witness_evidence import ObservedEvidence, collect_evidence
-from biodance.effects import causes, check_quality
+from biodance.diagnosis.witness_inference import infer_causes
+from biodance.effects import check_quality
 from biodance.errors import BiodanceError
-from biodance.inference.session import judge
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.plates.parameters import count_plates
 from biodance.lab.session.read import read_session
@@ -29,7 +29,6 @@ from biodance.observations import SeenTrial, observe, recording
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import Session
-from biodance.uncertainty.tolerances import shipped
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
 
 CHILDREN = tuple(f"biomechzoo/HC0{n}A" for n in (30, 31, 32, 38, 44, 50, 55))
@@ -110,13 +109,12 @@ def copied(files: list[Path], folder: Path, text: str) -> Path:
 
 
 def named(session: Session, evidence: ObservedEvidence) -> tuple[Finding, ...]:
-    """Return what checks and observations name in a session."""
+    """Return what checks and witnesses name in a session."""
     checks = [
         quality for quality in check_quality(session) if not quality.ok and quality.effect in ("clipping", "axis_error")
     ]
     failed = tuple(Finding(quality.effect, quality.target, (), (), 1.0) for quality in checks)
-    bare = Diagnosis("unexplained", ())
-    said = judge(None, evidence, shipped(), causes(), bare).diagnosis.findings
+    said = infer_causes(evidence).findings
     return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
 
 

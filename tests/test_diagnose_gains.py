@@ -74,7 +74,7 @@ def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_
     every = windows(1, trials=4, hidden=about_plate(lambda local, _: local * [1, 1, 1.05, 1, 1, 1]))
     by_role = {"fit": every[:2] if kept else every, "validate": every[2:] if kept else ()}
     monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
-    found = inferred(body(), by_role["fit"], tolerances=known(), effects=("plate_gain",))
+    found = inferred(body(), by_role["fit"], tolerances=known(), effects=("plate_gain", "plate_position"))
     result: Any = SimpleNamespace(body=body(), trials=())
     cases = cases_of(body(), by_role["fit"])
     before = identify_body(body(), tuple(case_fit(c, w.use) for c, w in zip(cases, by_role["fit"], strict=True)))

@@ -175,7 +175,7 @@ def test_without_simulation_only_observations_judge() -> None:
 
 @pytest.mark.parametrize("size", [2.5, 3.5, 4.5, 6.0])
 def test_a_fault_beyond_its_tolerance_does_not_hide_in_it(size: float) -> None:
-    """Zeros of laboratories are 0.3 N; eight times as much and more is told, whatever the tolerance could stretch to."""
+    """Zeros of laboratories are 0.3 N: eight times as much and more is told, however far a tolerance may stretch."""
     hidden = about_plate(lambda local, session: local + size * np.eye(6)[0])
     one = inferred(body(), windows(3, hidden=hidden), tolerances=known(), effects=("plate_offset",))
     assert one.posterior.probabilities().get(OFFSET, 0.0) > 0.95

@@ -13,7 +13,6 @@ from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residual
 from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.statistics import standing_point
-from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Sip
 
@@ -134,51 +133,6 @@ def test_a_load_is_named_with_mass_and_place() -> None:
     finding = diagnosis.findings[0]
     assert (finding.effect, finding.target) == ("added_mass", "left_forearm_hand")
     assert finding.parameters[0].value == pytest.approx(2.4, abs=0.35)
-
-
-def test_a_hand_that_comes_and_goes_is_named_with_its_force() -> None:
-    one = body()
-    index = one.segment_index("left_forearm_hand")
-    low, high = one.boxes[index]
-    palm = np.array([(low[0] + high[0]) / 2, low[1] + 0.08, (low[2] + high[2]) / 2])
-
-    def touched(wrench, session, moving):
-        point = poses(one, moving.q).points([index], palm[None])[:, 0]
-        strength = 15.0 * (np.clip(1 - np.abs(moving.time - 5.0), 0, 1) + np.clip(1 - np.abs(moving.time - 9.0), 0, 1))
-        force = strength[:, None] * np.array([0.0, 0.3, 1.0])
-        return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
-
-    examined = found(touched, chosen=(*FAST, "external_contact"))
-    assert [(f.effect, f.target) for f in examined.diagnosis.findings] == [("external_contact", "left_forearm_hand")]
-    assert examined.diagnosis.verdict in ("named, complete", "named, incomplete")
-    size = [p.value for p in examined.diagnosis.findings[0].parameters]
-    middle = 0.5 ** (
-        1 / 3
-    )  # of a force that rises and falls in proportion to time, half of the squares lie above this share of its peak
-    np.testing.assert_allclose(size, middle * np.array([0.0, 4.5, 15.0]), atol=1.5)
-    np.testing.assert_allclose(examined.named[0].effect.place, [0.0, 0.08, 0.0], atol=0.03)
-    window = windows(1, hidden=touched)[0]
-    case = Case(one, window.trial, window.motion, one.sip.phi, np.linspace(0, 0.25, window.motion.time.size))
-    added = accept(case, examined.named).trial.wrench.value - window.trial.wrench.value
-    assert added[window.motion.time == 5.0, 2] == pytest.approx(15.0, abs=3.0)
-
-
-def test_a_foot_that_touches_is_named_though_the_mean_of_a_trial_is_hidden() -> None:
-    """What a foot lifts on average looks like the plate's zero and the body's weight: the rest tells."""
-    one = body()
-    index = one.segment_index("left_foot")
-    low, high = one.boxes[index]
-    ball = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-
-    def touched(wrench, session, moving):
-        point = poses(one, moving.q).points([index], ball[None])[:, 0]
-        strength = np.where(np.abs(moving.time % 4.0 - 2.0) < 0.8, 6.0, 0.0)
-        force = strength[:, None] * np.array([0.0, 0.3, 1.0])
-        return wrench - np.concatenate([force, np.cross(point, force)], axis=1)
-
-    diagnosis = found(touched, chosen=(*FAST, "external_contact")).diagnosis
-    assert [(f.effect, f.target) for f in diagnosis.findings] == [("external_contact", "left_foot")]
-    assert diagnosis.findings[0].parameters[2].value == pytest.approx(6.0, abs=1.5)
 
 
 def test_accepting_a_fault_gains_on_trials_that_were_not_used() -> None:
