@@ -1,6 +1,7 @@
 """Contacts that come and go: what is touched pushes to one side and takes hold quickly, and is named with its force."""
 
 import numpy as np
+import pytest
 from diagnosed_sessions import body, known, windows
 from inferred_sessions import inferred
 
