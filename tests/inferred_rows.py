@@ -8,14 +8,14 @@ import numpy as np
 
 from biodance.diagnosis.candidates import SCALE, Candidate
 from biodance.effects import Effect, Parameter
-from biodance.inference.rows import BODY, Rows
+from biodance.inference.rows import BODY, TOLERATED, Rows
 from biodance.inference.scales import LOUD, Scales, prior_sd, products
 from biodance.inference.sets import Search, log_priors
 from biodance.records import Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances
 
-GROUPS = (BODY, "slide", "plate_offset")
+GROUPS = (BODY, "slide", TOLERATED)
 """Groups of the drawn columns."""
 
 

@@ -16,7 +16,7 @@ from biodance.diagnosis.problem import problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import effects
 from biodance.inference.causes import NamedCause
-from biodance.inference.rows import BODY, OBSERVED, rows_of
+from biodance.inference.rows import BODY, TOLERATED, rows_of
 from biodance.inference.scales import nominal, posterior, prior_sd, products
 from biodance.inference.sets import Search, hypothesis
 from biodance.observations import ObservableCause, Observation
@@ -84,13 +84,14 @@ def test_the_evidence_is_the_density_of_the_forces_in_newtons() -> None:
 
 
 def test_columns_of_one_kind_are_one_group_and_share_a_scale() -> None:
+    """What observations share has none: how it errs was learned with it."""
     found, _ = rows(told(1.0, 2.0, sd=1.0, norms=0.5))
     assert found.groups[0] == BODY
-    assert found.groups[-1] == OBSERVED
-    assert set(found.groups[1:-1]) >= {"plate_offset", "plate_gain"}
+    assert found.groups[-1] == TOLERATED
+    assert found.group[-1] == -1
+    assert {found.group[where.start] for where, _ in found.tolerated.values()} == {found.groups.index(TOLERATED)}
     first = found.problem.sip.shape[1]
     assert (found.group[:first] == 0).all()
-    assert np.bincount(found.group)[-1] == 1, "one shared error"
     blocks = found.block[: found.plates].reshape(-1, 6)
     np.testing.assert_array_equal(blocks, 6 * found.problem.spectrum.band[:, None] + np.arange(6))
     assert found.block.max() == 6 * len(BANDS)
@@ -170,7 +171,8 @@ def test_without_simulation_only_observations_judge() -> None:
     assert (found.plates, found.simulated) == (0, 0)
     np.testing.assert_allclose(found.y, [2.0, 4.0])
     np.testing.assert_allclose(found.X, [[2.0], [2.0]])
-    assert found.groups == (OBSERVED,)
+    assert found.groups == ()
+    assert (found.group == -1).all()
 
 
 @pytest.mark.parametrize("size", [2.5, 3.5, 4.5, 6.0])
