@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosed_sessions import about_plate, body, known, windows
+from inferred_sessions import inferred
 
-from biodance.diagnosis import engine
 from biodance.diagnosis.accept import case_fit
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.engine import Examined, assess, diagnose_trials
-from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.diagnosis.witness_inference import WitnessFindings
 from biodance.effects import effect
 from biodance.identification.identification import identify_body
+from biodance.inference.causes import NamedCause
+from biodance.inference.decision import Inferred
 from biodance.pipeline import gains
 from biodance.pipeline.judged_trials import cases_of
 
@@ -28,37 +26,32 @@ def faulty(local, session):
     return local
 
 
-def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Examined, gains.Accepted]:
+def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Inferred, gains.Accepted]:
     """Return the diagnosis of a session with two faults, and what accepting them and a third one changes."""
     every = windows(1, trials=4, hidden=about_plate(faulty))
     by_role = {"fit": every[:2], "validate": every[2:]}
     monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
-    monkeypatch.setattr(
-        engine, "significant_dependences", lambda _: {}
-    )  # which would refuse the bogus drift before its gain is asked
-    found = diagnose_trials(
-        body(), by_role["fit"], tolerances=known(), effects=("plate_gain", "plate_offset", "plate_drift")
-    )
-    fits = tuple(
-        case_fit(case, window.use) for case, window in zip(cases_of(body(), every[:2]), every[:2], strict=True)
-    )
-    result = SimpleNamespace(body=body(), trials=())
-    return found, gains.accepted(result, with_bogus(found), identify_body(body(), fits))  # type: ignore[arg-type]
+    causes = ("plate_gain", "plate_offset", "plate_drift")
+    found = inferred(body(), by_role["fit"], tolerances=known(), effects=causes)
+    cases = cases_of(body(), every[:2])
+    fits = tuple(case_fit(case, window.use) for case, window in zip(cases, every[:2], strict=True))
+    result: Any = SimpleNamespace(body=body(), trials=())
+    drift = NamedCause(effect("plate_drift").at("Fx", cases[0]), np.array([20.0]), np.eye(1))
+    return found, gains.accepted(result, accused(found, drift), identify_body(body(), fits))
 
 
-def with_bogus(examined: Examined) -> Examined:
-    """Return the diagnosis with a drift of 20 N named that nobody hid, before the culprits."""
-    naming = examined.naming
-    drift = NamedCause(effect("plate_drift").at("Fx", naming.found.problem.cases[0]), np.array([20.0]), np.eye(1))
-    found = replace(naming.found, named=(drift, *naming.found.named))
-    return assess(
-        replace(examined, naming=replace(naming, found=found, accepted=(naming.accepted[0], *naming.accepted)))
-    )
+def accused(one: Inferred, cause: NamedCause) -> Inferred:
+    """Return the diagnosis with a cause named that nobody hid, before the culprits."""
+    name, target, parameter = cause.effect.name, cause.effect.target, cause.effect.parameters[0]
+    size = Estimate(parameter.name, float(cause.theta[0]), 1.0, parameter.unit)
+    finding = Finding(name, target, (size,), (Alias(name, target, 50.0),), 1.0)
+    told = replace(one.diagnosis, findings=(finding, *one.diagnosis.findings))
+    return replace(one, diagnosis=told, named=(cause, *one.named))
 
 
 def test_culprits_gain_each_their_own_and_a_bogus_companion_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
     found, one = diagnosed(monkeypatch)
-    told = one.examined.diagnosis
+    told = one.inferred.diagnosis
     gain = {f"{f.effect} {f.target}": f.gain for f in told.findings}
     assert set(gain) == {"plate_gain Fz", "plate_offset Fy"}
     assert all(own.proven for own in gain.values())
@@ -74,16 +67,6 @@ def test_culprits_gain_each_their_own_and_a_bogus_companion_is_taken_back(monkey
     assert told.verdict == found.diagnosis.verdict
 
 
-def accused(effect_name: str, target: str, parameter: str, value: float, unit: str) -> Finding:
-    """Return what a witness says of a plate."""
-    cause = Alias(effect_name, target, 50.0)
-    return Finding(effect_name, target, (Estimate(parameter, value, 0.1 * abs(value), unit),), (cause,), 1.0)
-
-
-RIGHT = accused("plate_gain", "plate1:Fz", "gain", 0.05, "1")
-WRONG = accused("plate_position", "plate1:x", "shift", 0.04, "m")
-
-
 @pytest.mark.parametrize("kept", [True, False], ids=["trials were kept", "none was kept"])
 def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_is(
     monkeypatch: pytest.MonkeyPatch, kept: bool
@@ -91,18 +74,20 @@ def test_a_plate_that_is_wrongly_accused_is_not_corrected_and_one_that_is_wrong_
     every = windows(1, trials=4, hidden=about_plate(lambda local, _: local * [1, 1, 1.05, 1, 1, 1]))
     by_role = {"fit": every[:2] if kept else every, "validate": every[2:] if kept else ()}
     monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
-    found = diagnose_trials(body(), by_role["fit"], tolerances=known(), effects=("plate_gain",), search=False)
+    found = inferred(body(), by_role["fit"], tolerances=known(), effects=("plate_gain", "plate_position"))
     result: Any = SimpleNamespace(body=body(), trials=())
-    right, wrong = gains._with_gains(result, found, (RIGHT, WRONG))
+    cases = cases_of(body(), by_role["fit"])
+    before = identify_body(body(), tuple(case_fit(c, w.use) for c, w in zip(cases, by_role["fit"], strict=True)))
+    moved = NamedCause(effect("plate_position").at("plate1:x", cases[0]), np.array([0.04]), np.eye(1) * 1e-6)
+    told = gains.accepted(result, accused(found, moved), before).inferred.diagnosis
+    (right,), (wrong,) = told.findings, told.resembles
+    assert (right.effect, right.target) == ("plate_gain", "Fz")
     assert right.gain is not None
     assert right.gain.proven
+    assert set(right.gain.trials) == {window.trial.name for window in every[2 * kept :]}
+    assert wrong.effect == "plate_position"
     assert wrong.gain is not None
     assert wrong.gain.ci95[1] < 0
-    assert set(right.gain.trials) == {window.trial.name for window in every[2 * kept :]}
-    said = WitnessFindings((RIGHT, WRONG), ObservedEvidence((), {}, {}))
-    monkeypatch.setattr(gains, "infer_causes", lambda _: said)
-    told = gains.combined_with_witnesses(result, found.diagnosis, found, ObservedEvidence((), {}, {}), {})
-    assert [one.effect for one in told.findings] == ["plate_gain"]
     assert any(note.startswith("plate position plate1:x was taken back: accepting it") for note in told.notes)
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 from diagnosed_sessions import about_plate, body, gain, known, windows
+from inferred_sessions import inferred
 
-from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.reasons import Reason
 
 
@@ -15,7 +15,7 @@ def shifted(local, session):
 
 def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
     some = windows(1, trials=2, hidden=about_plate(shifted))
-    one = diagnose_trials(body(), some, tolerances=known(), effects=("plate_crosstalk",)).diagnosis
+    one = inferred(body(), some, tolerances=known(), effects=("plate_crosstalk",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
     assert len(one.resembles) > 1
@@ -25,6 +25,6 @@ def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
 def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
     """A gain of 5 % is 25 times what these plates have."""
     some = windows(1, trials=2, hidden=gain(0.05))
-    one = diagnose_trials(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
+    one = inferred(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert Reason.OUTSIDE_TOLERANCES in one.reasons

@@ -9,8 +9,6 @@ from scipy.stats import multivariate_normal
 
 from biodance.body.parts import JointError
 from biodance.diagnosis.candidates import Candidate, candidates, changes, local_basis, removed, slopes
-from biodance.diagnosis.diagnosis import Alias, Finding
-from biodance.diagnosis.doubt import _with_less_evidence
 from biodance.diagnosis.evidence import evidence, linear_posterior, smallest_detectable
 from biodance.diagnosis.learning import Null, learn_tolerances
 from biodance.diagnosis.model import model
@@ -23,7 +21,6 @@ from biodance.diagnosis.observability import (
     visibility,
 )
 from biodance.diagnosis.problem import problem
-from biodance.diagnosis.screening import screen
 from biodance.effects import Effect, Parameter, effect
 from biodance.uncertainty.tolerances import Tolerances, key_of, read_tolerances, shipped, to_toml
 
@@ -104,26 +101,6 @@ def test_a_load_is_spanned_by_mass_and_place(put) -> None:
     assert np.linalg.norm(left) < 0.03 * np.linalg.norm(load)
 
 
-def test_screening_ranks_every_cause_and_limits_them_all(put) -> None:
-    causes = candidates(put, ("plate_offset", "plate_gain"))
-    found = model(put, causes, known())
-    suspects = screen(found, causes)
-    assert len(suspects) == 12
-    rows = detection_limits(visibility(found, causes), put.cases[0].body, 10.0)
-    assert {(row.effect, row.target) for row in rows} == {one.names for one in suspects}
-    assert all(row.told_from >= row.limit > 0 for row in rows)
-
-
-@pytest.mark.parametrize(("gain", "doubted"), [(14.3, ["shoulder_girdle", "plate_gain"]), (130.0, ["shoulder_girdle"])])
-def test_a_cause_of_less_evidence_than_a_doubted_one_is_doubted_too(gain: float, doubted: list[str]) -> None:
-    pairs = [
-        (None, Finding(name, "", (), (Alias(name, "", bayes),), 0.5))
-        for name, bayes in (("shoulder_girdle", 117.1), ("plate_gain", gain))
-    ]
-    assert [finding.effect for _, finding in _with_less_evidence(pairs[:1], pairs)] == doubted
-    assert _with_less_evidence([], pairs) == []
-
-
 def test_no_limit_lies_below_what_changes_the_wrench(put) -> None:
     causes = candidates(put, ("plate_gain",))
     seen = visibility(model(put, causes, known()), causes)
@@ -133,21 +110,6 @@ def test_no_limit_lies_below_what_changes_the_wrench(put) -> None:
         added = np.concatenate([one.effect.added(case, size) for case in put.cases])
         root = np.sqrt(np.mean(added**2, axis=0))
         assert max(root[:3].max() / 1.0, root[3:].max() / 0.3) > 0.99, one.names
-
-
-def test_thirty_targets_are_charged_as_thirty_chances(put) -> None:
-    (one,) = candidates(put, ("time_delay",))
-    found = model(put, (one,), known())
-    alone = screen(found, (one,))
-    targets = [replace(one, effect=replace_target(one.effect, f"t{k}")) for k in range(30)]
-    crowd = screen(found, tuple(targets))
-    assert alone[0].score - crowd[0].score == pytest.approx(np.log(30))
-    assert alone[0].score == pytest.approx(alone[0].log_bayes_factor)
-
-
-def replace_target(cause, target: str):
-    """Return the same cause at another target."""
-    return type(cause)(target)
 
 
 def test_what_placing_has_repaired_needs_a_larger_fault_to_be_seen() -> None:

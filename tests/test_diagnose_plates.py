@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosed_sessions import about_plate, body, known, windows
+from inferred_sessions import inferred
 
-from biodance.diagnosis.engine import diagnose_trials
 from biodance.uncertainty.tolerances import Tolerances, table_sizes
 
 LEFT = np.block([[np.full((3, 3), 0.002), np.full((3, 3), 0.01)], [np.full((3, 3), 0.001), np.full((3, 3), 0.002)]])
@@ -31,13 +31,13 @@ def leaking(seed: int, *, clear: float = 0.0):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_crosstalk_that_calibrated_plates_keep_is_no_finding(seed: int) -> None:
     some = windows(seed, trials=2, hidden=leaking(seed))
-    one = diagnose_trials(body(), some, tolerances=installed(), effects=("plate_crosstalk",)).diagnosis
+    one = inferred(body(), some, tolerances=installed(), effects=("plate_crosstalk",)).diagnosis
     assert (one.verdict, one.findings, one.resembles) == ("nothing wrong", (), ())
 
 
 def test_a_clear_crosstalk_beside_them_is_named_with_its_size() -> None:
     some = windows(1, trials=2, hidden=leaking(1, clear=0.025))
-    one = diagnose_trials(body(), some, tolerances=installed(), effects=("plate_crosstalk",)).diagnosis
+    one = inferred(body(), some, tolerances=installed(), effects=("plate_crosstalk",)).diagnosis
     (found,) = one.findings
     assert (found.effect, found.target) == ("plate_crosstalk", "Fz->Fx")
     assert found.parameters[0].value == pytest.approx(0.025, abs=0.006)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, windows
+from inferred_sessions import inferred
 
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
-from biodance.diagnosis.engine import diagnose_trials
 from biodance.diagnosis.of_family import of_family
 from biodance.effects import About, Case, CauseWords, CheckKind, Effect, Parameter, causes, effects, known_cause
 from biodance.pipeline.cause_words import alternatives, spoken
@@ -92,6 +92,6 @@ def test_the_engine_asks_an_object_which_size_matters(least: float, found: list[
 
     some = windows(1, hidden=lambda wrench, session, moving: wrench + 50.0 * shaken(moving.time))
     family = effects(("plate_offset", "plate_gain")) | {"rope": Shaken()}
-    one = of_family(diagnose_trials(body(), some, tolerances=known(), effects=family).diagnosis, family)
+    one = of_family(inferred(body(), some, tolerances=known(), effects=family).diagnosis, family)
     assert [finding.effect for finding in one.findings] == found
     assert all(finding.cause.words is Rope.words for finding in one.findings)

@@ -7,7 +7,6 @@ import pytest
 from human_cases import human_case
 from scipy.signal import butter, filtfilt
 
-from biodance.diagnosis.transient_contact import one_sided, quick
 from biodance.effects import Case, effect
 from biodance.effects.filter_mismatch import REFERENCE, STRENGTH
 from biodance.effects.sloshing_load import _FREQUENCY
@@ -71,16 +70,3 @@ def test_a_load_sloshes_at_the_frequency_that_is_reported() -> None:
     assert rows[2] == ("frequency", _FREQUENCY + 0.5, 0.05, "Hz")
     slow, quick = (found.added(case, np.array([0.0, 1.0, step, 0.0])) for step in (-0.4, 0.4))
     assert np.linalg.norm(slow - quick) > 0.1 * np.linalg.norm(slow)
-
-
-def test_a_touch_pushes_to_one_side_and_a_swell_does_not() -> None:
-    touch = np.clip(np.sin(np.arange(40) / 3), 0, None)[:, None] * [0.0, 0.3, 1.0]
-    swell = np.linspace(-1, 1, 40)[:, None] * [0.0, 0.3, 1.0]
-    assert one_sided(touch)
-    assert one_sided(-touch)
-    assert not one_sided(swell)
-    creeping = np.exp(-np.arange(25) / 4)[:, None] * [0.0, 0.3, 1.0]  # 1.6 s, at values 0.4 s apart
-    held = (np.arange(25) % 10 < 4)[:, None] * [0.0, 0.3, 1.0]
-    assert quick([held, held])
-    assert not quick([swell, swell])
-    assert not quick([creeping - np.median(creeping, axis=0), creeping])

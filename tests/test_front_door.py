@@ -48,7 +48,7 @@ def test_it_loads_nothing_heavy():
 
 
 @pytest.mark.parametrize(
-    "first", ["import biodance", "import biodance.identification.identification, biodance.diagnosis.engine"]
+    "first", ["import biodance", "import biodance.identification.identification, biodance.inference.session"]
 )
 def test_a_verb_stays_a_verb_whatever_was_imported_before(first):
     code = (

@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from two_plates import changed, late, session
 
-from biodance.diagnosis.delay_contradicted import is_contradicted
-from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Recorded
 from biodance.effects.plate_offset import PlateOffset
 from biodance.effects.plates_exchanged import PlatesExchanged
@@ -16,7 +13,6 @@ from biodance.effects.time_delay import TimeDelay
 from biodance.lab.session.read import read_session
 from biodance.motion.newton import newton_of
 from biodance.observations import observe, recording
-from biodance.observations.newton import Newton
 from biodance.pipeline.weighing import WeighedBy, weigh
 from biodance.records import Wrench
 
@@ -87,20 +83,6 @@ def test_the_witness_sees_a_delay_and_a_weight():
     lag, mass = (one for one in observe(seen) if one.observer == "newton")
     assert lag.value == pytest.approx(0.03, abs=0.002)
     assert mass.value == pytest.approx(62.0, abs=3 * mass.sd)
-
-
-def test_a_delay_that_newton_contradicts_is_none():
-    def finding(seconds):
-        size = Estimate("delay", seconds, 0.005, "s")
-        return Finding("time_delay", "", (size,), (Alias("time_delay", "", 9.0),), 1.0)
-
-    seen = recording(changed(session(), late(0.03))["squat_1"], mass=62.0)
-    evidence = ObservedEvidence(Newton().observe(seen), {}, {})
-    assert not is_contradicted(finding(0.03), evidence)
-    assert not is_contradicted(finding(0.05), evidence)
-    assert is_contradicted(finding(0.08), evidence)
-    assert is_contradicted(finding(-0.02), evidence)
-    assert not is_contradicted(finding(-0.02), ObservedEvidence((), {}, {}))
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from inferred_sessions import heard
 from walkers import WEIGHT, Stand, plate, walker
 from walking import FOOT, MASS, Wrong, place, session, standing, walk
 
 from biodance.diagnosis.witness_evidence import collect_evidence
-from biodance.diagnosis.witness_inference import size_from_witnesses
 from biodance.lab.markers.sets import GUESSED
 from biodance.observations import (
     Observation,
@@ -196,7 +196,7 @@ def test_an_unknown_mass_and_missing_feet_are_silence_not_an_error() -> None:
     trial = walk()
     bare = replace(trial, markers=trial.markers.select(["SACR"]))
     assert {one.observer for one in observe(recording(bare, mass=MASS))} == {"empty_plate"}
-    assert size_from_witnesses(collect_evidence(session(replace(bare, markers=None))), ("time_delay", "")) is None
+    assert heard(session(replace(bare, markers=None))).diagnosis.findings == ()
 
 
 def test_a_foot_across_two_belts_is_judged_by_both_together() -> None:

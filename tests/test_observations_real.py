@@ -3,11 +3,10 @@
 from pathlib import Path
 
 import pytest
+from inferred_sessions import heard
 from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
-from biodance.diagnosis.witness_evidence import collect_evidence
-from biodance.diagnosis.witness_inference import infer_causes
 from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
@@ -21,13 +20,13 @@ def spoiled(session: Path, folder: Path, text: str) -> Path:
     return folder
 
 
-def heard_in(folder: Path) -> tuple[Finding, ...]:
-    return infer_causes(collect_evidence(read_session(folder))).findings
+def named_in(folder: Path) -> tuple[Finding, ...]:
+    return heard(read_session(folder)).diagnosis.findings
 
 
 @pytest.mark.parametrize("name", ["HC038A", "HC050A"])
 def test_clean_walks_of_children_name_nothing(name: str, data: Path) -> None:
-    assert heard_in(data / "biomechzoo" / name) == ()
+    assert named_in(data / "biomechzoo" / name) == ()
 
 
 @pytest.mark.parametrize(
@@ -42,7 +41,7 @@ def test_clean_walks_of_children_name_nothing(name: str, data: Path) -> None:
 def test_a_fault_in_real_walks_is_named(
     name: str, text: str, effect: str, target: str, size: float | None, data: Path, tmp_path: Path
 ) -> None:
-    (first, *others) = heard_in(spoiled(data / "biomechzoo" / name, tmp_path, text))
+    (first, *others) = named_in(spoiled(data / "biomechzoo" / name, tmp_path, text))
     assert (first.effect, first.target, others) == (effect, target, [])
     if size is not None:
         low, high = first.parameters[0].interval

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, pull, windows
+from inferred_sessions import inferred
 from perfect_recordings import SUBJECT, arm_swing, recorded
 from second_package import ENTRY_POINTS, LIMIT_POINT, RENAMED, install
 
 import biodance.dance.limits as limits_room
 from biodance.body.human.human import human
 from biodance.body.tables.choice import table_names
-from biodance.diagnosis.engine import diagnose_trials
 from biodance.effects import effects
 from biodance.errors import BiodanceError
 from biodance.records import Subject
@@ -86,7 +86,7 @@ def test_reader_marker_set_and_export_from_the_command_line(tmp_path: Path) -> N
 
 def test_effect_is_fitted_like_any_other(installed: Path) -> None:
     assert list(effects())[-1] == "cable"
-    found = diagnose_trials(
+    found = inferred(
         body(),
         windows(1, hidden=pull),
         tolerances=known(),

@@ -6,20 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inferred_sessions import heard
 from walking import MASS, PLATES, Wrong, session, standing, walk
 
-from biodance.diagnosis.combine_witnesses import combine_findings
-from biodance.diagnosis.diagnosis import Diagnosis, Finding
-from biodance.diagnosis.witness_evidence import collect_evidence
-from biodance.diagnosis.witness_inference import infer_causes
+from biodance.diagnosis.diagnosis import Finding
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.session.read import read_session
 from biodance.observations import observe, recording
 from biodance.records import SIDES, Markers, Session, Trial
 
 
-def heard(found: Session) -> tuple[Finding, ...]:
-    return infer_causes(collect_evidence(found)).findings
+def named(found: Session) -> tuple[Finding, ...]:
+    return heard(found).diagnosis.findings
 
 
 def toes_moved(trial: Trial, inwards: float, *, edges: bool = False) -> Trial:
@@ -47,7 +45,7 @@ def toes_moved(trial: Trial, inwards: float, *, edges: bool = False) -> Trial:
 def test_toe_markers_on_the_first_ray_of_both_feet_accuse_no_plate() -> None:
     """Right foot on plate 1, left foot on plate 2, one direction: two plates shifted apart would look the same."""
     seen = session(standing(), *(toes_moved(walk(name=name), 0.04) for name in ("walk", "again")))
-    (only,) = heard(seen)
+    (only,) = named(seen)
     assert (only.effect, only.target) == ("toe_landmark", "both")
     inwards = next(one for one in only.parameters if one.name == "inwards")
     assert inwards.interval[0] <= 0.04 <= inwards.interval[1]
@@ -55,7 +53,7 @@ def test_toe_markers_on_the_first_ray_of_both_feet_accuse_no_plate() -> None:
 
 def test_markers_on_both_edges_tell_where_the_foot_is() -> None:
     trials = [toes_moved(walk(name=name), 0.04, edges=True) for name in ("walk", "again")]
-    assert heard(session(standing(), *trials)) == ()
+    assert named(session(standing(), *trials)) == ()
     values = {(one.observer, one.what): one.value for one in observe(recording(trials[0], mass=MASS), ["foot_across"])}
     assert len(values) == 6
     assert max(map(abs, values.values())) < 0.003
@@ -64,7 +62,7 @@ def test_markers_on_both_edges_tell_where_the_foot_is() -> None:
 def test_a_plate_20_mm_off_is_named_or_stands_beside_the_landmark() -> None:
     wrong = Wrong(moved=(0.0, 0.02))
     for inwards in (0.0, 0.03):
-        found = heard(session(*(toes_moved(walk(wrong, name=name), inwards) for name in ("walk", "again"))))
+        found = named(session(*(toes_moved(walk(wrong, name=name), inwards) for name in ("walk", "again"))))
         alike = {(alias.effect, alias.target) for one in found for alias in one.set}
         assert ("plate_position", "plate1:y") in alike
         assert {one.effect for one in found} <= {"plate_position", "toe_landmark"}
@@ -77,7 +75,7 @@ def test_a_pressure_half_a_metre_from_the_foot_tells_no_place() -> None:
         here, there = walk(name=name), walk(far, name=name)
         moved = [replace(a, wrench=b.wrench) for a, b in zip(here.plates, there.plates, strict=True)]
         trials.append(replace(here, plates=tuple(moved)))
-    found = heard(session(standing(), *trials))
+    found = named(session(standing(), *trials))
     assert not [one for one in found if one.effect == "plate_position"]
 
 
@@ -102,14 +100,14 @@ def test_who_stands_still_needs_no_moment_about_the_vertical() -> None:
     (right, off) = (observe(recording(one, mass=MASS), ["standing_twist"])[0] for one in (still, turned))
     assert abs(right.value) < 1e-9
     assert off.value == pytest.approx(wrong)
-    (found,) = heard(session(turned))
+    (found,) = named(session(turned))
     assert (found.effect, found.target) == ("plate_offset", "Mz")
     assert found.parameters[0].interval[0] <= wrong <= found.parameters[0].interval[1]
 
 
 def test_a_published_recording_whose_mz_is_off_is_told_so(data: Path) -> None:
     """The laboratory's own numbers: 10 to 12 N·m in every trial, standing too."""
-    found = next(one for one in heard(read_session(data / "laas_human/c3d")) if one.target == "Mz")
+    found = next(one for one in named(read_session(data / "laas_human/c3d")) if one.target == "Mz")
     assert found.effect == "plate_offset"
     assert 9.5 < abs(found.parameters[0].value) < 13.0
 
@@ -124,12 +122,11 @@ def test_a_stance_whose_beginning_was_not_recorded_has_no_phases() -> None:
     assert {one.plate for one in seen} == {"plate2"}
 
 
-def test_a_habit_of_the_laboratory_is_told_and_nothing_is_wrong() -> None:
+def test_a_habit_of_the_laboratory_is_told_and_is_no_fault() -> None:
     seen = session(standing(), *(toes_moved(walk(name=name), 0.04) for name in ("walk", "again")))
-    evidence = collect_evidence(seen)
-    whole = combine_findings(Diagnosis("nothing wrong", ()), infer_causes(evidence), evidence, judged=True)
-    assert [one.effect for one in whole.findings] == ["toe_landmark"]
-    assert (whole.verdict, whole.faults, whole.told) == ("nothing wrong", (), "nothing wrong")
+    found = heard(seen).diagnosis
+    assert [one.effect for one in found.findings] == ["toe_landmark"]
+    assert found.faults == ()
 
 
 @pytest.mark.parametrize(
@@ -145,4 +142,4 @@ def test_a_habit_of_the_laboratory_is_told_and_nothing_is_wrong() -> None:
 )
 def test_laboratories_without_a_fault_of_plates_accuse_none(name: str, data: Path) -> None:
     """One good step (MH), feet half beside (FMC), toe markers on the first ray and .mot files (OpenSim's examples)."""
-    assert [one for one in heard(read_session(data / name)) if one.effect.startswith("plate")] == []
+    assert [one for one in named(read_session(data / name)) if one.effect.startswith("plate")] == []

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, known, motion, windows
+from inferred_sessions import inferred
 
 from biodance.body.tables.error_sizes import error_size
-from biodance.diagnosis.adequacy import LIMIT
-from biodance.diagnosis.engine import diagnose_trials
+from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.own_tolerances import UNREST, own_tolerances, soft_tissue, unrest
 from biodance.diagnosis.problem import TrialWindow
 from biodance.motion.regressor import predict_wrench
@@ -91,7 +91,7 @@ def test_a_zero_that_wanders_between_trials_is_no_alarm() -> None:
     def wanders(size: float) -> tuple[float, str]:
         some = windows(5, hidden=lambda wrench, session, _: wrench + size * (session[0] == 0.25) * np.eye(6)[0])
         own = own_tolerances(body(), some, known=known())
-        found = diagnose_trials(body(), some, tolerances=own.tolerances, effects=("plate_offset",)).diagnosis
+        found = inferred(body(), some, tolerances=own.tolerances, effects=("plate_offset",)).diagnosis
         return max(row.z for row in found.adequacy if row.channel == "Fx" and row.band_hz[0] == 0), found.verdict
 
     assert wanders(1.0)[0] < LIMIT

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, motion, windows
+from inferred_sessions import inferred
 
 from biodance.body.tables.error_sizes import error_size
-from biodance.diagnosis.engine import diagnose_trials
 from biodance.records import Markers, Plate, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import (
@@ -96,8 +96,5 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
     np.testing.assert_allclose(more, 4 * expected, rtol=0.1, err_msg="columns have the same noise: four times")
     wider = with_own_noise(known(), more, 70.0)
     np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
-    seen = [
-        diagnose_trials(body(), windows(1), tolerances=one, effects=("added_mass",)).diagnosis
-        for one in (known(), wider)
-    ]
+    seen = [inferred(body(), windows(1), tolerances=one, effects=("added_mass",)).diagnosis for one in (known(), wider)]
     assert min(row.limit for row in seen[1].limits) > min(row.limit for row in seen[0].limits)

@@ -1,14 +1,29 @@
-"""The witnesses of a session together: what is wrong is named with its size, chance and contradiction name nothing."""
+"""Observations alone, without any model of the body: what is wrong is named with its size, chance names nothing."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from inferred_sessions import heard, heard_in
 from walking import MASS, STANCE, Wrong, session, standing, walk
 
 from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence, undo_causes
-from biodance.diagnosis.witness_inference import infer_causes, size_from_witnesses
+from biodance.effects import effects
+from biodance.inference.causes import NamedCause
+from biodance.inference.rows import observed_causes, rows_of
+from biodance.inference.sets import Search, hypothesis
 from biodance.observations import observe, recording
+from biodance.uncertainty.tolerances import shipped
+
+
+def size_of(evidence, names):
+    """Return what observations alone say of the size of a cause, with its standard deviation."""
+    asked = effects()
+    every = observed_causes(evidence, asked)
+    search = Search.of(rows_of(None, every, shipped(), evidence), every)
+    one = next(cause.effect for cause in every if cause.names == names)
+    (fitted,) = hypothesis(search, (NamedCause(one, np.zeros(one.typical.size), np.empty((0, 0))),)).causes
+    return fitted.theta[0], fitted.covariance[0, 0] ** 0.5
 
 
 def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> None:
@@ -18,12 +33,12 @@ def test_standing_cannot_tell_a_small_zero_from_a_plate_that_is_not_level() -> N
     (share,) = [size / (62.0 * 9.81) for size in one.norms.values()]
     assert 0.003 < share < 0.004
     twice = collect_evidence(session(standing(push=4.0), standing(push=4.0)))
-    assert size_from_witnesses(twice, ("plate_offset", "Fx"))[1] > 1.5
+    assert size_of(twice, ("plate_offset", "Fx"))[1] > 1.5
 
 
 def test_clean_walks_and_standing_name_nothing() -> None:
     evidence = collect_evidence(session(standing(), walk(), walk(name="again")))
-    assert infer_causes(evidence).findings == ()
+    assert heard_in(evidence).diagnosis.findings == ()
     rows = {(row.effect, row.target): row for row in cause_visibilities(evidence)}
     assert rows["plate_position", "plate1:y"].sd < 0.005
     assert ("plate_crosstalk", "plate1:Fz->Mx") in rows["plate_position", "plate1:y"].alike
@@ -34,7 +49,7 @@ def test_clean_walks_and_standing_name_nothing() -> None:
 def test_who_weighs_more_than_declared_may_carry_a_load(heavier: float, a_load: bool) -> None:
     """A load is weight, too; but nobody carries less than nothing."""
     weighed = standing(weight=(1 + heavier) * MASS)
-    (one,) = infer_causes(collect_evidence(session(weighed, replace(weighed, name="later")))).findings
+    (one,) = heard(session(weighed, replace(weighed, name="later"))).diagnosis.findings
     alike = {(alias.effect, alias.target) for alias in one.set}
     assert [n in alike for n in (("plate_gain", "Fz"), ("body_mass", ""), ("added_mass", ""))] == [True, True, a_load]
 
@@ -49,7 +64,7 @@ def test_who_weighs_more_than_declared_may_carry_a_load(heavier: float, a_load: 
     ],
 )
 def test_what_is_wrong_in_two_walks_is_named(wrong: Wrong, names: tuple[str, str], size: float | None) -> None:
-    found = infer_causes(collect_evidence(session(standing(wrong), walk(wrong), walk(wrong, name="again")))).findings
+    found = heard(session(standing(wrong), walk(wrong), walk(wrong, name="again"))).diagnosis.findings
     assert [(one.effect, one.target) for one in found] == [names]
     if size is not None:
         low, high = found[0].parameters[0].interval
@@ -75,10 +90,8 @@ def test_putting_a_delay_right_gives_back_what_was_seen_without_it() -> None:
 def test_witnesses_that_contradict_each_other_exclude_little() -> None:
     """30 ms early here and 30 ms late there is no clock that is right to some milliseconds."""
     delay = ("time_delay", "")
-    agreed = size_from_witnesses(collect_evidence(session(walk(), walk(name="again"))), delay)
-    torn = size_from_witnesses(
-        collect_evidence(session(walk(Wrong(late=0.03)), walk(Wrong(late=-0.03), name="again"))), delay
-    )
+    agreed = size_of(collect_evidence(session(walk(), walk(name="again"))), delay)
+    torn = size_of(collect_evidence(session(walk(Wrong(late=0.03)), walk(Wrong(late=-0.03), name="again"))), delay)
     assert torn[1] > 2.0 * agreed[1]
     assert all(abs(torn[0] - late) < 4.0 * torn[1] for late in (0.03, -0.03))
 
@@ -86,7 +99,7 @@ def test_witnesses_that_contradict_each_other_exclude_little() -> None:
 def test_one_odd_step_names_nothing() -> None:
     odd = walk(Wrong(late=0.03))
     others = [walk(name=f"walk{i}") for i in range(3)]
-    shifted = infer_causes(collect_evidence(session(*others, odd))).findings
+    shifted = heard(session(*others, odd)).diagnosis.findings
     assert not [one for one in shifted if one.effect != "time_delay"]
 
 

@@ -1,19 +1,15 @@
-"""What a name needs: evidence, a size that is significant and that matters; closed-form cases of every rule."""
+"""What a name needs: movement, and a size that matters; what is left must matter, too."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnosed_sessions import RATE, body, known, motion, offset, windows
+from inferred_sessions import inferred
 
-from biodance.diagnosis.adequacy import adequacy, largest_z, verdict
 from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT, Adequacy, least, matters
-from biodance.diagnosis.engine import diagnose_trials
-from biodance.diagnosis.joint_fit import settle
-from biodance.diagnosis.model import NamedCause
-from biodance.diagnosis.naming import build_model, drop_weak_causes, is_significant, required_evidence
-from biodance.diagnosis.problem import problem
-from biodance.effects import Case, QualityCheck, effects
+from biodance.diagnosis.reasons import Reason
+from biodance.effects import Case, effects
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion, Wrench
 from biodance.uncertainty.tolerances import shipped, table_sizes, without_habits
@@ -34,52 +30,11 @@ def standing_looks(shift: float):
 
 
 def test_standing_alone_names_nothing_however_large() -> None:
-    moving = diagnose_trials(body(), windows(1, hidden=offset(40.0)), tolerances=known(), effects=FAST)
+    moving = inferred(body(), windows(1, hidden=offset(40.0)), tolerances=known(), effects=FAST)
     assert [one.effect for one in moving.diagnosis.findings] == ["plate_offset"]
-    quiet = diagnose_trials(body(), standing_looks(40.0), tolerances=known(), effects=FAST).diagnosis
+    quiet = inferred(body(), standing_looks(40.0), tolerances=known(), effects=FAST).diagnosis
     assert (quiet.findings, quiet.resembles) == ((), ())
-    assert quiet.doubted
-
-
-def test_a_name_that_another_one_takes_back_is_taken_back() -> None:
-    """Offset and nothing else is hidden: a delay named beside it has no size of its own and falls, the offset stays."""
-    put = problem(body(), windows(2, hidden=offset(12.0)), chosen=FAST)
-    found, causes = build_model(put, known(), FAST)
-    one = {cause.names: cause for cause in causes}
-    start = tuple(
-        NamedCause(one[name].effect, one[name].effect.typical, np.eye(1))
-        for name in (("time_delay", ""), ("plate_offset", "Fx"))
-    )
-    both = settle(found, start)
-
-    def round_of(name):
-        from biodance.diagnosis.naming import Round
-        from biodance.diagnosis.screening import ScoredCandidate
-
-        return Round((ScoredCandidate(one[name].effect, 50.0, 50.0, np.zeros(1), 0.9),))
-
-    kept, rounds = drop_weak_causes(both, (round_of(("time_delay", "")), round_of(("plate_offset", "Fx"))))
-    assert [cause.effect.name for cause in kept.named] == ["plate_offset"]
-    assert len(rounds) == 1
-    assert kept.named[0].theta[0] == pytest.approx(12.0, abs=1.0)
-
-
-def test_a_size_below_two_standard_deviations_or_above_what_can_be_does_not_stand() -> None:
-    found, _ = build_model(problem(body(), windows(1), chosen=("wobbling_mass", "plate_offset")), known(), FAST)
-    offset_fx = effects()["plate_offset"].at("Fx", found.problem.cases[0])
-    assert not is_significant(found, NamedCause(offset_fx, np.array([5.9]), np.array([[9.0]])))
-    assert is_significant(found, NamedCause(offset_fx, np.array([-6.1]), np.array([[9.0]])))
-    wobbling = effects()["wobbling_mass"].at("right_shank", found.problem.cases[0])
-    own = float(body().sip.mass[body().segment_index("right_shank")])
-    assert is_significant(found, NamedCause(wobbling, np.array([0.9 * own]), np.array([[1e-4]])))
-    assert not is_significant(found, NamedCause(wobbling, np.array([1.1 * own]), np.array([[1e-4]])))
-    assert not is_significant(found, NamedCause(wobbling, np.array([-1.0]), np.array([[1e-4]])))
-
-
-def test_what_hides_needs_overwhelming_evidence() -> None:
-    found, _ = build_model(problem(body(), windows(1), chosen=("plate_offset",)), known(), ("plate_offset",))
-    assert required_evidence(found, 0.2) == found.tolerances.threshold
-    assert required_evidence(found, 0.19) == 3 * found.tolerances.threshold
+    assert Reason.ONLY_STANDING in quiet.reasons
 
 
 def test_only_what_is_physics_keeps_a_mean_and_the_rest_is_spread() -> None:
@@ -105,7 +60,7 @@ def test_a_poor_model_resembles_and_is_no_finding() -> None:
         knock = 40.0 * np.sin(2 * np.pi * 4.0 * moving.time) * (np.abs(moving.time - 6.0) < 1.0)
         return offset(12.0)(wrench + knock[:, None] * (np.arange(6) == 1), session, moving)
 
-    one = diagnose_trials(body(), windows(1, hidden=knocked), tolerances=known(), effects=FAST).diagnosis
+    one = inferred(body(), windows(1, hidden=knocked), tolerances=known(), effects=FAST).diagnosis
     assert one.verdict == "unexplained"
     assert one.findings == ()
     assert "plate_offset" in {finding.effect for finding in one.resembles}
@@ -131,29 +86,24 @@ def test_a_cause_matters_from_its_least_size_on(name, target, small, large) -> N
 
 
 def test_a_cause_within_any_tolerance_is_told_but_no_finding() -> None:
-    one = diagnose_trials(body(), windows(1, hidden=offset(1.9)), tolerances=replace(known(), sizes={}), effects=FAST)
+    one = inferred(body(), windows(1, hidden=offset(1.9)), tolerances=replace(known(), sizes={}), effects=FAST)
     assert one.diagnosis.verdict == "nothing wrong"
     assert one.diagnosis.findings == ()
     assert [finding.effect for finding in one.diagnosis.tolerated] == ["plate_offset"]
     limit = next(row for row in one.diagnosis.limits if (row.effect, row.target) == ("plate_offset", "Fx"))
-    assert limit.limit >= least(effects()["plate_offset"].at("Fx", one.naming.first.problem.cases[0]))["offset"]
+    assert limit.limit >= least(effects()["plate_offset"].at("Fx", one.search.rows.problem.cases[0]))["offset"]
 
 
 def test_an_alarm_must_matter_physically() -> None:
     small, large = (Adequacy("Mx", (0.04, 0.3), 12.0, size=size) for size in (0.9 * LEAST_MOMENT, 1.1 * LEAST_MOMENT))
     force = Adequacy("Fz", (0.04, 0.3), 5.0, size=1.1 * LEAST_FORCE)
-    assert largest_z((small,)) == 0.0
-    assert largest_z((small, force)) == 5.0
-    assert largest_z((small, large)) == 12.0
-    assert verdict(0, largest_z((small,)), ()) == "nothing wrong"
-    assert verdict(1, largest_z((large,)), (QualityCheck("x", True, ""),)) == "unexplained"
+    assert [row.matters for row in (small, large, force)] == [False, True, True]
 
 
 @pytest.mark.parametrize(("channel", "zero"), [("Fz", 2.0), ("Mx", 1.0)])
 def test_the_mean_of_a_trial_must_matter_as_a_zero_of_the_plate_must(channel: str, zero: float) -> None:
     small, large = (Adequacy(channel, (0.0, 0.04), 7.0, size=size) for size in (0.9 * zero, 1.1 * zero))
-    assert largest_z((small,)) == 0.0
-    assert largest_z((small, large)) == 7.0
+    assert (small.matters, large.matters) == (False, True)
 
 
 def test_the_size_of_what_is_left_is_in_newton() -> None:
@@ -162,9 +112,7 @@ def test_the_size_of_what_is_left_is_in_newton() -> None:
     def beaten(wrench, session, moving):
         return wrench + 6.0 * np.sin(2 * np.pi * 1.5 * moving.time)[:, None] * (np.arange(6) == 0)
 
-    found, _ = build_model(
-        problem(body(), windows(1, hidden=beaten), chosen=("plate_offset",)), known(), ("plate_offset",)
-    )
-    row = next(one for one in adequacy(found) if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
+    found = inferred(body(), windows(1, hidden=beaten), tolerances=known(), effects=("plate_offset",)).diagnosis
+    row = next(one for one in found.adequacy if (one.channel, one.band_hz) == ("Fx", (1.0, 2.5)))
     assert row.size == pytest.approx(6.0 / np.sqrt(2), rel=0.15)
     assert row.unit == "N"

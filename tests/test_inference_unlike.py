@@ -1,16 +1,10 @@
 """No cause is quite like its model: what the model of a named one leaves is no further cause, and no strange body."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from diagnosed_sessions import body, known, windows
+from inferred_sessions import inferred
 
-from biodance.diagnosis.engine import diagnose_trials
-from biodance.diagnosis.joint_fit import settle
-from biodance.diagnosis.model import NamedCause, with_unlike_causes
-from biodance.diagnosis.naming import build_model
-from biodance.diagnosis.problem import problem
 from biodance.effects import Case, Effect, Parameter, effects
 from biodance.records import Array
 
@@ -39,7 +33,7 @@ def told(newton: float, late: float):
     """Return what is said of a cable of ``newton`` N that swings ``late`` rad behind its model."""
     some = windows(1, hidden=lambda wrench, session, moving: wrench + newton * shaken(moving.time, late))
     every = effects(("time_delay", "plate_offset", "plate_gain", "body_mass")) | {"cable": Cable()}
-    return diagnose_trials(body(), some, tolerances=known(), effects=every)
+    return inferred(body(), some, tolerances=known(), effects=every)
 
 
 def test_what_the_model_of_a_name_leaves_is_nothing() -> None:
@@ -51,42 +45,6 @@ def test_what_the_model_of_a_name_leaves_is_nothing() -> None:
 
 def test_a_model_that_is_plainly_wrong_is_no_finding() -> None:
     assert told(50.0, 0.6).diagnosis.verdict == "unexplained"
-
-
-def named(newton: float):
-    """Return a model in which a cable of ``newton`` N is named, and that without any cause."""
-    some = windows(1, hidden=lambda wrench, session, moving: wrench + newton * shaken(moving.time, 0.0))
-    every = effects(("plate_offset", "plate_gain")) | {"cable": Cable()}
-    bare, _ = build_model(problem(body(), some), known(), every)
-    return settle(bare, (NamedCause(Cable(), np.array([newton]), np.empty((0, 0))),)), bare, every
-
-
-def test_the_noise_grows_where_the_cause_is_and_goes_with_it() -> None:
-    found, bare, _ = named(50.0)
-    wide = with_unlike_causes(found, found.tolerances)
-    sd = np.sqrt(np.diagonal(wide.tolerances.noise, axis1=1, axis2=2))
-    before = np.sqrt(np.diagonal(bare.tolerances.noise, axis1=1, axis2=2))
-    grown = sd / before
-    assert grown[3, 1] > 3, "1 to 2.5 Hz, Fy"
-    np.testing.assert_allclose(np.delete(grown[3], [1, 3, 5]), 1.0, rtol=0.02)
-    np.testing.assert_allclose(grown[0], 1.0, err_msg="the mean of a trial hangs on no derivative")
-    again = with_unlike_causes(wide.without_causes(()), found.tolerances)
-    np.testing.assert_array_equal(again.tolerances.noise, bare.tolerances.noise)
-    np.testing.assert_allclose(again.posterior.mean, bare.posterior.mean, atol=1e-4)
-
-
-def test_a_small_cause_changes_nothing() -> None:
-    found, _, _ = named(0.5)
-    assert with_unlike_causes(found, found.tolerances) is found
-
-
-def test_a_model_under_another_noise_is_the_one_that_is_built_with_it() -> None:
-    _, bare, every = named(0.0)
-    by_band = np.linspace(1, 4, len(bare.tolerances.noise))
-    louder = replace(bare.tolerances, noise=bare.tolerances.noise * by_band[:, None, None])
-    built, _ = build_model(bare.problem, louder, every)
-    np.testing.assert_allclose(bare.under(louder).posterior.mean, built.posterior.mean, atol=1e-4)
-    assert bare.under(louder).log_likelihood == pytest.approx(built.log_likelihood, rel=1e-4)
 
 
 class Strap(Cable):
@@ -101,9 +59,8 @@ def test_a_cause_that_says_how_unlike_its_model_it_is_leaves_so_much() -> None:
     """0.6 rad late: of 50 N, 28 are left. Of a cause known to a half that is no other size in any band or trial."""
     some = windows(1, trials=2, hidden=lambda wrench, session, moving: wrench + 50.0 * shaken(moving.time, 0.6))
     every = effects(("time_delay", "plate_offset")) | {"cable": Strap()}
-    (one,) = diagnose_trials(body(), some, tolerances=known(), effects=every).diagnosis.findings
+    (one,) = inferred(body(), some, tolerances=known(), effects=every).diagnosis.findings
     assert one.effect == "cable"
-    assert not one.varies_with
 
 
 class Second(Cable):
@@ -142,6 +99,6 @@ def test_look_alikes_are_told_apart_by_more_than_a_model_leaves(second: Second, 
     """
     some = windows(1, hidden=lambda wrench, session, moving: wrench + 50.0 * shaken(moving.time, 0.0))
     every = effects(("plate_offset",)) | {"cable": Cable(), "second_cable": second}
-    (one,) = diagnose_trials(body(), some, tolerances=known(), effects=every).diagnosis.findings
+    (one,) = inferred(body(), some, tolerances=known(), effects=every).diagnosis.findings
     assert one.effect == "cable"
     assert ("second_cable" in {alias.effect for alias in one.set}) is alike

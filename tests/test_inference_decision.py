@@ -1,0 +1,141 @@
+"""What a session ends with: probabilities of places, sets that hold 95 %, sizes averaged over all sets of causes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_sessions import body, known, offset, windows
+from inferred_rows import Drawn, rows, search
+from inferred_sessions import heard, inferred
+from walking import MASS, Wrong, session, standing, walk
+
+from biodance.inference.causes import NamedCause
+from biodance.inference.decision import IN_SET, NAMED, SUGGESTED, places
+from biodance.inference.sets import Hypothesis, Posterior, hypothesis
+
+
+@pytest.fixture(scope="module")
+def bare() -> Hypothesis:
+    """Return rows without any cause."""
+    columns = {name: np.zeros((77, 1)) for name in "abcd"}
+    return hypothesis(search(rows(np.random.default_rng(1), causes=columns)), ())
+
+
+def holding(bare: Hypothesis, log_posterior: float, **sizes: tuple[float, float]) -> Hypothesis:
+    """Return a set of causes of known posterior, each with size and standard deviation."""
+    causes = tuple(NamedCause(Drawn(name), np.array([v]), np.array([[sd**2]])) for name, (v, sd) in sizes.items())
+    return replace(bare, causes=causes, log_posterior=log_posterior, log_unknown=-np.inf)
+
+
+def posterior(*every: Hypothesis) -> Posterior:
+    return Posterior(every, ())
+
+
+def logs(*shares: float) -> list[float]:
+    return np.log(shares).tolist()
+
+
+def test_a_place_is_as_probable_as_all_that_may_stand_in_it(bare: Hypothesis) -> None:
+    none, a, b = logs(0.1, 0.6, 0.3)
+    every = posterior(holding(bare, none), holding(bare, a, a=(1.0, 0.1)), holding(bare, b, b=(2.0, 0.1)))
+    (place,) = places(every, {})
+    assert place.cause.effect.target == "a"
+    assert place.probability == pytest.approx(0.9)
+    assert [share for _, share, _ in place.shares] == pytest.approx([2 / 3, 1 / 3])
+
+
+@pytest.mark.parametrize(
+    ("shares", "kept"), [((0.96, 0.03, 0.01), "a"), ((0.6, 0.36, 0.04), "ab"), ((0.5, 0.44, 0.06), "abc")]
+)
+def test_a_set_is_the_smallest_with_95_percent_of_its_place(
+    bare: Hypothesis, shares: tuple[float, ...], kept: str
+) -> None:
+    sets = [holding(bare, value, **{name: (1.0, 0.1)}) for name, value in zip("abc", logs(*shares), strict=True)]
+    (place,) = places(posterior(holding(bare, -20.0), *sets), {})
+    assert "".join(alias.target for alias in place.set) == kept
+    assert sum(share for (_, target), share, _ in place.shares if target in kept) >= IN_SET
+
+
+def test_the_evidence_of_a_look_alike_is_without_its_prior(bare: Hypothesis) -> None:
+    every = posterior(holding(bare, -8.0), holding(bare, -2.0, a=(1.0, 0.1)))
+    (place,) = places(every, {("drawn", "a"): -3.0})
+    assert place.set[0].log_bayes_factor == pytest.approx(9.0)
+
+
+def test_a_size_is_averaged_over_all_sets_that_hold_the_cause(bare: Hypothesis) -> None:
+    """Mixture of 75 % at 2 ± 0.1 and 25 % at 4 ± 0.2: mean 2.5, variance 0.75 (0.01 + 0.25) + 0.25 (0.04 + 2.25)."""
+    none, one, two = logs(0.2, 0.6, 0.2)
+    every = posterior(
+        holding(bare, none), holding(bare, one, a=(2.0, 0.1)), holding(bare, two, a=(4.0, 0.2), b=(1.0, 0.1))
+    )
+    (place,) = places(every, {})
+    assert place.cause.theta[0] == pytest.approx(2.5)
+    assert place.cause.covariance[0, 0] == pytest.approx(0.7675)
+
+
+def test_a_second_cause_has_its_own_place(bare: Hypothesis) -> None:
+    none, a, b, ab = logs(0.02, 0.3, 0.08, 0.6)
+    sizes = {"a": (1.0, 0.1), "b": (1.0, 0.1)}
+    every = posterior(
+        holding(bare, none),
+        *(holding(bare, value, **{name: sizes[name]}) for name, value in (("a", a), ("b", b))),
+        holding(bare, ab, **sizes),
+    )
+    found = {place.cause.effect.target: place.probability for place in places(every, {})}
+    assert found == pytest.approx({"a": 0.6 / 0.68, "b": 0.6 / 0.9})
+
+
+FAST = ("plate_gain", "plate_offset", "time_delay", "body_mass")
+
+
+@pytest.mark.parametrize("size", [2.5, 3.5, 6.0])
+def test_what_is_told_goes_by_the_probability(size: float) -> None:
+    one = inferred(body(), windows(1, trials=2, hidden=offset(size)), tolerances=known(), effects=FAST)
+    told = one.diagnosis
+    assert all(finding.probability >= NAMED for finding in told.findings)
+    assert all(SUGGESTED <= like.probability < NAMED for like in told.resembles)
+    assert len(one.named) == len(told.findings)
+    for finding, cause in zip(told.findings, one.named, strict=True):
+        assert (finding.effect, finding.target) == (cause.effect.name, cause.effect.target)
+
+
+def test_no_size_is_surer_than_plates_as_installed_are_alike() -> None:
+    """Zeros of laboratories without fault differ by 0.3 N, which no long recording makes less."""
+    one = inferred(body(), windows(1, trials=2, hidden=offset(12.0)), tolerances=known(), effects=FAST)
+    (finding,) = one.diagnosis.findings
+    assert finding.parameters[0].sd >= 0.3
+
+
+def test_without_a_finding_its_size_goes_and_the_others_are_fitted_again() -> None:
+    hidden = offset(12.0)
+
+    def both(wrench, moving, motion):
+        return 1.06 * hidden(wrench, moving, motion)
+
+    one = inferred(body(), windows(1, trials=2, hidden=both), tolerances=known(), effects=FAST)
+    assert len(one.named) == 2
+    less = one.without(1)
+    (kept,), (gone,) = less.diagnosis.findings, less.diagnosis.resembles
+    assert (kept, gone) == one.diagnosis.findings
+    assert len(less.named) == 1
+    assert less.named[0].effect == one.named[0].effect
+
+
+def test_one_foot_on_one_plate_cannot_tell_a_moved_plate_from_a_moved_marker() -> None:
+    """Where the moved plate is not sure, the markers of that foot stand beside it."""
+    unsure = 0
+    for shift in (0.022, 0.024, 0.026, 0.03, 0.04):
+        wrong = Wrong(moved=(0.0, shift))
+        trials = (walk(wrong, name=name) for name in ("walk", "again"))
+        for finding in heard(session(*trials)).diagnosis.findings:
+            alike = {alias.effect for alias in finding.set}
+            if finding.effect == "plate_position":
+                assert ("toe_landmark" in alike) == (finding.probability < IN_SET)
+                unsure += finding.probability < IN_SET
+    assert unsure
+
+
+def test_who_is_heavier_than_declared_may_carry_a_load_where_only_weights_are_seen() -> None:
+    weighed = standing(weight=1.05 * MASS)
+    (one,) = heard(session(weighed, replace(weighed, name="later"))).diagnosis.findings
+    assert ("added_mass", "") in {(alias.effect, alias.target) for alias in one.set}

@@ -1,0 +1,167 @@
+"""The scales of a session and its log evidence: against dense Gaussian densities, finite differences and draws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from inferred_rows import covariance, log_prior, rows, with_target
+from scipy.stats import multivariate_normal
+from scipy.stats import t as student
+
+from biodance.inference.scales import (
+    FLESH,
+    FLOOR,
+    SPREAD,
+    TAIL,
+    TOLERANCE,
+    Scales,
+    _moved,
+    fit,
+    nominal,
+    posterior,
+    prior_sd,
+    products,
+    widened,
+)
+
+SCALES = (
+    Scales(np.zeros(3), 0.0, np.zeros(0)),
+    Scales(np.array([0.4, -0.2, 0.9]), 0.0, np.zeros(0)),
+    Scales(np.array([0.1, 0.7, -0.3]), 0.6, np.zeros(0)),
+)
+
+
+def inner(drawn):
+    return products(drawn, drawn.X, drawn.y, drawn.group)
+
+
+def density(drawn, scales, *more):
+    """Return the log density of the target, with the priors of the scales."""
+    zero = np.zeros(len(drawn.y))
+    return multivariate_normal(zero, covariance(drawn, scales, *more)).logpdf(drawn.y) + log_prior(drawn, scales)
+
+
+@pytest.mark.parametrize("scales", SCALES)
+def test_the_log_evidence_is_the_density_of_the_target(scales: Scales) -> None:
+    """Up to the constant of so many standard normal rows."""
+    drawn = rows(np.random.default_rng(1), observations=0)
+    constant = -0.5 * len(drawn.y) * np.log(2 * np.pi)
+    found = posterior(inner(drawn), prior_sd(drawn), scales).log_evidence
+    assert found == pytest.approx(density(drawn, scales) - constant, rel=1e-10)
+
+
+def test_columns_of_a_cause_widen_the_density() -> None:
+    rng = np.random.default_rng(2)
+    drawn, scales = rows(rng, observations=0), SCALES[2]
+    Z, constant = rng.normal(size=(len(drawn.y), 2)), -0.5 * len(drawn.y) * np.log(2 * np.pi)
+    found = posterior(widened(inner(drawn), drawn, drawn.X, Z, drawn.y), prior_sd(drawn), scales)
+    assert found.log_evidence == pytest.approx(density(drawn, scales, Z) - constant, rel=1e-10)
+    C = covariance(drawn, scales)
+    known = Z.T @ np.linalg.solve(C, Z) + np.eye(2)
+    mean, spread = found.last(2)
+    np.testing.assert_allclose(spread, np.linalg.inv(known), rtol=1e-9)
+    np.testing.assert_allclose(mean, spread @ Z.T @ np.linalg.solve(C, drawn.y), rtol=1e-9)
+
+
+def test_widened_products_are_those_of_all_columns_at_once() -> None:
+    rng = np.random.default_rng(3)
+    drawn = rows(rng)
+    Z, y = rng.normal(size=(len(drawn.y), 3)), rng.normal(size=len(drawn.y))
+    wide = widened(inner(drawn), drawn, drawn.X, Z, y)
+    both = products(drawn, np.concatenate([drawn.X, Z], axis=1), y, wide.group)
+    for name in ("plates", "markers", "observed"):
+        np.testing.assert_allclose(getattr(wide, name), getattr(both, name), atol=1e-12)
+    np.testing.assert_array_equal(wide.group, [*drawn.group, -1, -1, -1])
+
+
+def test_observations_have_student_s_errors_and_their_weights_the_curvature() -> None:
+    """Laplace's approximation over all coefficients, at the mean that weighted least squares gives."""
+    drawn = rows(np.random.default_rng(4))
+    at = Scales(np.array([0.2, 0.0, -0.1]), 0.3, np.array([1.0, 0.5, 0.2, 0.9, 1.1]))
+    found = posterior(inner(drawn), prior_sd(drawn), at)
+    X = drawn.X * np.exp(at.groups)[drawn.group]
+    C = covariance(drawn, at)
+    u = X.T @ np.linalg.solve(C, drawn.y)
+    np.testing.assert_allclose(found.u, u, rtol=1e-9)
+    left = drawn.y - X @ u
+    n, r = drawn.plates, drawn.simulated
+    normal = -0.5 * np.sum(left[:n] ** 2) * np.exp(-2 * at.noise) - 0.5 * np.sum(left[n:r] ** 2) - 0.5 * u @ u
+    constant = student(TAIL).logpdf(0.0)
+    tails = np.sum(student(TAIL).logpdf(left[r:]) - constant)
+    weight = np.concatenate([np.full(n, np.exp(-2 * at.noise)), np.ones(r - n), at.weights])
+    curvature = -0.5 * np.linalg.slogdet(np.eye(u.size) + X.T @ (weight[:, None] * X))[1] - n * at.noise
+    assert found.log_evidence == pytest.approx(normal + tails + curvature + log_prior(drawn, at), rel=1e-10)
+
+
+def test_scales_move_along_the_slope_of_the_evidence_by_fisher_s_information() -> None:
+    """A step is slope over information; the slope by finite differences of the dense density."""
+    drawn, at = rows(np.random.default_rng(5), observations=0), SCALES[1]
+    found, sd, step = posterior(inner(drawn), prior_sd(drawn), at), prior_sd(drawn), 1e-4
+    known = found.curvature(3)
+    _, moved = _moved(found, sd, known)
+    for g in range(3):
+        there = [replace(at, groups=at.groups + way * step * np.eye(3)[g]) for way in (1, -1)]
+        slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
+        expected = np.clip(slope / (known.known[g] + 1 / sd[g] ** 2), -0.7, 0.7)
+        assert moved.groups[g] == pytest.approx(max(at.groups[g] + expected, FLOOR), abs=1e-5)
+    there = [replace(at, noise=at.noise + way * step) for way in (1, -1)]
+    slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
+    assert (moved.noise > at.noise) == (slope > 0)
+
+
+def test_the_information_on_a_scale_is_that_of_many_draws() -> None:
+    """Its inverse is the variance of the most probable logarithm: the variance of the slope, over bodies drawn."""
+    rng = np.random.default_rng(6)
+    drawn, at, slopes = rows(rng, observations=0, width=8), SCALES[0], []
+    root = np.linalg.cholesky(covariance(drawn, at))
+    for _ in range(1500):
+        one = posterior(inner(with_target(drawn, root @ rng.normal(size=len(drawn.y)))), prior_sd(drawn), at)
+        own = np.bincount(drawn.group, weights=one.u**2)
+        slopes.append(own + one.curvature(3).shares - np.bincount(drawn.group))
+    np.testing.assert_allclose(np.mean(slopes, axis=0), 0.0, atol=0.35)
+    np.testing.assert_allclose(np.var(slopes, axis=0), posterior(inner(drawn), prior_sd(drawn), at).curvature(3).known,
+                               rtol=0.15)  # fmt: skip
+
+
+def test_scales_that_were_drawn_are_found() -> None:
+    """Sizes and noise up to 1.6 times the nominal ones: in the mean over sessions, but for what their priors take."""
+    truth, noise, found = np.array([0.25, 0.5, 0.3]), 0.47, []
+    for seed in range(25):
+        rng = np.random.default_rng(100 + seed)
+        drawn = rows(rng, plates=600, observations=0, width=40)
+        root = np.linalg.cholesky(covariance(drawn, Scales(truth, noise, np.zeros(0))))
+        drawn = with_target(drawn, root @ rng.normal(size=len(drawn.y)))
+        one = fit(inner(drawn), prior_sd(drawn), nominal(drawn)).scales
+        found.append([*one.groups, one.noise])
+    np.testing.assert_allclose(np.mean(found, axis=0), [*truth, noise], atol=0.08)
+
+
+def test_soft_tissue_may_be_farther_from_usual_than_body_and_plates() -> None:
+    drawn = rows(np.random.default_rng(7))
+    np.testing.assert_array_equal(prior_sd(drawn), [SPREAD, FLESH, TOLERANCE])
+    assert max(SPREAD, TOLERANCE) < FLESH
+
+
+@pytest.mark.parametrize("loud", [0.0, 0.3])
+def test_no_session_is_quieter_than_what_was_learned_or_than_asked(loud: float) -> None:
+    drawn = rows(np.random.default_rng(8), plates=300)
+    silent = with_target(drawn, 0.1 * drawn.y)
+    one = fit(inner(silent), prior_sd(silent), nominal(silent), least=loud)
+    assert one.scales.noise == loud
+    assert one.scales.groups.min() >= FLOOR
+
+
+def test_one_outlier_among_observations_moves_nothing_and_stays_one() -> None:
+    """Five observations of one number, of which the last is 25 standard deviations off."""
+    drawn = rows(np.random.default_rng(9), plates=0, markers=0, observations=5, width=1)
+    X = np.zeros_like(drawn.X)
+    X[:, 2] = 3.0
+    value = np.array([1.1, 0.9, 1.0, 1.2, 26.0])
+    alone = replace(drawn, X=X, y=value)
+    one = fit(inner(alone), prior_sd(alone), nominal(alone))
+    told = 3.0 * one.coefficients[2]
+    assert told == pytest.approx(1.05, abs=0.2)
+    assert one.scales.weights[-1] < 0.02
+    assert one.scales.weights[:-1].min() > 1.0
+    normal = 3.0 * (X[:, 2] @ value) / (1 + X[:, 2] @ X[:, 2])
+    assert normal > 5.0, "which least squares would say"
