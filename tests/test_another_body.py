@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import pytest
+from biodance.pipeline.another_body import beside_another_body
 from diagnosed_sessions import about_plate, body, known, windows
 from inferred_sessions import inferred
 
 from biodance.body.body import Body
 from biodance.diagnosis.diagnosis import Verdict
 from biodance.inference.decision import Inferred
-from biodance.pipeline.another_body import beside_another_body
 
 
 def gained(local, session):

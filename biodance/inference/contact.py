@@ -16,8 +16,8 @@ from biodance.effects import NamedCause, Transient
 from biodance.inference.causes import cause_key
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
-from biodance.inference.scales import fit, posterior, prior_sd, widened
-from biodance.inference.sets import Search
+from biodance.inference.scales import fit, posterior, prior_sd, products, widened
+from biodance.inference.sets import Search, unlike_models
 from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)
@@ -139,10 +139,17 @@ def _named(search: Search, base: Hypothesis, one: _Touch, values: Array, kinds: 
     """
     rows, effect, Z = search.rows, *_placed(search, base, one)
     own = np.concatenate([base.Z, one.size * Z], axis=1)
-    sd, plain = prior_sd(rows), np.ones(len(rows.y))
-    found = fit(widened(search.inner, rows, rows.X, own, base.y), sd, base.fit.scales, least=search.least)
+    sd, surety, found = prior_sd(rows), base.surety, base.fit
+    for _ in range(_STEPS):  # a touch is unlike its model, too: what it leaves is noise
+        X = surety[:, None] * rows.X
+        inner = products(rows, X, surety * base.y, rows.group)
+        both = widened(inner, rows, X, surety[:, None] * own, surety * base.y)
+        found = fit(both, sd, found.scales, least=search.least)
+        touched = one.size * Z @ found.last(Z.shape[1])[0]
+        old, surety = surety, base.surety * unlike_models(rows, (one.effect,), (touched,))
+    surety = old
     wide = np.concatenate([base.Z, SIZES[-1] * Z], axis=1)  # the most probable size would shrink short peaks
-    open_ = posterior(widened(search.inner, rows, rows.X, wide, base.y), sd, found.scales)
+    open_ = posterior(widened(inner, rows, X, surety[:, None] * wide, surety * base.y), sd, found.scales)
     course, count = SIZES[-1] * open_.last(Z.shape[1])[0], len(effect.parameters)
     square = np.sum(values**2, axis=1)
     order = np.argsort(square)
@@ -151,9 +158,9 @@ def _named(search: Search, base: Hypothesis, one: _Touch, values: Array, kinds: 
     touch = NamedCause(effect, values[k], np.diag(spread), _by_trial(rows, effect, course))
     prior = effect.prior / kinds / len(SIZES)
     before = base.log_posterior - base.fit.log_evidence  # prior of the causes beside it
-    value = found.log_evidence + before + float(np.log(prior / (1 - prior)))
+    value = found.log_evidence + float(np.log(surety / base.surety).sum()) + before + float(np.log(prior / (1 - prior)))
     causes = (*(c for c in base.causes if cause_key(c) != cause_key(touch)), touch)
-    return Hypothesis(causes, rows, replace(found, products=search.inner), value, own, base.y, plain)
+    return Hypothesis(causes, rows, replace(found, products=search.inner), value, own, base.y, surety)
 
 
 def _by_trial(rows: Rows, effect: Transient, course: Array) -> dict[str, Array]:

@@ -170,7 +170,7 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
     at, p = start or search.start.scales, u0.size
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
-        surety = _surety(rows, causes, taken)
+        surety = unlike_models(rows, tuple(one.effect for one in causes), taken)
         Z = np.concatenate(
             [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes], axis=1
         )
@@ -208,15 +208,15 @@ def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCau
     return tuple(out)
 
 
-def _surety(rows: Rows, causes: Sequence[NamedCause], taken: Sequence[Array]) -> Array:
+def unlike_models(rows: Rows, effects: Sequence[Effect], taken: Sequence[Array]) -> Array:
     """Return (r,) by which rows are scaled because no cause is quite like its model: it leaves the share `unlike` of
     what it adds to a band and channel (``taken`` (r,) of each), as noise beside the session's.
     """
     n, extra = rows.plates, np.zeros(rows.plates)
     count = np.maximum(np.bincount(rows.block[:n]), 1)
-    for one, added in zip(causes, taken, strict=True):
+    for one, added in zip(effects, taken, strict=True):
         square = np.bincount(rows.block[:n], weights=added[:n] ** 2) / count
-        extra += unlike(one.effect) ** 2 * square[rows.block[:n]]
+        extra += unlike(one) ** 2 * square[rows.block[:n]]
     extra[rows.block[:n] < len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
     return np.concatenate([1 / np.sqrt(1 + np.where(extra > _FELT, extra, 0.0)), np.ones(len(rows.y) - n)])
 
