@@ -11,9 +11,8 @@ from inferred_sessions import inferred
 
 from biodance.diagnosis.accept import case_fit
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.effects import effect
+from biodance.effects import NamedCause, effect
 from biodance.identification.identification import identify_body
-from biodance.inference.causes import NamedCause
 from biodance.inference.decision import Inferred
 from biodance.pipeline import gains
 from biodance.pipeline.judged_trials import cases_of

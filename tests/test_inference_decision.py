@@ -9,9 +9,10 @@ from inferred_rows import Drawn, rows, search
 from inferred_sessions import heard, inferred
 from walking import MASS, Wrong, session, standing, walk
 
-from biodance.inference.causes import NamedCause
+from biodance.effects import NamedCause
 from biodance.inference.decision import IN_SET, NAMED, SUGGESTED, places
-from biodance.inference.sets import Hypothesis, Posterior, hypothesis
+from biodance.inference.hypotheses import Hypothesis, Posterior
+from biodance.inference.sets import hypothesis
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,7 @@ from inferred_sessions import inferred
 from scipy.signal import butter, sosfiltfilt
 
 from biodance.diagnosis.consequence import matters
-from biodance.effects import effects
-from biodance.inference.causes import NamedCause
+from biodance.effects import NamedCause, effects
 from biodance.inference.decision import _told
 
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")

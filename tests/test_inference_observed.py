@@ -8,8 +8,7 @@ from inferred_sessions import heard, heard_in
 from walking import MASS, STANCE, Wrong, session, standing, walk
 
 from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence, undo_causes
-from biodance.effects import effects
-from biodance.inference.causes import NamedCause
+from biodance.effects import NamedCause, effects
 from biodance.inference.rows import observed_causes, rows_of
 from biodance.inference.sets import Search, hypothesis
 from biodance.observations import observe, recording

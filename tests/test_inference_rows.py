@@ -14,8 +14,7 @@ from scipy.stats import multivariate_normal
 from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.effects import effects
-from biodance.inference.causes import NamedCause
+from biodance.effects import NamedCause, effects
 from biodance.inference.rows import BODY, TOLERATED, rows_of
 from biodance.inference.scales import nominal, posterior, prior_sd, products
 from biodance.inference.sets import Search, hypothesis

@@ -74,6 +74,7 @@ class Posterior:
     hypotheses: tuple[Hypothesis, ...]
     screened: tuple[Scored, ...]
     known_unknown: float = 0.0
+    before: Hypothesis | None = None
 
     @property
     def unknown(self) -> float:
