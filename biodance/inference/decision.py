@@ -143,9 +143,9 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     named = [(p, f) for p, f in every if p.probability >= NAMED and _told(rows, p.cause)]
     resembled = [f for p, f in every if SUGGESTED <= p.probability < NAMED and _told(rows, p.cause)]
     small = [f for p, f in every if p.probability >= SUGGESTED and not _told(rows, p.cause)]
-    left = adequacy(best, rows) if rows.problem is not None else ()
-    unknown = posterior.unknown >= UNKNOWN and any(row.matters and row.z > 0 for row in left)
-    why = dict(bare.why) | dict.fromkeys(_strange(best, rows) if unknown or named else (), ())
+    left = adequacy(posterior.unexplained, rows) if rows.problem is not None else ()
+    unknown = posterior.unknown >= UNKNOWN and any(row.matters for row in left)
+    why = dict(bare.why) | dict.fromkeys(_strange(posterior.unexplained, rows) if unknown or named else (), ())
     why |= {Reason.FORCES_LEFT: ()} if unknown else {}
     verdict: Verdict = "unexplained" if unknown else "nothing wrong"
     if named:

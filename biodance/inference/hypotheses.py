@@ -69,7 +69,9 @@ class Scored:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone."""
+    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone. Where an unknown cause was
+    more probable than none (``known_unknown``), they are at its noise, and ``before`` is the most probable one without.
+    """
 
     hypotheses: tuple[Hypothesis, ...]
     screened: tuple[Scored, ...]
@@ -91,6 +93,11 @@ class Posterior:
     def best(self) -> Hypothesis:
         """The most probable hypothesis."""
         return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
+
+    @property
+    def unexplained(self) -> Hypothesis:
+        """The hypothesis beside which more may be left than laboratories leave."""
+        return self.before or self.best
 
     def probabilities(self) -> dict[tuple[str, str], float]:
         """Return the probability of every cause."""

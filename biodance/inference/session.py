@@ -160,7 +160,7 @@ def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosi
     rows = rows_of(seen.problem, seen.causes, known, None)
     bare = with_unknown(hypothesis(Search.of(rows, ()), ()))
     left = adequacy(bare, rows)
-    if not (bare.log_unknown > bare.log_posterior and any(row.matters and row.z > 0 for row in left)):
+    if not (bare.log_unknown > bare.log_posterior and any(row.matters for row in left)):
         return replace(one, adequacy=left)
     verdict: Verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
     unknown = float(1 / (1 + np.exp(bare.log_posterior - bare.log_unknown)))

@@ -113,7 +113,7 @@ def infer(search: Search, further: Further = lambda _search, _base: ()) -> Poste
         square, count = energies(best)
         louder = best.fit.scales.noise + 0.5 * float(np.log(square[count > 0].max()))
         search = replace(search, least=louder)
-        found = replace(_searched(search), known_unknown=found.unknown)
+        found = replace(_searched(search), known_unknown=found.unknown, before=best)
     return found
 
 
