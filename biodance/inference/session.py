@@ -20,7 +20,7 @@ from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.left import adequacy
 from biodance.inference.rows import Rows, observed_causes, rows_of
 from biodance.inference.scales import fit, nominal, prior_sd, products
-from biodance.inference.sets import Hypothesis, Posterior, Search, hypothesis, infer
+from biodance.inference.sets import Posterior, Search, hypothesis, infer
 from biodance.inference.unknown import with_unknown
 from biodance.records import Array, Sip
 from biodance.threads import one_thread

@@ -8,8 +8,9 @@ from biodance.diagnosis.reasons import Reason
 
 
 def unmodelled_joints(body: Body, joints: tuple[str, ...]) -> dict[Reason, tuple[str, ...]]:
-    """Return why what a simulation of ``body`` leaves may be the body's own: joints that no marker shows, or ``joints`` that
-    it moves at beside the usual ones, for which nobody has learned what is usual; empty where it moves as usual.
+    """Return why what a simulation of ``body`` leaves may be the body's own: joints that no marker shows, or
+    ``joints`` that it moves at beside the usual ones, for which nobody has learned what is usual; empty where it moves
+    as usual.
     """
     hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
     if hidden:
