@@ -16,11 +16,11 @@ from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import Inferred, decide
-from biodance.inference.hypotheses import Hypothesis
+from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import Rows, observed_causes, rows_of
 from biodance.inference.scales import fit, nominal, prior_sd, products
-from biodance.inference.sets import Posterior, Search, hypothesis, infer
+from biodance.inference.sets import Search, hypothesis, infer
 from biodance.inference.unknown import with_unknown
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
