@@ -31,7 +31,6 @@ ELSEWHERE = {
     "body/human/scaling.py:TILT": "deg, a warning's threshold",
     "body/human/limits.py:HAND_TURN": "a joint's range",
     "virtual_lab/recording/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
-    "virtual_lab/faults/forces.py:FLESH_MODES": "springs",
     "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
     "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
     "body/robot/prior.py:_COM_SD": "robots",

@@ -137,7 +137,7 @@ class Spring:
     free: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
-FLESH_MODES = {"trunk_head": Spring(5.5, 0.3)}
+_FLESH = {"trunk_head": Spring(5.5, 0.3)}
 """Viscera; other flesh hangs on `MUSCLE`."""
 MUSCLE = Spring(9.0, 0.3)
 LIQUID = Spring(1.3, 0.08, (1.0, 1.0, 0.0))
@@ -179,7 +179,7 @@ def loose(segment: str, place: Array, mass: float, spring: Spring) -> AppliedFor
 def wobbling_mass(person: Person, target: str, mass: float) -> AppliedForce:
     """Return the force of ``mass`` kg of the flesh of one of the 12 segments that is not fixed to its bone."""
     segment = _carrier(target)
-    return loose(segment, person.body.sip.com[TRUE_SEGMENTS.index(segment)], mass, FLESH_MODES.get(target, MUSCLE))
+    return loose(segment, person.body.sip.com[TRUE_SEGMENTS.index(segment)], mass, _FLESH.get(target, MUSCLE))
 
 
 def sloshing_load(person: Person, target: str, mass: float, sloshing: float) -> tuple[AddedLoad, AppliedForce]:
