@@ -11,21 +11,11 @@ from scipy.stats import multivariate_normal, norm
 
 from biodance.diagnosis.candidates import SCALE
 from biodance.inference.causes import UNLIKE, NamedCause
+from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.scales import FLOOR, Scales, nominal, posterior, prior_sd
 from biodance.inference.scales import LOUD as LOUDNESS
-from biodance.inference.sets import (
-    EXCESS,
-    OWN,
-    P_UNKNOWN,
-    UNKNOWN,
-    Hypothesis,
-    Posterior,
-    energies,
-    hypothesis,
-    infer,
-    screen,
-    with_unknown,
-)
+from biodance.inference.sets import hypothesis, infer, screen
+from biodance.inference.unknown import EXCESS, OWN, P_UNKNOWN, UNKNOWN, energies, with_unknown
 
 
 class Likely(Drawn):
