@@ -18,7 +18,7 @@ import biodance
 from benchmarks.plates import Step, draw
 from biodance.batch.outcome import Outcome
 from biodance.batch.summary import write_summary
-from biodance.batch.work import rows_of
+from biodance.batch.work import trial_rows
 from biodance.cli import run
 from biodance.cli.app import NOT_DONE
 from biodance.dance.problem.plan import read_plan
@@ -89,7 +89,7 @@ def _of_a_dance(folder: Path) -> dict[str, Path]:
 
 def _of_archives(folder: Path) -> dict[str, Path]:
     """Return the pages of nine sessions, one of which weighs more, with a refused one, and of plates that moved."""
-    rows = rows_of(json.loads((folder / "report" / "results.json").read_text(encoding="utf-8")))
+    rows = trial_rows(json.loads((folder / "report" / "results.json").read_text(encoding="utf-8")))
     away = [{"mass_difference_percent": 20.0 if k == 4 else 0.1 * k} for k in range(9)]
     sessions = [Outcome(f"s{k}", "0", "done", "", tuple(row | one for row in rows)) for k, one in enumerate(away)]
     lost = Outcome(
