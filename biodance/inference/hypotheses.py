@@ -69,8 +69,8 @@ class Scored:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone. Where an unknown cause was
-    more probable than none (``known_unknown``), they are at its noise, and ``before`` is the most probable one without.
+    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone. Where an unknown cause
+    was more probable than none (``known_unknown``), they are at its noise, and ``before`` is the best one without.
     """
 
     hypotheses: tuple[Hypothesis, ...]
