@@ -16,8 +16,8 @@ from biodance.effects import NamedCause, Transient
 from biodance.inference.causes import cause_key
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
-from biodance.inference.scales import Scales, fit, posterior, prior_sd, products, widened
-from biodance.inference.sets import Search, unlike_models
+from biodance.inference.scales import fit, posterior, prior_sd, products, widened
+from biodance.inference.sets import Search, at_scales, unlike_models
 from biodance.records import Array
 
 SIZES = (2.0, 8.0, 30.0)
@@ -70,20 +70,10 @@ def with_contacts(search: Search, base: Hypothesis, kinds: Sequence[Transient]) 
     if best is None or best[0].log_bayes_factor <= 0:
         return ()
     loud = _named(search, base, *best, len(kinds))
-    quiet = _at_scales(search, base, loud.fit.scales)  # beside the contact the session is not as loud as without
+    quiet = at_scales(search, base, loud.fit.scales)  # beside the contact the session is not as loud as without
     again = _touch_of(search, quiet, best[0].effect)
     values = None if again is None else _touching(search.rows, again)
     return (loud,) if again is None or values is None else (_named(search, quiet, again, values, len(kinds)),)
-
-
-def _at_scales(search: Search, base: Hypothesis, scales: Scales) -> Hypothesis:
-    """Return a hypothesis under other scales."""
-    rows, surety = search.rows, base.surety
-    X, y = surety[:, None] * rows.X, surety * base.y
-    inner = widened(products(rows, X, y, rows.group), rows, X, surety[:, None] * base.Z, y)
-    found = posterior(inner, prior_sd(rows), scales)
-    value = base.log_posterior - base.fit.log_evidence + found.log_evidence
-    return replace(base, fit=replace(found, products=search.inner), log_posterior=value)
 
 
 def _columns(rows: Rows, effect: Transient) -> Array | None:

@@ -100,22 +100,30 @@ class Inferred:
 
 
 def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
-    """Return every cause of the most probable set, with what may stand in its place."""
+    """Return every cause of the most probable set, with what may stand in its place; where one of several is not sure
+    beside the others, of the most probable set without it.
+    """
     best = posterior.best
+    while True:
+        found = tuple(_place(posterior, best, cause, prior) for cause in best.causes)
+        unsure = min(found, key=lambda one: one.probability, default=None)
+        if unsure is None or len(found) == 1 or unsure.probability >= NAMED:
+            return found
+        rest = best.names - {cause_key(unsure.cause)}
+        best = next((one for one in posterior.hypotheses if one.names == rest), best)
+        if best.names != rest:
+            return found
+
+
+def _place(posterior: Posterior, best: Hypothesis, cause: NamedCause, prior: Mapping[Key, float]) -> Place:
+    """Return one cause of a set, with what may stand in its place beside the others."""
     total = {one.names: float(np.logaddexp(one.log_posterior, one.log_unknown)) for one in posterior.hypotheses}
-    out = []
-    for cause in best.causes:
-        rest = best.names - {cause_key(cause)}
-        here = {
-            next(iter(names - rest)): v for names, v in total.items() if len(names) == len(best.names) and rest < names
-        }
-        none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
-        shares = sorted(
-            ((name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()),
-            key=lambda one: -one[1],
-        )
-        out.append(Place(_averaged(posterior, cause), float(1 / (1 + np.exp(none - some))), tuple(shares)))
-    return tuple(out)
+    rest, wide = best.names - {cause_key(cause)}, len(best.names)
+    here = {next(iter(names - rest)): v for names, v in total.items() if len(names) == wide and rest < names}
+    none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
+    shares = [(name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()]
+    probability = float(1 / (1 + np.exp(none - some)))
+    return Place(_averaged(posterior, cause), probability, tuple(sorted(shares, key=lambda one: -one[1])))
 
 
 def _averaged(posterior: Posterior, cause: NamedCause) -> NamedCause:

@@ -19,8 +19,19 @@ from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key, unlike
 from biodance.inference.hypotheses import Hypothesis, Posterior, Scored
-from biodance.inference.rows import Rows
-from biodance.inference.scales import TAIL, Products, ScaledFit, Scales, fit, nominal, prior_sd, products, widened
+from biodance.inference.rows import TOLERATED, Rows
+from biodance.inference.scales import (
+    TAIL,
+    Products,
+    ScaledFit,
+    Scales,
+    fit,
+    nominal,
+    posterior,
+    prior_sd,
+    products,
+    widened,
+)
 from biodance.inference.unknown import UNKNOWN, energies, with_unknown
 from biodance.records import CHANNELS, Array
 
@@ -29,6 +40,8 @@ _ROUNDS, _STEPS, _SETTLED = 4, 3, 0.02
 _AGAIN = 1
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
+_GROWN = 0.1
+"""Logarithm of the scale from which tolerances are larger than anywhere."""
 _FELT = 0.05
 """Share of the noise below which what a cause is unlike its model is none."""
 
@@ -162,33 +175,42 @@ def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
 
 
 def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | None = None) -> Hypothesis:
-    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes."""
-    rows, plain = search.rows, np.ones(len(search.rows.y))
+    """Return a set of causes at its most probable sizes and scales: each cause exactly as its model, or unlike it by
+    its share (`unlike`), whichever is more probable.
+    """
+    rows = search.rows
     if not causes:
-        return Hypothesis((), rows, search.start, search.start.log_evidence, np.empty((len(rows.y), 0)), rows.y, plain)
-    u0 = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
-    at, p = start or search.start.scales, u0.size
+        Z, plain = np.empty((len(rows.y), 0)), np.ones(len(rows.y))
+        return Hypothesis((), rows, search.start, search.start.log_evidence, Z, rows.y, plain)
+    exact = _settled(search, causes, start or search.start.scales, share=0.0)
+    taken = [rows.added(one.effect, one.theta) for one in exact.causes]
+    if (unlike_models(rows, tuple(one.effect for one in causes), taken) == 1).all():
+        return exact
+    unlike_them = _settled(search, exact.causes, exact.fit.scales, share=1.0)
+    return max(exact, unlike_them, key=lambda one: one.log_posterior)
+
+
+def _settled(search: Search, causes: tuple[NamedCause, ...], at: Scales, *, share: float) -> Hypothesis:
+    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes; ``share`` of
+    what each may be unlike its model is noise.
+    """
+    rows, u0 = search.rows, np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
+    effects = tuple(one.effect for one in causes)
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
-        surety = unlike_models(rows, tuple(one.effect for one in causes), taken)
-        Z = np.concatenate(
-            [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes], axis=1
-        )
+        surety = unlike_models(rows, effects, [share * one for one in taken])
+        slopes = [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes]
+        Z = np.concatenate(slopes, axis=1)
         y = rows.y - np.sum(taken, axis=0) + Z @ u0
         inner, X = search.inner, rows.X
         if (surety < 1).any():
             X = surety[:, None] * rows.X
             inner = products(rows, X, y, rows.group)
-        found = fit(
-            widened(inner, rows, X, surety[:, None] * Z, surety * y),
-            prior_sd(rows),
-            at,
-            steps=_STEPS,
-            least=search.least,
-        )
+        both = widened(inner, rows, X, surety[:, None] * Z, surety * y)
+        found = fit(both, prior_sd(rows), at, steps=_STEPS, least=search.least)
         settled = found.scales.far(at) < _SETTLED
         at = found.scales
-        u, C = found.last(p)
+        u, C = found.last(u0.size)
         causes, moved, u0 = _moved(causes, u, C), np.abs(u - u0).max(initial=0.0), u
         if moved < _SETTLED and settled:
             break
@@ -221,8 +243,34 @@ def unlike_models(rows: Rows, effects: Sequence[Effect], taken: Sequence[Array])
     return np.concatenate([1 / np.sqrt(1 + np.where(extra > _FELT, extra, 0.0)), np.ones(len(rows.y) - n)])
 
 
+def at_scales(search: Search, base: Hypothesis, scales: Scales) -> Hypothesis:
+    """Return a hypothesis under other scales."""
+    rows, surety = search.rows, base.surety
+    X, y = surety[:, None] * rows.X, surety * base.y
+    inner = widened(products(rows, X, y, rows.group), rows, X, surety[:, None] * base.Z, y)
+    found = posterior(inner, prior_sd(rows), scales)
+    value = base.log_posterior - base.fit.log_evidence + found.log_evidence
+    return replace(base, fit=replace(found, products=search.inner), log_posterior=value)
+
+
 def screen(search: Search, one: Hypothesis) -> list[Scored]:
-    """Return every further cause by the score test at the scales of a hypothesis, most probable first."""
+    """Return every further cause by the score test beside a hypothesis, most probable first: at its scales or, where
+    its tolerances grew, with these as large as anywhere, so that no fault hides in its own tolerance.
+    """
+    found = {(s.effect.name, s.effect.target): s for s in _scored(search, one)}
+    scales, tolerated = one.fit.scales, np.array([name == TOLERATED for name in search.rows.groups], dtype=bool)
+    if np.any(scales.groups[tolerated] > _GROWN):
+        usual = at_scales(search, one, replace(scales, groups=np.where(tolerated, 0.0, scales.groups)))
+        lost = usual.fit.log_evidence - one.fit.log_evidence
+        for again in _scored(search, usual):
+            key = again.effect.name, again.effect.target
+            if again.gain + lost > found[key].gain:
+                found[key] = replace(again, gain=again.gain + lost)
+    return sorted(found.values(), key=lambda suspect: -suspect.gain)
+
+
+def _scored(search: Search, one: Hypothesis) -> list[Scored]:
+    """Return every further cause by the score test at the scales of a hypothesis."""
     r, found, weight = search.rows.simulated, one.fit, search.weight(one)
     left = one.left / one.surety
     cross = search.crossed_at(weight) if (one.surety == 1).all() else search.rows.X.T @ (weight[:, None] * search.Z)
@@ -245,7 +293,7 @@ def screen(search: Search, one: Hypothesis) -> list[Scored]:
         tried = [(value, cause.start(mean)), *_at_sizes(search, one, cause.effect)]
         value, begin = max(tried, key=lambda pair: pair[0])
         scored.append(Scored(cause.effect, value + search.prior[cause.names], begin))
-    return sorted(scored, key=lambda suspect: -suspect.gain)
+    return scored
 
 
 def _at_sizes(search: Search, one: Hypothesis, effect: Effect) -> list[tuple[float, Array]]:

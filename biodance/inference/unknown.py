@@ -11,9 +11,9 @@ from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.scales import LOUD, prior_sd
 from biodance.records import CHANNELS, Array
 
-P_UNKNOWN, UNKNOWN = 0.1, 0.5
-"""Probability of an unknown cause in a session, before any data, and from which there is one; those of causes stand in
-their effects (`Effect.prior`)."""
+P_UNKNOWN, UNKNOWN = (0.06, 0.03, 0.01), 0.5
+"""Probability of an unknown cause in a session, before any data: in one band and channel, in the whole noise, in body
+or tolerances; and from which there is one. Those of causes stand in their effects (`Effect.prior`)."""
 OWN, EXCESS = 0.4, 1.4
 """Standard deviation of the logarithm of the noise of one band and channel beside that of the session: without fault,
 and with an unknown cause.
@@ -45,10 +45,12 @@ def with_unknown(one: Hypothesis) -> Hypothesis:
         (np.array([one.fit.scales.noise]), np.array([LOUD])),
         (one.fit.scales.groups, prior_sd(one.rows)),
     )
-    each = [float(logsumexp(_excess(away, usual))) - np.log(len(away)) for away, usual in kinds]
-    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN) / len(kinds))
+    each = [
+        float(logsumexp(_excess(away, usual))) - np.log(len(away)) + np.log(p / (1 - p))
+        for (away, usual), p in zip(kinds, P_UNKNOWN, strict=True)
+    ]
     at = np.flatnonzero(count)[int(np.argmax(_excess(*kinds[0])))]
-    told = one.log_posterior + float(logsumexp(each)) + price
+    told = one.log_posterior + float(logsumexp(each))
     return replace(one, log_unknown=told, where_unknown=divmod(int(at), len(CHANNELS)))
 
 
