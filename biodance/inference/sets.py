@@ -40,6 +40,8 @@ _ROUNDS, _STEPS, _SETTLED = 4, 3, 0.02
 _AGAIN = 1
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
+_SHARES = (1.0,)
+"""Shares of `unlike` by which all causes of a set may be unlike their models, beside none."""
 _GROWN = 0.1
 """Logarithm of the scale from which tolerances are larger than anywhere."""
 _FELT = 0.05
@@ -186,8 +188,8 @@ def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | N
     taken = [rows.added(one.effect, one.theta) for one in exact.causes]
     if (unlike_models(rows, tuple(one.effect for one in causes), taken) == 1).all():
         return exact
-    unlike_them = _settled(search, exact.causes, exact.fit.scales, share=1.0)
-    return max(exact, unlike_them, key=lambda one: one.log_posterior)
+    others = (_settled(search, exact.causes, exact.fit.scales, share=share) for share in _SHARES)
+    return max(exact, *others, key=lambda one: one.log_posterior)
 
 
 def _settled(search: Search, causes: tuple[NamedCause, ...], at: Scales, *, share: float) -> Hypothesis:

@@ -199,7 +199,8 @@ def _judged(
             )
             unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
             joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
-            reasons = unmodelled_joints(result.body, joints)
+            # new joints of a sound body may be judged; of a doubtful one they excuse anything
+            reasons = unmodelled_joints(result.body, joints if result.doubts else ())
             reasons |= {reason: () for reason, holds in unsure.items() if holds}
             bare, looked_at = replace(bare, notes=notes, why=reasons), seen.problem.looked_at
             simulate = simulate and not reasons
