@@ -66,14 +66,15 @@ def with_contacts(search: Search, base: Hypothesis, kinds: Sequence[Transient]) 
     """
     found = [one for kind in kinds if (one := _touch_of(search, base, kind)) is not None]
     likely = sorted(found, key=lambda one: -one.log_bayes_factor)
-    best = next(((one, values) for one in likely[:2] if (values := _touching(search.rows, one)) is not None), None)
-    if best is None or best[0].log_bayes_factor <= 0:
+    best = next((one for one in likely[:2] if _is_touch(search.rows, one)), None)
+    if best is None or best.log_bayes_factor <= 0:
         return ()
-    loud = _named(search, base, *best, len(kinds))
+    loud = _named(search, base, best, len(kinds))
     quiet = at_scales(search, base, loud.fit.scales)  # beside the contact the session is not as loud as without
-    again = _touch_of(search, quiet, best[0].effect)
-    values = None if again is None else _touching(search.rows, again)
-    return (loud,) if again is None or values is None else (_named(search, quiet, again, values, len(kinds)),)
+    again = _touch_of(search, quiet, best.effect)
+    return (
+        (loud,) if again is None or not _is_touch(search.rows, again) else (_named(search, quiet, again, len(kinds)),)
+    )
 
 
 def _columns(rows: Rows, effect: Transient) -> Array | None:
@@ -101,22 +102,22 @@ def _touch_of(search: Search, base: Hypothesis, effect: Transient) -> _Touch | N
     return _Touch(effect, Z, s, G, size, value)
 
 
-def _touching(rows: Rows, one: _Touch) -> Array | None:
-    """Return the values (n, p) over time of a contact's course, if it is that of something touched: on one side of zero
-    or, as the plate's zero and the body's weight take the mean of a trial from a foot, of where it lies most of the
-    time in its trial, if it is quick. None for one that is neither.
+def _is_touch(rows: Rows, one: _Touch) -> bool:
+    """Return whether a contact's course is that of something touched: on one side of zero or, as the plate's zero and
+    the body's weight take the mean of a trial from a foot, of where it lies most of the time in its trial, if it is
+    quick.
     """
     assert rows.problem is not None
     values, beside, start = one.course.reshape(-1, len(one.effect.parameters)), [], 0
     if one_sided(values):
-        return values
+        return True
     for case in rows.problem.cases:
         columns = one.effect.local(case)
         stop = start + (0 if columns is None else columns.shape[2] // values.shape[1])
         beside.append(values[start:stop] - (np.median(values[start:stop], axis=0) if stop > start else 0.0))
         start = stop
     inner = [part[_END:-_END] for part in beside]  # nobody judges the ends of a trial: there the course is open
-    return np.concatenate(beside) if one_sided(np.concatenate(inner)) and quick(inner) else None
+    return one_sided(np.concatenate(inner)) and quick(inner)
 
 
 def quick(courses: Sequence[Array]) -> bool:
@@ -137,9 +138,9 @@ def one_sided(course: Array) -> bool:
     return bool(min(sides) <= OTHER_SIDE * sum(sides))
 
 
-def _named(search: Search, base: Hypothesis, one: _Touch, values: Array, kinds: int) -> Hypothesis:
+def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothesis:
     """Return the hypothesis with the contact at the point of its segment that explains most, and its course there; as
-    its size the force while it acts: half of the squares of its ``values`` (n, p) belong to larger ones.
+    its size the force while it acts: half of the squares of its values belong to larger ones.
     """
     rows, effect, Z = search.rows, *_placed(search, base, one)
     own = np.concatenate([base.Z, one.size * Z], axis=1)
@@ -155,10 +156,11 @@ def _named(search: Search, base: Hypothesis, one: _Touch, values: Array, kinds: 
     wide = np.concatenate([base.Z, SIZES[-1] * Z], axis=1)  # the most probable size would shrink short peaks
     open_ = posterior(widened(inner, rows, X, surety[:, None] * wide, surety * base.y), sd, found.scales)
     course, count = SIZES[-1] * open_.last(Z.shape[1])[0], len(effect.parameters)
+    values = course.reshape(-1, count)
     square = np.sum(values**2, axis=1)
     order = np.argsort(square)
     k = int(order[np.searchsorted(np.cumsum(square[order]), 0.5 * square.sum())])
-    spread = one.size**2 * np.diag(one.spread).reshape(-1, count)[k]
+    spread = SIZES[-1] ** 2 * np.diag(open_.last(Z.shape[1])[1]).reshape(-1, count)[k]
     touch = NamedCause(effect, values[k], np.diag(spread), _by_trial(rows, effect, course))
     prior = effect.prior / kinds / len(SIZES)
     before = base.log_posterior - base.fit.log_evidence  # prior of the causes beside it
