@@ -3,6 +3,7 @@ would keep; the folder with real recordings.
 """
 
 import os
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -17,3 +18,14 @@ def data() -> Path:
     if not folder:
         pytest.skip("BIODANCE_DATA does not name the folder with real recordings")
     return Path(folder)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what the engine does not meet yet (``engine_gaps.toml``) as expected to fail: it is run and told every time,
+    and a gap that closed is told as passed.
+    """
+    gaps = tomllib.loads((Path(__file__).parent / "engine_gaps.toml").read_text(encoding="utf-8"))
+    for item in items:
+        reason = gaps.get(item.nodeid.removeprefix("tests/"))
+        if reason is not None:
+            item.add_marker(pytest.mark.xfail(reason=reason, strict=False))

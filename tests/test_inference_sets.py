@@ -218,8 +218,8 @@ def test_the_unknown_is_the_ratio_of_densities_of_scales() -> None:
     blocks = ratio(0.5 * np.log(square[count > 0]), np.full(12, np.sqrt(OWN**2 + 0.5 / 30)))
     session = ratio(np.array([base.fit.scales.noise]), np.array([LOUDNESS]))
     groups = ratio(base.fit.scales.groups, prior_sd(base.rows))
-    price = np.log(P_UNKNOWN / (1 - P_UNKNOWN))
-    expected = base.log_posterior + price + np.logaddexp.reduce([blocks, session, groups]) - np.log(3)
+    odds = [np.log(p / (1 - p)) for p in P_UNKNOWN]
+    expected = base.log_posterior + np.logaddexp.reduce(np.add([blocks, session, groups], odds))
     assert with_unknown(base).log_unknown == pytest.approx(expected)
 
 

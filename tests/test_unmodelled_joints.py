@@ -16,7 +16,7 @@ def test_a_body_as_usual_has_none() -> None:
 
 def test_joints_that_no_marker_shows_and_joints_beside_the_usual_ones_are_told() -> None:
     held = body().holding({"right_elbow", "left_elbow"}, body().neutral)
-    assert unmodelled_joints(held, ("wrists",)) == {Reason.UNSEEN_JOINTS: ("elbow",)}
+    assert unmodelled_joints(held, ("wrists",)) == {Reason.UNSEEN_JOINTS: ("right elbow", "left elbow")}
     assert unmodelled_joints(body(), ("neck",)) == {Reason.UNDESCRIBED_JOINTS: ("neck",)}
 
 
