@@ -30,7 +30,7 @@ from biodance.observations import LANDMARK, shift_per_sd
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
 
-NAMED, SUGGESTED = 0.85, 0.5
+NAMED, SUGGESTED = 0.8, 0.5
 """Probability from which a cause is named, and from which it is told as only resembled."""
 IN_SET = 0.95
 """Share of the posterior of its place that the set of a cause holds."""
