@@ -20,7 +20,7 @@ class AddedMass(Effect):
     """
 
     name = "added_mass"
-    prior = 0.06
+    prior = 0.02
     parameters = (
         Parameter("mass", "kg", 1.0, "0.5-8 kg loads; 2.4 kg on the arm in Bonnet 2016", least=_LEAST),
         *(Parameter(f"place_{axis}", "m", 0.05, "half the width of a limb (segment boxes)") for axis in "xyz"),

@@ -144,15 +144,16 @@ def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothe
     """
     rows, effect, Z = search.rows, *_placed(search, base, one)
     own = np.concatenate([base.Z, one.size * Z], axis=1)
-    sd, surety, found = prior_sd(rows), base.surety, base.fit
-    for _ in range(_STEPS):  # a touch is unlike its model, too: what it leaves is noise
+    sd, surety, touched = prior_sd(rows), base.surety, base
+    for _ in range(_STEPS):
         X = surety[:, None] * rows.X
         inner = products(rows, X, surety * base.y, rows.group)
         both = widened(inner, rows, X, surety[:, None] * own, surety * base.y)
-        found = fit(both, sd, found.scales, least=search.least)
-        touched = one.size * Z @ found.last(Z.shape[1])[0]
-        old, surety = surety, base.surety * unlike_models(rows, (one.effect,), (touched,))
-    surety = old
+        found = fit(both, sd, touched.fit.scales, least=search.least)
+        touched = Hypothesis((), rows, replace(found, products=search.inner), -np.inf, own, base.y, surety)
+        added = one.size * Z @ found.last(Z.shape[1])[0]
+        surety = base.surety * unlike_models(touched, (one.effect,), (added,))
+    surety = touched.surety
     wide = np.concatenate([base.Z, SIZES[-1] * Z], axis=1)  # the most probable size would shrink short peaks
     open_ = posterior(widened(inner, rows, X, surety[:, None] * wide, surety * base.y), sd, found.scales)
     course, count = SIZES[-1] * open_.last(Z.shape[1])[0], len(effect.parameters)

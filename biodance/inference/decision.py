@@ -5,7 +5,7 @@ does matters to a laboratory (`consequence`). Its set holds 95 % of the posterio
 over all sets of causes that hold it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,7 @@ from biodance.observations import LANDMARK, shift_per_sd
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
 
-NAMED, SUGGESTED = 0.8, 0.5
+NAMED, SUGGESTED = 0.85, 0.5
 """Probability from which a cause is named, and from which it is told as only resembled."""
 IN_SET = 0.95
 """Share of the posterior of its place that the set of a cause holds."""
@@ -47,7 +47,7 @@ Key = tuple[str, str]
 @dataclass(frozen=True, eq=False)
 class Place:
     """One cause of the most probable set and what may stand in its place: ``cause`` with its size averaged over all
-    sets; ``probability`` that any of them is there; ``shares`` of them, most probable first, with the log Bayes factor
+    sets without its look-alikes; ``probability`` that any of them is there; ``shares`` of them, most probable first, with the log Bayes factor
     of each against none.
     """
 
@@ -122,19 +122,22 @@ def _place(posterior: Posterior, best: Hypothesis, cause: NamedCause, prior: Map
     here = {next(iter(names - rest)): v for names, v in total.items() if len(names) == wide and rest < names}
     none, some = total.get(rest, -np.inf), float(logsumexp(list(here.values())))
     shares = [(name, float(np.exp(v - some)), v - none - prior.get(name, 0.0)) for name, v in here.items()]
-    probability = float(1 / (1 + np.exp(none - some)))
-    return Place(_averaged(posterior, cause), probability, tuple(sorted(shares, key=lambda one: -one[1])))
+    place = Place(cause, float(1 / (1 + np.exp(none - some))), tuple(sorted(shares, key=lambda one: -one[1])))
+    alike = {(alias.effect, alias.target) for alias in place.set[1:]}
+    return replace(place, cause=_averaged(posterior, cause, alike))
 
 
-def _averaged(posterior: Posterior, cause: NamedCause) -> NamedCause:
-    """Return a cause with mean and covariance of its size over all hypotheses that hold it."""
+def _averaged(posterior: Posterior, cause: NamedCause, alike: Set[Key]) -> NamedCause:
+    """Return a cause with mean and covariance of its size over all hypotheses that hold it, and none of what looks
+    ``alike``: of two that share one effect each has the smaller part.
+    """
     if cause.course:
         return cause
     found = [
         (weight, one.whole(own), own.covariance)
         for one, weight in zip(posterior.hypotheses, posterior.weights.sum(axis=1), strict=True)
         for own in one.causes
-        if cause_key(own) == cause_key(cause) and weight > 0
+        if cause_key(own) == cause_key(cause) and weight > 0 and alike.isdisjoint(one.names)
     ]
     weight = np.array([one[0] for one in found])
     weight /= weight.sum()

@@ -15,7 +15,7 @@ from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.contact import with_contacts
-from biodance.inference.decision import Inferred, decide
+from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import Rows, observed_causes, rows_of
@@ -28,10 +28,9 @@ from biodance.uncertainty.tolerances import Tolerances
 
 _SIGN = 0.005
 """Probability that a channel of a session has the wrong sign, before any data."""
-_SURE = 0.85
-"""Probability from which it is told."""
 
-
+_HEAVIER = 0.3
+"""Share of a segment's mass by which it must look heavier before its kinematic errors are computed again."""
 _STALE = 0.03
 """Share of the predicted wrench that may change before causes are predicted again: their sizes are then right to
 this share.
@@ -87,7 +86,7 @@ def judge(
     else:
         causes = observed_causes(evidence, asked)
         rows = rows_of(None, causes, known, evidence)
-    search, posterior = _inferred(rows, causes, asked, evidence)
+    search, posterior = _inferred(seen, rows, causes, asked, evidence)
     found = decide(search, posterior, bare)
     sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
     if sign:  # what all other causes do holds only once the sign is mended
@@ -97,23 +96,40 @@ def judge(
 
 
 def _inferred(
-    rows: Rows, causes: tuple[Candidate, ...], asked: Mapping[str, Cause], evidence: ObservedEvidence
+    seen: Seen | None,
+    rows: Rows,
+    causes: tuple[Candidate, ...],
+    asked: Mapping[str, Cause],
+    evidence: ObservedEvidence,
 ) -> tuple[Search, Posterior]:
-    """Return the search and its posterior; causes are predicted again from the body of the most probable set where it
-    moves otherwise than the prior's (a tilted floor pulls at the centre of mass that is there).
+    """Return the search and its posterior: what looks heavier errs more with the markers; and causes are predicted
+    again from the body of the most probable set where it moves otherwise than the prior's (a tilted floor pulls at the
+    centre of mass that is there).
     """
     search = Search.of(rows, causes)
-    if rows.problem is None:
+    if seen is None or rows.problem is None:
         return search, infer(search)
+    posed, every, phi = rows.problem, seen.causes, hypothesis(search, ()).phi
+    if _is_heavier(posed, phi):
+        posed = posed.with_matter(phi)
+        search = Search.of(rows_of(posed, every, rows.tolerances, evidence), causes)
     found = infer(search, _contacts)
-    if not found.best.causes or not _predicts_otherwise(rows.problem, found.best.phi):
+    if not found.best.causes or not _predicts_otherwise(posed, found.best.phi):
         return search, found
     kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
-    posed = rows.problem.with_parameters(found.best.phi)
+    posed = posed.with_parameters(found.best.phi)
     every = causes_of(posed, rows.tolerances, kinds)
     again = rows_of(posed, every, rows.tolerances, evidence)
     search = Search.of(again, tuple(one for one in every if one.names[0] in asked))
     return search, infer(search, _contacts)
+
+
+def _is_heavier(posed: Problem, phi: Array) -> bool:
+    """Return whether any segment looks so much heavier than its prior in ``phi`` (10N,) that what its matter errs by
+    with the markers grows noticeably (`Problem.with_matter`).
+    """
+    before = posed.prior.mass
+    return bool(np.any(phi[::10] - before > _HEAVIER * before))
 
 
 def _predicts_otherwise(posed: Problem, phi: Array) -> bool:
@@ -184,7 +200,7 @@ def _turned(
         return ()
     best, name = max(found)
     probability = float(1 / (1 + np.exp(-best)))
-    if probability < _SURE or counting.contacts() < 2:
+    if probability < NAMED or counting.contacts() < 2:
         return ()
     alike = tuple(Alias(*other, float(value)) for value, other in sorted(found, reverse=True) if best - value <= 3.0)
     advice = (

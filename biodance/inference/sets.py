@@ -40,12 +40,8 @@ _ROUNDS, _STEPS, _SETTLED = 4, 3, 0.02
 _AGAIN = 1
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
-_SHARES = (1.0,)
-"""Shares of `unlike` by which all causes of a set may be unlike their models, beside none."""
 _GROWN = 0.1
 """Logarithm of the scale from which tolerances are larger than anywhere."""
-_FELT = 0.05
-"""Share of the noise below which what a cause is unlike its model is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,30 +173,18 @@ def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
 
 
 def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | None = None) -> Hypothesis:
-    """Return a set of causes at its most probable sizes and scales: each cause exactly as its model, or unlike it by
-    its share (`unlike`), whichever is more probable.
+    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes; each cause
+    may be unlike its model by up to its share (`unlike_models`).
     """
     rows = search.rows
     if not causes:
         Z, plain = np.empty((len(rows.y), 0)), np.ones(len(rows.y))
         return Hypothesis((), rows, search.start, search.start.log_evidence, Z, rows.y, plain)
-    exact = _settled(search, causes, start or search.start.scales, share=0.0)
-    taken = [rows.added(one.effect, one.theta) for one in exact.causes]
-    if (unlike_models(rows, tuple(one.effect for one in causes), taken) == 1).all():
-        return exact
-    others = (_settled(search, exact.causes, exact.fit.scales, share=share) for share in _SHARES)
-    return max(exact, *others, key=lambda one: one.log_posterior)
-
-
-def _settled(search: Search, causes: tuple[NamedCause, ...], at: Scales, *, share: float) -> Hypothesis:
-    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes; ``share`` of
-    what each may be unlike its model is noise.
-    """
-    rows, u0 = search.rows, np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
-    effects = tuple(one.effect for one in causes)
+    u0 = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
+    at, effects = start or search.start.scales, tuple(one.effect for one in causes)
+    surety = np.ones(len(rows.y))
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
-        surety = unlike_models(rows, effects, [share * one for one in taken])
         slopes = [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes]
         Z = np.concatenate(slopes, axis=1)
         y = rows.y - np.sum(taken, axis=0) + Z @ u0
@@ -210,16 +194,16 @@ def _settled(search: Search, causes: tuple[NamedCause, ...], at: Scales, *, shar
             inner = products(rows, X, y, rows.group)
         both = widened(inner, rows, X, surety[:, None] * Z, surety * y)
         found = fit(both, prior_sd(rows), at, steps=_STEPS, least=search.least)
-        settled = found.scales.far(at) < _SETTLED
-        at = found.scales
+        settled, at = found.scales.far(at) < _SETTLED, found.scales
         u, C = found.last(u0.size)
         causes, moved, u0 = _moved(causes, u, C), np.abs(u - u0).max(initial=0.0), u
-        if moved < _SETTLED and settled:
+        one = Hypothesis(causes, rows, replace(found, products=search.inner), -np.inf, Z, y, surety)
+        surety = unlike_models(one, effects, taken)
+        if moved < _SETTLED and settled and np.abs(surety - one.surety).max(initial=0.0) < _SETTLED:
             break
-    value = found.log_evidence + float(np.log(surety).sum()) + sum(search.prior[cause_key(one)] for one in causes)
-    possible = all(rows.possible(one.effect, one.theta) for one in causes)
-    found = replace(found, products=search.inner)  # the largest arrays, which nobody asks for again
-    return Hypothesis(causes, rows, found, value if possible else -np.inf, Z, y, surety)
+    value = found.log_evidence + float(np.log(one.surety).sum()) + sum(search.prior[cause_key(c)] for c in causes)
+    possible = all(rows.possible(c.effect, c.theta) for c in causes)
+    return replace(one, log_posterior=value) if possible else one
 
 
 def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCause, ...]:
@@ -232,17 +216,21 @@ def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCau
     return tuple(out)
 
 
-def unlike_models(rows: Rows, effects: Sequence[Effect], taken: Sequence[Array]) -> Array:
-    """Return (r,) by which rows are scaled because no cause is quite like its model: it leaves the share `unlike` of
-    what it adds to a band and channel (``taken`` (r,) of each), as noise beside the session's.
+def unlike_models(one: Hypothesis, effects: Sequence[Effect], taken: Sequence[Array]) -> Array:
+    """Return (r,) by which rows are scaled because no cause is quite like its model: in each band and channel it leaves
+    up to the share `unlike` of what it adds there (``taken`` (r,) of each), as much as the hypothesis leaves beyond the
+    session's noise.
     """
-    n, extra = rows.plates, np.zeros(rows.plates)
-    count = np.maximum(np.bincount(rows.block[:n]), 1)
-    for one, added in zip(effects, taken, strict=True):
-        square = np.bincount(rows.block[:n], weights=added[:n] ** 2) / count
-        extra += unlike(one) ** 2 * square[rows.block[:n]]
-    extra[rows.block[:n] < len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
-    return np.concatenate([1 / np.sqrt(1 + np.where(extra > _FELT, extra, 0.0)), np.ones(len(rows.y) - n)])
+    rows, n = one.rows, one.rows.plates
+    block = rows.block[:n]
+    count, loud = np.maximum(np.bincount(block), 1), np.exp(-2 * one.fit.scales.noise)
+    most = np.zeros(count.size)
+    for effect, added in zip(effects, taken, strict=True):
+        most += unlike(effect) ** 2 * loud * np.bincount(block, weights=added[:n] ** 2) / count
+    most[: len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
+    left = loud * np.bincount(block, weights=(one.left / one.surety)[:n] ** 2) / count
+    extra = np.clip(left - 1.0, 0.0, most)[block]
+    return np.concatenate([1 / np.sqrt(1 + extra), np.ones(len(rows.y) - n)])
 
 
 def at_scales(search: Search, base: Hypothesis, scales: Scales) -> Hypothesis:
