@@ -1,8 +1,9 @@
 """What a session ends with: the posterior and what matters, decided once.
 
 A cause is named where it, or a look-alike in its place, is there with at least the probability `NAMED`, and what it
-does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place. Its size is averaged
-over all sets of causes that hold it.
+does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place, and whatever the data
+cannot tell from it, however rare it is. Its size is averaged over all sets of causes that hold it without a look-alike.
+No delay is named that Newton contradicts.
 """
 
 from collections.abc import Mapping, Set
@@ -11,13 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from biodance.diagnosis.candidates import changes
+from biodance.diagnosis.candidates import TOGETHER, changes
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
 from biodance.effects import NamedCause, unit_at
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
+from biodance.effects.time_delay import TimeDelay
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.causes import cause_key
 from biodance.inference.hypotheses import Hypothesis, Posterior
@@ -27,6 +29,7 @@ from biodance.inference.scales import prior_sd
 from biodance.inference.sets import Search, hypothesis
 from biodance.inference.unknown import UNKNOWN
 from biodance.observations import LANDMARK, shift_per_sd
+from biodance.observations.newton import Newton
 from biodance.records import SIDES, Array
 from biodance.uncertainty.tolerances import key_of
 
@@ -47,8 +50,8 @@ Key = tuple[str, str]
 @dataclass(frozen=True, eq=False)
 class Place:
     """One cause of the most probable set and what may stand in its place: ``cause`` with its size averaged over all
-    sets without its look-alikes; ``probability`` that any of them is there; ``shares`` of them, most probable first, with the log Bayes factor
-    of each against none.
+    sets without its look-alikes; ``probability`` that any of them is there; ``shares`` of them, most probable first,
+    with the log Bayes factor of each against none.
     """
 
     cause: NamedCause
@@ -57,14 +60,15 @@ class Place:
 
     @property
     def set(self) -> tuple[Alias, ...]:
-        """The smallest set of look-alikes with `IN_SET` of the posterior, the cause first."""
-        kept, sum_ = [], 0.0
+        """The cause, then all that the data cannot tell from it (`TOGETHER`), and what else it takes to hold `IN_SET`
+        of the posterior.
+        """
+        kept, sum_, own = [], 0.0, next(b for name, _, b in self.shares if name == cause_key(self.cause))
         for name, share, bayes in self.shares:
-            if sum_ < IN_SET:
+            if sum_ < IN_SET or bayes >= own - TOGETHER:
                 kept.append(Alias(*name, bayes))
             sum_ += share
-        own = cause_key(self.cause)
-        return tuple(sorted(kept, key=lambda alias: (alias.effect, alias.target) != own))
+        return tuple(sorted(kept, key=lambda alias: (alias.effect, alias.target) != cause_key(self.cause)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +187,7 @@ def _told(rows: Rows, one: NamedCause) -> bool:
     """Return whether a cause is large enough to be told: its size matters, and what it changes in this session's wrench
     does; one that only observations show must be larger than laboratories have without calling it a fault.
     """
-    if not matters(one.effect, one.theta):
+    if not matters(one.effect, one.theta) or _is_contradicted(rows, one):
         return False
     if one.course:
         return True
@@ -192,6 +196,19 @@ def _told(rows: Rows, one: NamedCause) -> bool:
         return bool(abs(one.theta[0]) > usual + one.covariance[0, 0] ** 0.5)
     felt = rows.problem.felt(changes(rows.problem, one.effect, one.theta)[:, None])[0]
     return bool(felt >= 1.0 or (rows.observed(one.effect) != 0).any())
+
+
+def _is_contradicted(rows: Rows, one: NamedCause) -> bool:
+    """Return whether a cause is a delay, and the total force goes with the trunk at an instant that is nearer to none
+    than to it: feet are few and short, the force of all plates lasts as long as the trial.
+    """
+    seen = rows.evidence.observations if rows.evidence else ()
+    lags = [o for o in seen if (o.observer, o.unit) == (Newton.name, "s")]
+    if not isinstance(one.effect, TimeDelay) or not lags:
+        return False
+    share = np.array([o.sd**-2 for o in lags])
+    lag = float(share @ [o.value for o in lags] / share.sum())
+    return abs(lag) < abs(lag - one.theta[0])
 
 
 def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:

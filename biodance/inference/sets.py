@@ -36,7 +36,7 @@ from biodance.inference.unknown import UNKNOWN, energies, with_unknown
 from biodance.records import CHANNELS, Array
 
 MOST, _REFINED, _BRANCHES = 3, 6, 2
-_ROUNDS, _STEPS, _SETTLED = 4, 3, 0.02
+_ROUNDS, _STEPS, _SETTLED = 6, 3, 0.02
 _AGAIN = 1
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
