@@ -15,9 +15,10 @@ from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, effects
+from biodance.inference.columns import Columns
 from biodance.inference.rows import BODY, TOLERATED, rows_of
-from biodance.inference.scales import nominal, posterior, prior_sd, products
-from biodance.inference.sets import Search, hypothesis
+from biodance.inference.scales import bare, nominal, posterior, prior_sd
+from biodance.inference.sets import Search, at_scales, hypothesis
 from biodance.observations import ObservableCause, Observation
 from biodance.uncertainty.bands import BANDS
 
@@ -76,7 +77,7 @@ def test_the_evidence_is_the_density_of_the_forces_in_newtons() -> None:
     columns = [sizes.get(f"{one.name} {one.target}", 0.0) * put.unit(one)[:n] for one in plates]
     X = np.concatenate([put.sip[:n], *columns], axis=1)
     density = multivariate_normal(np.zeros(n), noise + X @ X.T).logpdf(put.target[:n])
-    inner = products(found, found.X, found.y, found.group)
+    inner = bare(Columns.of(found))
     value = posterior(replace(inner, markers=0 * inner.markers), prior_sd(found), nominal(found)).log_evidence
     turned = -0.5 * n * np.log(2 * np.pi) - sum(np.linalg.slogdet(coloured[b])[1] for b in put.spectrum.band)
     assert value + turned == pytest.approx(density, abs=1e-3)
@@ -115,9 +116,10 @@ def test_what_an_observation_says_of_a_zero_moves_the_zero_of_the_forces() -> No
     heard, _ = rows(told(0.9, 0.9, sd=0.1))
     at = {}
     for name, found in (("silent", silent), ("heard", heard)):
-        fitted = posterior(products(found, found.X, found.y, found.group), prior_sd(found), nominal(found))
+        columns = Columns.of(found)
+        fitted = posterior(bare(columns), prior_sd(found), nominal(found))
         where, unit = found.tolerated[OFFSET]
-        at[name] = float((unit @ fitted.coefficients[where])[0])
+        at[name] = float((unit @ (columns.turn @ fitted.coefficients)[where])[0])
     assert at["silent"] + 0.2 < at["heard"] < 0.9
 
 
@@ -128,9 +130,10 @@ def test_a_cause_that_both_show_is_judged_by_both() -> None:
     for name, evidence in (("forces", SILENT), ("both", told(12.6, 12.4, sd=0.5))):
         found, causes = rows(evidence, hidden)
         one = next(c.effect for c in causes if c.names == OFFSET)
-        both = hypothesis(Search.of(found, causes), (NamedCause(one, np.zeros(1), np.empty((0, 0))),))
+        search = Search.of(found, causes)
+        both = hypothesis(search, (NamedCause(one, np.zeros(1), np.empty((0, 0))),))
         (cause,) = both.causes
-        fitted[name] = both.whole(cause)[0], cause.covariance[0, 0] ** 0.5
+        fitted[name] = both.whole(cause)[0], at_scales(search, both, nominal(found)).fit.last(1)[1][0, 0]
     (forces, wide), (both, narrow) = fitted["forces"], fitted["both"]
     assert narrow < wide
     assert abs(both - 12.4) < abs(forces - 12.4) or abs(both - 12.4) < 0.5

@@ -8,6 +8,7 @@ from inferred_rows import covariance, log_prior, rows, with_target
 from scipy.stats import multivariate_normal
 from scipy.stats import t as student
 
+from biodance.inference.columns import Columns
 from biodance.inference.scales import (
     FLESH,
     FLOOR,
@@ -15,13 +16,13 @@ from biodance.inference.scales import (
     TAIL,
     TOLERANCE,
     Scales,
-    _moved,
+    bare,
     fit,
+    nearer,
     nominal,
     posterior,
     prior_sd,
     products,
-    widened,
 )
 
 SCALES = (
@@ -32,7 +33,12 @@ SCALES = (
 
 
 def inner(drawn):
-    return products(drawn, drawn.X, drawn.y, drawn.group)
+    return bare(Columns.of(drawn))
+
+
+def sure(drawn):
+    """Return that every row is as sure as its noise says."""
+    return np.ones(drawn.noises + 1)
 
 
 def density(drawn, scales, *more):
@@ -54,7 +60,7 @@ def test_columns_of_a_cause_widen_the_density() -> None:
     rng = np.random.default_rng(2)
     drawn, scales = rows(rng, observations=0), SCALES[2]
     Z, constant = rng.normal(size=(len(drawn.y), 2)), -0.5 * len(drawn.y) * np.log(2 * np.pi)
-    found = posterior(widened(inner(drawn), drawn, drawn.X, Z, drawn.y), prior_sd(drawn), scales)
+    found = posterior(products(Columns.of(drawn), Z, drawn.y, sure(drawn)), prior_sd(drawn), scales)
     assert found.log_evidence == pytest.approx(density(drawn, scales, Z) - constant, rel=1e-10)
     C = covariance(drawn, scales)
     known = Z.T @ np.linalg.solve(C, Z) + np.eye(2)
@@ -63,15 +69,33 @@ def test_columns_of_a_cause_widen_the_density() -> None:
     np.testing.assert_allclose(mean, spread @ Z.T @ np.linalg.solve(C, drawn.y), rtol=1e-9)
 
 
-def test_widened_products_are_those_of_all_columns_at_once() -> None:
+def test_products_are_those_of_all_columns_at_once_each_row_as_sure_as_its_band_and_channel() -> None:
     rng = np.random.default_rng(3)
     drawn = rows(rng)
     Z, y = rng.normal(size=(len(drawn.y), 3)), rng.normal(size=len(drawn.y))
-    wide = widened(inner(drawn), drawn, drawn.X, Z, y)
-    both = products(drawn, np.concatenate([drawn.X, Z], axis=1), y, wide.group)
-    for name in ("plates", "markers", "observed"):
-        np.testing.assert_allclose(getattr(wide, name), getattr(both, name), atol=1e-12)
-    np.testing.assert_array_equal(wide.group, [*drawn.group, -1, -1, -1])
+    columns, unsure = Columns.of(drawn), sure(drawn)
+    unsure[:12] = rng.uniform(0.3, 1.0, 12)
+    found = products(columns, Z, y, unsure)
+    both = unsure[drawn.block][:, None] * np.column_stack([drawn.X @ columns.turn, Z, y])
+    n, r = drawn.plates, drawn.simulated
+    np.testing.assert_allclose(found.plates, both[:n].T @ both[:n], atol=1e-11)
+    np.testing.assert_allclose(found.markers, both[n:r].T @ both[n:r], atol=1e-11)
+    np.testing.assert_allclose(found.observed, both[r:], atol=1e-12)
+    np.testing.assert_array_equal(found.group, [*columns.group, -1, -1, -1])
+
+
+def test_directions_that_the_rows_do_not_show_are_not_carried_and_miss_nowhere() -> None:
+    """Twelve columns of which only the sums of pairs are seen: the density of the target is that of all of them."""
+    drawn, scales = rows(np.random.default_rng(11), observations=0), SCALES[1]
+    blind = replace(drawn, X=np.repeat(drawn.X[:, ::2], 2, axis=1))
+    columns = Columns.of(blind)
+    assert columns.X.shape[1] == 6
+    constant = -0.5 * len(blind.y) * np.log(2 * np.pi)
+    found = posterior(bare(columns), prior_sd(blind), scales)
+    assert found.log_evidence == pytest.approx(density(blind, scales) - constant, rel=1e-10)
+    X = blind.X * np.exp(scales.groups)[blind.group]
+    every = np.exp(scales.groups)[blind.group] * (X.T @ np.linalg.solve(covariance(blind, scales), blind.y))
+    np.testing.assert_allclose(columns.turn @ found.coefficients, every, atol=1e-10)
 
 
 def test_observations_have_student_s_errors_and_their_weights_the_curvature() -> None:
@@ -79,7 +103,7 @@ def test_observations_have_student_s_errors_and_their_weights_the_curvature() ->
     drawn = rows(np.random.default_rng(4))
     at = Scales(np.array([0.2, 0.0, -0.1]), 0.3, np.array([1.0, 0.5, 0.2, 0.9, 1.1]))
     found = posterior(inner(drawn), prior_sd(drawn), at)
-    X = drawn.X * np.exp(at.groups)[drawn.group]
+    X = (drawn.X @ Columns.of(drawn).turn) * np.exp(at.groups)[drawn.group]
     C = covariance(drawn, at)
     u = X.T @ np.linalg.solve(C, drawn.y)
     np.testing.assert_allclose(found.u, u, rtol=1e-9)
@@ -98,7 +122,7 @@ def test_scales_move_along_the_slope_of_the_evidence_by_fisher_s_information() -
     drawn, at = rows(np.random.default_rng(5), observations=0), SCALES[1]
     found, sd, step = posterior(inner(drawn), prior_sd(drawn), at), prior_sd(drawn), 1e-4
     known = found.curvature(3)
-    _, moved = _moved(found, sd, known)
+    moved = nearer(found, sd)
     for g in range(3):
         there = [replace(at, groups=at.groups + way * step * np.eye(3)[g]) for way in (1, -1)]
         slope = (density(drawn, there[0]) - density(drawn, there[1])) / (2 * step)
@@ -159,7 +183,7 @@ def test_one_outlier_among_observations_moves_nothing_and_stays_one() -> None:
     value = np.array([1.1, 0.9, 1.0, 1.2, 26.0])
     alone = replace(drawn, X=X, y=value)
     one = fit(inner(alone), prior_sd(alone), nominal(alone))
-    told = 3.0 * one.coefficients[2]
+    told = float((alone.X @ Columns.of(alone).turn @ one.coefficients)[0])
     assert told == pytest.approx(1.05, abs=0.2)
     assert one.scales.weights[-1] < 0.02
     assert one.scales.weights[:-1].min() > 1.0

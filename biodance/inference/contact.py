@@ -16,7 +16,7 @@ from biodance.effects import NamedCause, Transient
 from biodance.inference.causes import cause_key
 from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.rows import Rows
-from biodance.inference.scales import fit, posterior, prior_sd, products, widened
+from biodance.inference.scales import fit, posterior, prior_sd, products
 from biodance.inference.sets import Search, at_scales, unlike_models
 from biodance.records import Array
 
@@ -144,18 +144,14 @@ def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothe
     """
     rows, effect, Z = search.rows, *_placed(search, base, one)
     own = np.concatenate([base.Z, one.size * Z], axis=1)
-    sd, surety, touched = prior_sd(rows), base.surety, base
+    columns, sd, sure, touched = search.columns, prior_sd(rows), base.sure, base
     for _ in range(_STEPS):
-        X = surety[:, None] * rows.X
-        inner = products(rows, X, surety * base.y, rows.group)
-        both = widened(inner, rows, X, surety[:, None] * own, surety * base.y)
-        found = fit(both, sd, touched.fit.scales, least=search.least)
-        touched = Hypothesis((), rows, replace(found, products=search.inner), -np.inf, own, base.y, surety)
+        found = fit(products(columns, own, base.y, sure), sd, touched.fit.scales, least=search.least)
+        touched = Hypothesis((), columns, found, -np.inf, own, base.y, sure)
         added = one.size * Z @ found.last(Z.shape[1])[0]
-        surety = base.surety * unlike_models(touched, (one.effect,), (added,))
-    surety = touched.surety
+        sure = base.sure * unlike_models(touched, (one.effect,), (added,))
     wide = np.concatenate([base.Z, SIZES[-1] * Z], axis=1)  # the most probable size would shrink short peaks
-    open_ = posterior(widened(inner, rows, X, surety[:, None] * wide, surety * base.y), sd, found.scales)
+    open_ = posterior(products(columns, wide, base.y, touched.sure), sd, found.scales)
     course, count = SIZES[-1] * open_.last(Z.shape[1])[0], len(effect.parameters)
     values = course.reshape(-1, count)
     square = np.sum(values**2, axis=1)
@@ -165,9 +161,9 @@ def _named(search: Search, base: Hypothesis, one: _Touch, kinds: int) -> Hypothe
     touch = NamedCause(effect, values[k], np.diag(spread), _by_trial(rows, effect, course))
     prior = effect.prior / kinds / len(SIZES)
     before = base.log_posterior - base.fit.log_evidence  # prior of the causes beside it
-    value = found.log_evidence + float(np.log(surety / base.surety).sum()) + before + float(np.log(prior / (1 - prior)))
+    value = found.log_evidence + touched.log_sure - base.log_sure + before + float(np.log(prior / (1 - prior)))
     causes = (*(c for c in base.causes if cause_key(c) != cause_key(touch)), touch)
-    return Hypothesis(causes, rows, replace(found, products=search.inner), value, own, base.y, surety)
+    return replace(touched, causes=causes, log_posterior=value)
 
 
 def _by_trial(rows: Rows, effect: Transient, course: Array) -> dict[str, Array]:

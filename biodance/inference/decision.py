@@ -184,16 +184,18 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
 
 
 def _told(rows: Rows, one: NamedCause) -> bool:
-    """Return whether a cause is large enough to be told: its size matters, and what it changes in this session's wrench
-    does; one that only observations show must be larger than laboratories have without calling it a fault.
+    """Return whether a cause is large enough to be told: it matters, is larger than laboratories have without calling
+    it a fault (by a standard deviation), and what it changes in this session's wrench matters.
     """
     if not matters(one.effect, one.theta) or _is_contradicted(rows, one):
         return False
     if one.course:
         return True
+    usual = one.effect.parameters[0].usual_at(one.effect.target)
+    if usual > 0 and abs(one.theta[0]) <= usual + one.covariance[0, 0] ** 0.5:
+        return False
     if rows.problem is None:
-        usual = one.effect.parameters[0].usual_at(one.effect.target)
-        return bool(abs(one.theta[0]) > usual + one.covariance[0, 0] ** 0.5)
+        return True
     felt = rows.problem.felt(changes(rows.problem, one.effect, one.theta)[:, None])[0]
     return bool(felt >= 1.0 or (rows.observed(one.effect) != 0).any())
 
@@ -268,7 +270,7 @@ def _landmarks(best: Hypothesis, rows: Rows) -> dict[str, tuple[float, float]]:
     """
     if rows.evidence is None:
         return {}
-    first = rows.X.shape[1] - len(rows.evidence.norms)
+    first = best.columns.X.shape[1] - len(rows.evidence.norms)
     found = {}
     for k, name in enumerate(rows.evidence.norms):
         if LANDMARK in name:

@@ -7,6 +7,7 @@ from scipy.special import logsumexp
 
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key
+from biodance.inference.columns import Columns
 from biodance.inference.rows import Rows
 from biodance.inference.scales import ScaledFit
 from biodance.records import Array
@@ -15,19 +16,34 @@ from biodance.records import Array
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A set of causes with their sizes: ``log_posterior`` up to a constant of the session, and of the unknown beside
-    it (``log_unknown``); ``Z`` (r, k) columns and ``y`` (r,) target beside all that is no fault; ``surety`` (r,) by
-    which rows are scaled because no cause is quite like its model.
+    it (``log_unknown``); ``Z`` (r, k) columns and ``y`` (r,) target beside all that is no fault; ``sure`` (Q + 1,) by
+    which the rows of each noise group are scaled because no cause is quite like its model.
     """
 
     causes: tuple[NamedCause, ...]
-    rows: Rows
+    columns: Columns
     fit: ScaledFit
     log_posterior: float
     Z: Array
     y: Array
-    surety: Array
+    sure: Array
     log_unknown: float = -np.inf
     where_unknown: tuple[int, int] = (0, 0)
+
+    @property
+    def rows(self) -> Rows:
+        """Evidence of the session."""
+        return self.columns.rows
+
+    @property
+    def surety(self) -> Array:
+        """(r,) by which each row is scaled."""
+        return np.asarray(self.sure[self.rows.block])
+
+    @property
+    def log_sure(self) -> float:
+        """Logarithm of the determinant of that scaling."""
+        return float(np.log(self.surety).sum())
 
     @property
     def names(self) -> frozenset[tuple[str, str]]:
@@ -37,8 +53,13 @@ class Hypothesis:
     @property
     def left(self) -> Array:
         """(r,) whitened rows that the posterior mean leaves, in units of their noise."""
-        K, size = self.rows.X.shape[1], self.fit.coefficients
-        return np.asarray(self.surety * (self.y - self.rows.X @ size[:K] - self.Z @ size[K:]))
+        K, size = self.columns.X.shape[1], self.fit.coefficients
+        return np.asarray(self.surety * (self.y - self.columns.X @ size[:K] - self.Z @ size[K:]))
+
+    @property
+    def coefficients(self) -> Array:
+        """(P,) posterior mean per unit of `Rows.X`."""
+        return np.asarray(self.columns.turn @ self.fit.coefficients[: self.columns.X.shape[1]])
 
     @property
     def phi(self) -> Array:
@@ -47,7 +68,7 @@ class Hypothesis:
         return (
             np.empty(0)
             if found is None
-            else found.prior.phi + found.factor @ self.fit.coefficients[: found.factor.shape[1]]
+            else found.prior.phi + found.factor @ self.coefficients[: found.factor.shape[1]]
         )
 
     def whole(self, one: NamedCause) -> Array:
@@ -55,7 +76,7 @@ class Hypothesis:
         what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
         """
         where, unit = self.rows.tolerated.get(cause_key(one), (slice(0), np.zeros((one.theta.size, 0))))
-        return np.asarray(one.theta + unit @ self.fit.coefficients[where])
+        return np.asarray(one.theta + unit @ self.coefficients[where])
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from biodance.diagnosis.problem import Problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Effect
 from biodance.effects.filter_mismatch import FilterMismatch
-from biodance.records import Array
+from biodance.records import CHANNELS, Array
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances, key_of, whitened
 
@@ -82,12 +82,25 @@ class Rows:
         """Number of rows that come from plates and markers; observations follow them."""
         return 0 if self.problem is None else len(self.problem.target)
 
+    @property
+    def noises(self) -> int:
+        """Number of noise groups that rows of plates and markers may have."""
+        return len(CHANNELS) * len(BANDS) + 1
+
     def white(self, rows: Array) -> Array:
         """Return ``rows`` (r', n) of plates and markers in units of their nominal standard deviation."""
         if self.problem is None:
             return rows
         band = self.problem.spectrum.band
         return whitened(rows, band, marker_keys(self.problem), _mass(self.problem), self.tolerances)
+
+    def mean_square(self, rows: Array) -> Array:
+        """Return (Q + 1,) the mean square of ``rows`` (r,) in each band and channel of the plates; zero in markers and
+        observations.
+        """
+        block = self.block[: self.plates]
+        count = np.bincount(block, minlength=self.noises + 1)
+        return np.bincount(block, rows[: self.plates] ** 2, self.noises + 1) / np.maximum(count, 1)
 
     def possible(self, effect: Effect, theta: Array) -> bool:
         """Return whether a cause of size ``theta`` (p,) can be in this session."""

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.linalg.lapack import dpotri
 
+from biodance.inference.columns import Columns
 from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.records import Array
 
@@ -35,7 +36,9 @@ the body, of soft tissue, and of tolerances.
 """
 FLOOR = -0.3
 """Logarithm below which no group is believed to be smaller than where its size was learned."""
-_STEPS, _DONE, _FAR = 12, 0.02, 0.7
+CONVERGED = 0.02
+"""Change of the logarithm of a scale below which its search ends."""
+_STEPS, _FAR = 12, 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +52,9 @@ class Scales:
     weights: Array
 
     def far(self, other: "Scales") -> float:
-        """Return how far the logarithms of scales of columns and noise lie from others."""
-        return max(float(np.abs(self.groups - other.groups).max(initial=0.0)), abs(self.noise - other.noise))
+        """Return how far the logarithms of scales of columns and noise, and the weights, lie from others."""
+        columns = np.abs(self.groups - other.groups).max(initial=0.0)
+        return float(max(columns, abs(self.noise - other.noise), np.abs(self.weights - other.weights).max(initial=0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +116,16 @@ class ScaledFit:
 
     def curvature(self, count: int) -> Curvature:
         """Return what the data tell of the scales of ``count`` groups."""
-        half, group = dpotri(self.lower, lower=True)[0], self.products.group
-        C = np.tril(half) + np.tril(half, -1).T
-        known = np.zeros(count)
+        half, group = dpotri(self.lower, lower=True)[0], self.products.group  # C below its diagonal, zero above
+        own, known = np.diag(half), np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)
-            known[g] = 2 * np.sum((np.eye(here.size) - C[np.ix_(here, here)]) ** 2)
-        plates = self.products.plates[:-1, :-1] * np.exp(-2 * self.scales.noise)
-        taken = float(np.sum(C * (self.size[:, None] * plates * self.size)))
-        shares = np.bincount(group[group >= 0], weights=np.diag(C)[group >= 0], minlength=count).astype(float)
-        return Curvature(shares, known, taken)
+            within = half[np.ix_(here, here)]
+            known[g] = 4 * np.sum(within**2) - 4 * np.sum(own[here] ** 2) + 2 * np.sum((1 - own[here]) ** 2)
+        plates = self.products.plates[:-1, :-1]
+        both = 2 * self.size @ (half * plates) @ self.size - self.size**2 @ (own * np.diag(plates))
+        shares = np.bincount(group[group >= 0], weights=own[group >= 0], minlength=count).astype(float)
+        return Curvature(shares, known, float(both * np.exp(-2 * self.scales.noise)))
 
 
 def nominal(rows: Rows) -> Scales:
@@ -129,33 +133,32 @@ def nominal(rows: Rows) -> Scales:
     return Scales(np.zeros(len(rows.groups)), 0.0, np.ones(len(rows.y) - rows.simulated))
 
 
-def products(rows: Rows, X: Array, y: Array, group: NDArray[np.intp]) -> Products:
-    """Return the inner products of columns ``X`` (r, K) and target ``y`` (r,)."""
-    both = np.concatenate([X, y[:, None]], axis=1)
-    n, r = rows.plates, rows.simulated
-    observed = both[r:]
-    used = np.flatnonzero(observed.any(axis=0))
-    return Products(both[:n].T @ both[:n], both[n:r].T @ both[n:r], observed, used, n, group)
-
-
-def widened(found: Products, rows: Rows, X: Array, Z: Array, y: Array) -> Products:
-    """Return ``found``, the products of columns ``X`` (r, K), with further columns ``Z`` (r, p) of fixed scale between
-    them and the target ``y`` (r,).
+def products(columns: Columns, Z: Array, y: Array, sure: Array) -> Products:
+    """Return the inner products of all ``columns``, further ones ``Z`` (r, p) of fixed scale and the target ``y`` (r,),
+    where rows of the plates are scaled by that of ``sure`` (Q + 1,) for their band and channel.
     """
+    rows, X, square = columns.rows, columns.X, sure**2
     n, r, K = rows.plates, rows.simulated, X.shape[1]
     tail = np.concatenate([Z, y[:, None]], axis=1)
+    heavy = square[rows.block][:, None] * tail
 
     def put(inner: Array, part: slice) -> Array:
         out = np.empty((K + tail.shape[1], K + tail.shape[1]))
-        cross = X[part].T @ tail[part]
-        out[:K, :K], out[:K, K:], out[K:, :K] = inner[:K, :K], cross, cross.T
-        out[K:, K:] = tail[part].T @ tail[part]
+        cross = X[part].T @ heavy[part]
+        out[:K, :K], out[:K, K:], out[K:, :K] = inner, cross, cross.T
+        out[K:, K:] = tail[part].T @ heavy[part]
         return out
 
+    plates = put(columns.plates if (sure == 1).all() else columns.scaled(square), slice(n))
+    markers = put(columns.inner[-1], slice(n, r))
     observed = np.concatenate([X[r:], tail[r:]], axis=1)
     used = np.flatnonzero(observed.any(axis=0))
-    group = np.concatenate([found.group, np.full(Z.shape[1], -1)])
-    return Products(put(found.plates, slice(n)), put(found.markers, slice(n, r)), observed, used, n, group)
+    return Products(plates, markers, observed, used, n, np.append(columns.group, np.full(Z.shape[1], -1)))
+
+
+def bare(columns: Columns) -> Products:
+    """Return the inner products of the columns with the session's target."""
+    return products(columns, np.empty((len(columns.X), 0)), columns.rows.y, np.ones(columns.rows.noises + 1))
 
 
 def prior_sd(rows: Rows) -> Array:
@@ -164,18 +167,15 @@ def prior_sd(rows: Rows) -> Array:
     return np.array([known.get(name, TOLERANCE) for name in rows.groups])
 
 
-def fit(found: Products, sd: Array, start: Scales, *, steps: int = _STEPS, least: float = -np.inf) -> ScaledFit:
+def fit(found: Products, sd: Array, start: Scales, *, least: float = 0.0) -> ScaledFit:
     """Return the posterior at the most probable scales, whose logarithms have prior standard deviations ``sd`` (G,),
-    searched for from ``start``; the noise is at least ``least`` and no less than where everything was learned.
+    searched for from ``start``; the noise is at least ``least``.
     """
     at = replace(start, noise=max(start.noise, least))
-    for step in range(steps + 1):
+    for _ in range(_STEPS):
         one = posterior(found, sd, at)
-        if step == steps:
-            break
-        moved, at = _moved(one, sd, one.curvature(sd.size))
-        at = replace(at, noise=max(at.noise, least, 0.0))
-        if moved < _DONE:
+        at = nearer(one, sd, least)
+        if at.far(one.scales) < CONVERGED:
             break
     return one
 
@@ -200,8 +200,11 @@ def posterior(found: Products, sd: Array, at: Scales) -> ScaledFit:
     return ScaledFit(lower, u, size, at, float(value), square, found)
 
 
-def _moved(one: ScaledFit, sd: Array, known: Curvature) -> tuple[float, Scales]:
-    """Return how far the scales move in one step of Fisher scoring, and where to."""
+def nearer(one: ScaledFit, sd: Array, least: float = 0.0) -> Scales:
+    """Return the scales after one step of Fisher scoring; no group is believed to be smaller than `FLOOR`, and no noise
+    than ``least``.
+    """
+    known = one.curvature(sd.size)
     at, found, free = one.scales, one.products, one.products.group >= 0
     own = np.bincount(found.group[free], minlength=sd.size)
     square = np.bincount(found.group[free], weights=one.u[free] ** 2, minlength=sd.size) + known.shares
@@ -212,6 +215,4 @@ def _moved(one: ScaledFit, sd: Array, known: Curvature) -> tuple[float, Scales]:
     groups, noise = np.clip(groups, -_FAR, _FAR), float(np.clip(noise, -_FAR, _FAR))
     w = np.append(-one.coefficients, 1.0)
     weights = (TAIL + 1) / (TAIL + (found.observed @ w) ** 2)
-    change = max(np.abs(groups).max(initial=0.0), abs(noise), np.abs(weights - at.weights).max(initial=0.0))
-    moved = replace(at, groups=np.maximum(at.groups + groups, FLOOR), noise=at.noise + noise, weights=weights)
-    return float(change), moved
+    return Scales(np.maximum(at.groups + groups, FLOOR), max(at.noise + noise, least), weights)

@@ -14,12 +14,13 @@ from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
+from biodance.inference.columns import Columns
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import Rows, observed_causes, rows_of
-from biodance.inference.scales import fit, nominal, prior_sd, products
+from biodance.inference.scales import bare, fit, nominal, prior_sd
 from biodance.inference.sets import Search, hypothesis, infer
 from biodance.inference.unknown import with_unknown
 from biodance.records import Array, Sip
@@ -228,4 +229,4 @@ def _log_evidence(
         sign_reversed={},
     )
     rows = rows_of(None, causes, known, some, everywhere=True)
-    return fit(products(rows, rows.X, rows.y, rows.group), prior_sd(rows), nominal(rows)).log_evidence
+    return fit(bare(Columns.of(rows)), prior_sd(rows), nominal(rows)).log_evidence

@@ -18,26 +18,27 @@ from scipy.linalg import solve_triangular
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key, unlike
+from biodance.inference.columns import Columns
 from biodance.inference.hypotheses import Hypothesis, Posterior, Scored
 from biodance.inference.rows import TOLERATED, Rows
 from biodance.inference.scales import (
+    CONVERGED,
     TAIL,
-    Products,
     ScaledFit,
     Scales,
+    bare,
     fit,
+    nearer,
     nominal,
     posterior,
     prior_sd,
     products,
-    widened,
 )
 from biodance.inference.unknown import UNKNOWN, energies, with_unknown
 from biodance.records import CHANNELS, Array
 
 MOST, _REFINED, _BRANCHES = 3, 6, 2
-_ROUNDS, _STEPS, _SETTLED = 6, 3, 0.02
-_AGAIN = 1
+_ROUNDS = 12
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
 _GROWN = 0.1
@@ -46,17 +47,17 @@ _GROWN = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What every hypothesis of a session shares: the ``rows``, products ``inner`` of the columns that are no fault, the
-    ``causes`` with whitened columns ``Z`` (r, k) in ``cuts`` and their products with all others; ``prior`` log odds.
+    """What every hypothesis of a session shares: the ``rows``, their ``columns`` that are no fault, the ``causes`` with
+    whitened columns ``Z`` (r, k) in ``cuts`` and their products with all others; ``prior`` log odds.
     """
 
     rows: Rows
     causes: tuple[Candidate, ...]
     prior: Mapping[tuple[str, str], float]
-    inner: Products
+    columns: Columns
     Z: Array
     cuts: tuple[slice, ...]
-    least: float = -np.inf
+    least: float = 0.0
 
     @classmethod
     def of(cls, rows: Rows, causes: Sequence[Candidate]) -> "Search":
@@ -69,24 +70,25 @@ class Search:
                 own = rows.observed(one.effect)[:, loud]
                 below[:, cut.start : cut.start + loud.size] = own * SCALE * one.effect.typical[loud]
         Z = np.concatenate([rows.white(Z), below])
-        return cls(rows, tuple(causes), log_priors(causes), products(rows, rows.X, rows.y, rows.group), Z, cuts)
+        return cls(rows, tuple(causes), log_priors(causes), Columns.of(rows), Z, cuts)
 
     @cached_property
-    def crossed(self) -> tuple[Array, Array]:
-        """(K, k) products of columns that are no fault with those of the causes: in the plates, in all markers."""
-        n, r = self.rows.plates, self.rows.simulated
-        return self.rows.X[:n].T @ self.Z[:n], self.rows.X[n:r].T @ self.Z[n:r]
+    def crossed(self) -> Array:
+        """(Q, K, k) products of columns that are no fault with those of the causes, in each noise group."""
+        return self.columns.within(self.Z)
 
     def crossed_at(self, weight: Array) -> Array:
-        """Return (K, k) X' W Z where all rows of the plates have one weight, and all of the markers."""
-        r, loud = self.rows.simulated, weight[0] if self.rows.plates else 1.0
-        return loud * self.crossed[0] + self.crossed[1] + self.rows.X[r:].T @ (weight[r:, None] * self.Z[r:])
+        """Return (K, k) X' W Z where the rows of a noise group have one weight."""
+        rows, r = self.rows, self.rows.simulated
+        groups = np.zeros(rows.noises)
+        groups[rows.block[:r]] = weight[:r]
+        return np.tensordot(groups, self.crossed, 1) + self.columns.X[r:].T @ (weight[r:, None] * self.Z[r:])
 
     def score(self, base: "Hypothesis", Z: Array) -> tuple[Array, Array]:
         """Return score (k,) and information (k, k) of further whitened columns ``Z`` (r, k) beside a hypothesis."""
         weight = self.weight(base)
         weighted = weight[:, None] * Z
-        cross = np.concatenate([self.rows.X.T @ weighted, base.Z.T @ weighted])
+        cross = np.concatenate([self.columns.X.T @ weighted, base.Z.T @ weighted])
         half = solve_triangular(base.fit.lower, base.fit.size[:, None] * cross, lower=True, check_finite=False)
         return weighted.T @ (base.left / base.surety), Z.T @ weighted - half.T @ half
 
@@ -99,7 +101,7 @@ class Search:
     @cached_property
     def start(self) -> ScaledFit:
         """The posterior without any cause."""
-        return fit(self.inner, prior_sd(self.rows), nominal(self.rows), least=self.least)
+        return fit(bare(self.columns), prior_sd(self.rows), nominal(self.rows), least=self.least)
 
 
 Further = Callable[[Search, Hypothesis], tuple[Hypothesis, ...]]
@@ -117,15 +119,25 @@ def infer(search: Search, further: Further = lambda _search, _base: ()) -> Poste
         bases = dict.fromkeys((bare, found.best))
         more = tuple(with_unknown(new) for base in bases for new in further(search, base))
         found = replace(found, hypotheses=(*found.hypotheses, *more))
-    for _ in range(_AGAIN):
-        best = found.best
-        if found.unknown < UNKNOWN:
+    if found.unknown < UNKNOWN:
+        return found
+    louder = replace(search, least=_as_loud_everywhere(search, found.best))
+    return replace(_searched(louder), known_unknown=found.unknown, before=found.best)
+
+
+def _as_loud_everywhere(search: Search, one: Hypothesis) -> float:
+    """Return the logarithm of the noise under which no band and channel leaves more than it beside the causes of a
+    hypothesis: what is no fault is then as large as anywhere, and excuses nothing of it.
+    """
+    loud = one.fit.scales.noise
+    for _ in range(_ROUNDS):
+        square, count = energies(one)
+        more = 0.5 * float(np.log(square[count > 0].max()))
+        if more < CONVERGED:
             break
-        square, count = energies(best)
-        louder = best.fit.scales.noise + 0.5 * float(np.log(square[count > 0].max()))
-        search = replace(search, least=louder)
-        found = replace(_searched(search), known_unknown=found.unknown, before=best)
-    return found
+        loud = max(loud, one.fit.scales.noise) + more
+        one = hypothesis(replace(search, least=loud), one.causes, one.fit.scales)
+    return loud
 
 
 def _searched(search: Search) -> Posterior:
@@ -173,35 +185,29 @@ def log_priors(causes: Sequence[Candidate]) -> Mapping[tuple[str, str], float]:
 
 
 def hypothesis(search: Search, causes: tuple[NamedCause, ...], start: Scales | None = None) -> Hypothesis:
-    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps about the sizes; each cause
-    may be unlike its model by up to its share (`unlike_models`).
+    """Return a set of causes at its most probable sizes and scales, by Gauss-Newton steps of the sizes and Fisher
+    scoring of the scales in turn; each cause may be unlike its model by up to its share (`unlike_models`).
     """
-    rows = search.rows
+    rows, columns = search.rows, search.columns
+    sure = np.ones(rows.noises + 1)
     if not causes:
-        Z, plain = np.empty((len(rows.y), 0)), np.ones(len(rows.y))
-        return Hypothesis((), rows, search.start, search.start.log_evidence, Z, rows.y, plain)
+        Z = np.empty((len(rows.y), 0))
+        return Hypothesis((), columns, search.start, search.start.log_evidence, Z, rows.y, sure)
     u0 = np.concatenate([one.theta / (SCALE * one.effect.typical) for one in causes])
     at, effects = start or search.start.scales, tuple(one.effect for one in causes)
-    surety = np.ones(len(rows.y))
     for _ in range(_ROUNDS):
         taken = [rows.added(one.effect, one.theta) for one in causes]
         slopes = [rows.slopes(one.effect, one.theta) * (SCALE * one.effect.typical) for one in causes]
         Z = np.concatenate(slopes, axis=1)
         y = rows.y - np.sum(taken, axis=0) + Z @ u0
-        inner, X = search.inner, rows.X
-        if (surety < 1).any():
-            X = surety[:, None] * rows.X
-            inner = products(rows, X, y, rows.group)
-        both = widened(inner, rows, X, surety[:, None] * Z, surety * y)
-        found = fit(both, prior_sd(rows), at, steps=_STEPS, least=search.least)
-        settled, at = found.scales.far(at) < _SETTLED, found.scales
+        found = posterior(products(columns, Z, y, sure), prior_sd(rows), at)
         u, C = found.last(u0.size)
         causes, moved, u0 = _moved(causes, u, C), np.abs(u - u0).max(initial=0.0), u
-        one = Hypothesis(causes, rows, replace(found, products=search.inner), -np.inf, Z, y, surety)
-        surety = unlike_models(one, effects, taken)
-        if moved < _SETTLED and settled and np.abs(surety - one.surety).max(initial=0.0) < _SETTLED:
+        one = Hypothesis(causes, columns, found, -np.inf, Z, y, sure)
+        sure, at = unlike_models(one, effects, taken), nearer(found, prior_sd(rows), search.least)
+        if max(moved, at.far(found.scales), float(np.abs(sure - one.sure).max())) < CONVERGED:
             break
-    value = found.log_evidence + float(np.log(one.surety).sum()) + sum(search.prior[cause_key(c)] for c in causes)
+    value = found.log_evidence + one.log_sure + sum(search.prior[cause_key(c)] for c in causes)
     possible = all(rows.possible(c.effect, c.theta) for c in causes)
     return replace(one, log_posterior=value) if possible else one
 
@@ -217,30 +223,25 @@ def _moved(causes: tuple[NamedCause, ...], u: Array, C: Array) -> tuple[NamedCau
 
 
 def unlike_models(one: Hypothesis, effects: Sequence[Effect], taken: Sequence[Array]) -> Array:
-    """Return (r,) by which rows are scaled because no cause is quite like its model: in each band and channel it leaves
-    up to the share `unlike` of what it adds there (``taken`` (r,) of each), as much as the hypothesis leaves beyond the
-    session's noise.
+    """Return (Q + 1,) by which rows are scaled because no cause is quite like its model: in each band and channel it
+    leaves up to the share `unlike` of what it adds there (``taken`` (r,) of each), as much as the hypothesis leaves
+    beyond the session's noise.
     """
-    rows, n = one.rows, one.rows.plates
-    block = rows.block[:n]
-    count, loud = np.maximum(np.bincount(block), 1), np.exp(-2 * one.fit.scales.noise)
-    most = np.zeros(count.size)
+    rows = one.rows
+    loud = np.exp(-2 * one.fit.scales.noise)
+    most = np.zeros(rows.noises + 1)
     for effect, added in zip(effects, taken, strict=True):
-        most += unlike(effect) ** 2 * loud * np.bincount(block, weights=added[:n] ** 2) / count
+        most += unlike(effect) ** 2 * loud * rows.mean_square(added)
     most[: len(CHANNELS)] = 0.0  # a mean is a size, and says nothing of a shape
-    left = loud * np.bincount(block, weights=(one.left / one.surety)[:n] ** 2) / count
-    extra = np.clip(left - 1.0, 0.0, most)[block]
-    return np.concatenate([1 / np.sqrt(1 + extra), np.ones(len(rows.y) - n)])
+    left = loud * rows.mean_square(one.left / one.surety)
+    return np.asarray(1 / np.sqrt(1 + np.clip(left - 1.0, 0.0, most)))
 
 
 def at_scales(search: Search, base: Hypothesis, scales: Scales) -> Hypothesis:
     """Return a hypothesis under other scales."""
-    rows, surety = search.rows, base.surety
-    X, y = surety[:, None] * rows.X, surety * base.y
-    inner = widened(products(rows, X, y, rows.group), rows, X, surety[:, None] * base.Z, y)
-    found = posterior(inner, prior_sd(rows), scales)
+    found = posterior(products(search.columns, base.Z, base.y, base.sure), prior_sd(search.rows), scales)
     value = base.log_posterior - base.fit.log_evidence + found.log_evidence
-    return replace(base, fit=replace(found, products=search.inner), log_posterior=value)
+    return replace(base, fit=found, log_posterior=value)
 
 
 def screen(search: Search, one: Hypothesis) -> list[Scored]:
@@ -263,7 +264,7 @@ def _scored(search: Search, one: Hypothesis) -> list[Scored]:
     """Return every further cause by the score test at the scales of a hypothesis."""
     r, found, weight = search.rows.simulated, one.fit, search.weight(one)
     left = one.left / one.surety
-    cross = search.crossed_at(weight) if (one.surety == 1).all() else search.rows.X.T @ (weight[:, None] * search.Z)
+    cross = search.crossed_at(weight)
     if one.Z.shape[1]:
         cross = np.concatenate([cross, (one.Z * weight[:, None]).T @ search.Z])
     half = solve_triangular(found.lower, found.size[:, None] * cross, lower=True, check_finite=False)

@@ -1,0 +1,84 @@
+"""The columns that are no fault, turned to what the rows show of them.
+
+Coefficients of one group have one scale, u ~ N(0, lambda^2 1): any rotation of them is as good. In the directions of
+the singular vectors of their columns, most show nothing: they keep what they were before, and need not be carried.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from biodance.inference.rows import Rows
+from biodance.records import Array
+
+_UNSEEN = 1e-3
+"""Square of what a direction does to all rows together, in their standard deviations, below which it shows nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What the rows show of everything that is no fault.
+
+    Parameters
+    ----------
+    rows : Rows
+        Evidence of the session.
+    X : (r, K) array
+        Whitened columns per nominal standard deviation, those that observations share last.
+    group : (K,) array of int
+        Group of each column; -1: its size is known.
+    turn : (P, K) array
+        Coefficients of `Rows.X` for one unit of each column.
+    inner : (Q, K, K) array
+        Products of the columns within each noise group: bands and channels of the plates, then markers.
+    """
+
+    rows: Rows
+    X: Array
+    group: NDArray[np.intp]
+    turn: Array
+    inner: Array
+
+    @classmethod
+    def of(cls, rows: Rows) -> "Columns":
+        """Return the columns of ``rows`` in the directions that these show."""
+        parts, group = [], []
+        for g in [*range(len(rows.groups)), -1]:
+            here = np.flatnonzero(rows.group == g)
+            way = np.eye(here.size)
+            if g >= 0:
+                square, way = eigh(rows.X[:, here].T @ rows.X[:, here], check_finite=False)
+                way = way[:, square > _UNSEEN]
+            whole = np.zeros((rows.group.size, way.shape[1]))
+            whole[here] = way
+            parts.append(whole)
+            group += [g] * way.shape[1]
+        turn = np.concatenate(parts, axis=1)
+        X = rows.X @ turn
+        return cls(rows, X, np.array(group, dtype=int), turn, _within(rows, X, X))
+
+    @cached_property
+    def plates(self) -> Array:
+        """(K, K) products of the columns in all rows of the plates."""
+        return self.scaled(np.ones(len(self.inner)))
+
+    def scaled(self, weight: Array) -> Array:
+        """Return `plates` where each band and channel has its ``weight`` (Q,)."""
+        return np.tensordot(weight[: len(self.inner) - 1], self.inner[:-1], 1)
+
+    def within(self, Z: Array) -> Array:
+        """Return (Q, K, k) the products of the columns with others ``Z`` (r, k) in each noise group."""
+        return _within(self.rows, self.X, Z)
+
+
+def _within(rows: Rows, X: Array, Z: Array) -> Array:
+    """Return (Q, K, k) the products of ``X`` (r, K) and ``Z`` (r, k) in each noise group."""
+    block = rows.block[: rows.simulated]
+    order = np.argsort(block, kind="stable")
+    ends = np.searchsorted(block[order], np.arange(rows.noises + 1))
+    X, Z = X[order], Z[order]
+    return np.array([X[a:b].T @ Z[a:b] for a, b in pairwise(ends)])
