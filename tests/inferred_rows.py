@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.diagnosis.candidates import SCALE, Candidate
 from biodance.effects import Effect, Parameter
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, TOLERATED, Rows
 from biodance.inference.scales import LOUD, Scales, prior_sd
 from biodance.inference.sets import Search, log_priors
@@ -92,7 +92,7 @@ def search(drawn: DrawnRows) -> Search:
     )
     Z = np.concatenate([SCALE * one for one in drawn.columns.values()], axis=1)
     cuts = tuple(slice(k, k + 1) for k in range(len(every)))
-    return Search(drawn, every, log_priors(every), Columns.of(drawn), Z, cuts)
+    return Search(drawn, every, log_priors(every), VisibleColumns.of(drawn), Z, cuts)
 
 
 def covariance(drawn: DrawnRows, scales: Scales, *more: Array) -> Array:

@@ -15,7 +15,7 @@ from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, effects
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, TOLERATED, rows_of
 from biodance.inference.scales import bare, nominal, posterior, prior_sd
 from biodance.inference.sets import Search, at_scales, hypothesis
@@ -77,7 +77,7 @@ def test_the_evidence_is_the_density_of_the_forces_in_newtons() -> None:
     columns = [sizes.get(f"{one.name} {one.target}", 0.0) * put.unit(one)[:n] for one in plates]
     X = np.concatenate([put.sip[:n], *columns], axis=1)
     density = multivariate_normal(np.zeros(n), noise + X @ X.T).logpdf(put.target[:n])
-    inner = bare(Columns.of(found))
+    inner = bare(VisibleColumns.of(found))
     value = posterior(replace(inner, markers=0 * inner.markers), prior_sd(found), nominal(found)).log_evidence
     turned = -0.5 * n * np.log(2 * np.pi) - sum(np.linalg.slogdet(coloured[b])[1] for b in put.spectrum.band)
     assert value + turned == pytest.approx(density, abs=1e-3)
@@ -116,7 +116,7 @@ def test_what_an_observation_says_of_a_zero_moves_the_zero_of_the_forces() -> No
     heard, _ = rows(told(0.9, 0.9, sd=0.1))
     at = {}
     for name, found in (("silent", silent), ("heard", heard)):
-        columns = Columns.of(found)
+        columns = VisibleColumns.of(found)
         fitted = posterior(bare(columns), prior_sd(found), nominal(found))
         where, unit = found.tolerated[OFFSET]
         at[name] = float((unit @ (columns.turn @ fitted.coefficients)[where])[0])

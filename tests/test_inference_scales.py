@@ -8,7 +8,7 @@ from inferred_rows import covariance, log_prior, rows, with_target
 from scipy.stats import multivariate_normal
 from scipy.stats import t as student
 
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.scales import (
     FLESH,
     FLOOR,
@@ -33,7 +33,7 @@ SCALES = (
 
 
 def inner(drawn):
-    return bare(Columns.of(drawn))
+    return bare(VisibleColumns.of(drawn))
 
 
 def sure(drawn):
@@ -60,7 +60,7 @@ def test_columns_of_a_cause_widen_the_density() -> None:
     rng = np.random.default_rng(2)
     drawn, scales = rows(rng, observations=0), SCALES[2]
     Z, constant = rng.normal(size=(len(drawn.y), 2)), -0.5 * len(drawn.y) * np.log(2 * np.pi)
-    found = posterior(products(Columns.of(drawn), Z, drawn.y, sure(drawn)), prior_sd(drawn), scales)
+    found = posterior(products(VisibleColumns.of(drawn), Z, drawn.y, sure(drawn)), prior_sd(drawn), scales)
     assert found.log_evidence == pytest.approx(density(drawn, scales, Z) - constant, rel=1e-10)
     C = covariance(drawn, scales)
     known = Z.T @ np.linalg.solve(C, Z) + np.eye(2)
@@ -73,7 +73,7 @@ def test_products_are_those_of_all_columns_at_once_each_row_as_sure_as_its_band_
     rng = np.random.default_rng(3)
     drawn = rows(rng)
     Z, y = rng.normal(size=(len(drawn.y), 3)), rng.normal(size=len(drawn.y))
-    columns, unsure = Columns.of(drawn), sure(drawn)
+    columns, unsure = VisibleColumns.of(drawn), sure(drawn)
     unsure[:12] = rng.uniform(0.3, 1.0, 12)
     found = products(columns, Z, y, unsure)
     both = unsure[drawn.block][:, None] * np.column_stack([drawn.X @ columns.turn, Z, y])
@@ -88,7 +88,7 @@ def test_directions_that_the_rows_do_not_show_are_not_carried_and_miss_nowhere()
     """Twelve columns of which only the sums of pairs are seen: the density of the target is that of all of them."""
     drawn, scales = rows(np.random.default_rng(11), observations=0), SCALES[1]
     blind = replace(drawn, X=np.repeat(drawn.X[:, ::2], 2, axis=1))
-    columns = Columns.of(blind)
+    columns = VisibleColumns.of(blind)
     assert columns.X.shape[1] == 6
     constant = -0.5 * len(blind.y) * np.log(2 * np.pi)
     found = posterior(bare(columns), prior_sd(blind), scales)
@@ -103,7 +103,7 @@ def test_observations_have_student_s_errors_and_their_weights_the_curvature() ->
     drawn = rows(np.random.default_rng(4))
     at = Scales(np.array([0.2, 0.0, -0.1]), 0.3, np.array([1.0, 0.5, 0.2, 0.9, 1.1]))
     found = posterior(inner(drawn), prior_sd(drawn), at)
-    X = (drawn.X @ Columns.of(drawn).turn) * np.exp(at.groups)[drawn.group]
+    X = (drawn.X @ VisibleColumns.of(drawn).turn) * np.exp(at.groups)[drawn.group]
     C = covariance(drawn, at)
     u = X.T @ np.linalg.solve(C, drawn.y)
     np.testing.assert_allclose(found.u, u, rtol=1e-9)
@@ -183,7 +183,7 @@ def test_one_outlier_among_observations_moves_nothing_and_stays_one() -> None:
     value = np.array([1.1, 0.9, 1.0, 1.2, 26.0])
     alone = replace(drawn, X=X, y=value)
     one = fit(inner(alone), prior_sd(alone), nominal(alone))
-    told = float((alone.X @ Columns.of(alone).turn @ one.coefficients)[0])
+    told = float((alone.X @ VisibleColumns.of(alone).turn @ one.coefficients)[0])
     assert told == pytest.approx(1.05, abs=0.2)
     assert one.scales.weights[-1] < 0.02
     assert one.scales.weights[:-1].min() > 1.0

@@ -20,7 +20,7 @@ _UNSEEN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class VisibleColumns:
     """What the rows show of everything that is no fault.
 
     Parameters
@@ -44,7 +44,7 @@ class Columns:
     inner: Array
 
     @classmethod
-    def of(cls, rows: Rows) -> "Columns":
+    def of(cls, rows: Rows) -> "VisibleColumns":
         """Return the columns of ``rows`` in the directions that these show."""
         parts, group = [], []
         for g in [*range(len(rows.groups)), -1]:

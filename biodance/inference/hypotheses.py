@@ -7,7 +7,7 @@ from scipy.special import logsumexp
 
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import Rows
 from biodance.inference.scales import ScaledFit
 from biodance.records import Array
@@ -21,7 +21,7 @@ class Hypothesis:
     """
 
     causes: tuple[NamedCause, ...]
-    columns: Columns
+    columns: VisibleColumns
     fit: ScaledFit
     log_posterior: float
     Z: Array

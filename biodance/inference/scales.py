@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.linalg.lapack import dpotri
 
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.records import Array
 
@@ -133,7 +133,7 @@ def nominal(rows: Rows) -> Scales:
     return Scales(np.zeros(len(rows.groups)), 0.0, np.ones(len(rows.y) - rows.simulated))
 
 
-def products(columns: Columns, Z: Array, y: Array, sure: Array) -> Products:
+def products(columns: VisibleColumns, Z: Array, y: Array, sure: Array) -> Products:
     """Return the inner products of all ``columns``, further ones ``Z`` (r, p) of fixed scale and the target ``y`` (r,),
     where rows of the plates are scaled by that of ``sure`` (Q + 1,) for their band and channel.
     """
@@ -156,7 +156,7 @@ def products(columns: Columns, Z: Array, y: Array, sure: Array) -> Products:
     return Products(plates, markers, observed, used, n, np.append(columns.group, np.full(Z.shape[1], -1)))
 
 
-def bare(columns: Columns) -> Products:
+def bare(columns: VisibleColumns) -> Products:
     """Return the inner products of the columns with the session's target."""
     return products(columns, np.empty((len(columns.X), 0)), columns.rows.y, np.ones(columns.rows.noises + 1))
 

@@ -14,7 +14,7 @@ from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.contact import with_contacts
 from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
@@ -229,4 +229,4 @@ def _log_evidence(
         sign_reversed={},
     )
     rows = rows_of(None, causes, known, some, everywhere=True)
-    return fit(bare(Columns.of(rows)), prior_sd(rows), nominal(rows)).log_evidence
+    return fit(bare(VisibleColumns.of(rows)), prior_sd(rows), nominal(rows)).log_evidence

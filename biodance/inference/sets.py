@@ -18,7 +18,7 @@ from scipy.linalg import solve_triangular
 from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key, unlike
-from biodance.inference.columns import Columns
+from biodance.inference.columns import VisibleColumns
 from biodance.inference.hypotheses import Hypothesis, Posterior, Scored
 from biodance.inference.rows import TOLERATED, Rows
 from biodance.inference.scales import (
@@ -54,7 +54,7 @@ class Search:
     rows: Rows
     causes: tuple[Candidate, ...]
     prior: Mapping[tuple[str, str], float]
-    columns: Columns
+    columns: VisibleColumns
     Z: Array
     cuts: tuple[slice, ...]
     least: float = 0.0
@@ -70,7 +70,7 @@ class Search:
                 own = rows.observed(one.effect)[:, loud]
                 below[:, cut.start : cut.start + loud.size] = own * SCALE * one.effect.typical[loud]
         Z = np.concatenate([rows.white(Z), below])
-        return cls(rows, tuple(causes), log_priors(causes), Columns.of(rows), Z, cuts)
+        return cls(rows, tuple(causes), log_priors(causes), VisibleColumns.of(rows), Z, cuts)
 
     @cached_property
     def crossed(self) -> Array:
