@@ -41,6 +41,8 @@ _REACH = 0.15
 """m from where it is expected that a pressure lies at most because a plate is not quite where the file says (five times
 what plates are off in laboratories); what lies farther is of another foot, of plates exchanged or of a wrong sign.
 """
+CONTACTS = 2
+"""Contacts with a plate from which one tells what it does wrong: a single one errs by what nobody foresees."""
 _EXACT = ("empty_plate", "flight", "standing_force", "standing_twist")
 """Observers of which Newton alone says what they see: plates with nobody on them; who stands still has a weight, and no
 other force or turn.
@@ -109,7 +111,7 @@ class ObservedEvidence:
 
     def contacts(self, cause: tuple[str, str] | None = None) -> int:
         """Return how many contacts of the person with the plates there are, or tell a cause: in how many its usual
-        fault is larger than what one observation errs by. What is exact needs none: 2 then.
+        fault is larger than what one observation errs by. What is exact needs none: `CONTACTS` then.
         """
         told = np.ones(len(self.observations), dtype=bool)
         if cause is not None:
@@ -117,7 +119,7 @@ class ObservedEvidence:
             told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= own)
         seen = [one for one, here in zip(self.observations, told, strict=True) if here]
         touched = {one.contact for one in seen if one.observer not in _EXACT}
-        return 2 if cause and any(one.observer in _EXACT for one in seen) else len(touched)
+        return CONTACTS if cause and any(one.observer in _EXACT for one in seen) else len(touched)
 
     def strongest(self, index: int) -> tuple[str, str]:
         """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""

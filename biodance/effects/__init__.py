@@ -14,7 +14,8 @@ from types import MappingProxyType
 
 from biodance.discovery import Chosen, Family
 from biodance.effects._base.case import Case
-from biodance.effects._base.effect import Effect, Parameter
+from biodance.effects._base.effect import ChannelEffect, Effect, Parameter
+from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.named_cause import NamedCause
 from biodance.effects._base.quality_check import Checked, DiscreteEffect, QualityCheck, Recorded, unit_at, unit_of
 from biodance.effects._base.quantity import Quantity
@@ -29,10 +30,12 @@ __all__ = [
     "Case",
     "Cause",
     "CauseWords",
+    "ChannelEffect",
     "CheckKind",
     "Checked",
     "DiscreteEffect",
     "Effect",
+    "InstalledPlate",
     "NamedCause",
     "Parameter",
     "QualityCheck",

@@ -3,7 +3,7 @@
 A cause is named where it, or a look-alike in its place, is there with at least the probability `NAMED`, and what it
 does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place, and whatever the data
 cannot tell from it, however rare it is. Its size is averaged over all sets of causes that hold it without a look-alike.
-No delay is named that Newton contradicts.
+No delay is named that Newton contradicts, and no fault of a plate from one step on it.
 """
 
 from collections.abc import Mapping, Set
@@ -16,7 +16,8 @@ from biodance.diagnosis.candidates import TOGETHER, changes
 from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
 from biodance.diagnosis.reasons import Reason
-from biodance.effects import NamedCause, unit_at
+from biodance.diagnosis.witness_evidence import CONTACTS
+from biodance.effects import ChannelEffect, InstalledPlate, NamedCause, unit_at
 from biodance.effects.added_mass import AddedMass
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.time_delay import TimeDelay
@@ -187,7 +188,7 @@ def _told(rows: Rows, one: NamedCause) -> bool:
     """Return whether a cause is large enough to be told: it matters, is larger than laboratories have without calling
     it a fault (by a standard deviation), and what it changes in this session's wrench matters.
     """
-    if not matters(one.effect, one.theta) or _is_contradicted(rows, one):
+    if not matters(one.effect, one.theta) or _is_contradicted(rows, one) or _is_of_one_step(rows, one):
         return False
     if one.course:
         return True
@@ -211,6 +212,19 @@ def _is_contradicted(rows: Rows, one: NamedCause) -> bool:
     share = np.array([o.sd**-2 for o in lags])
     lag = float(share @ [o.value for o in lags] / share.sum())
     return abs(lag) < abs(lag - one.theta[0])
+
+
+def _is_of_one_step(rows: Rows, one: NamedCause) -> bool:
+    """Return whether a cause is a plate's, and people walk over that plate once: one step errs as a whole, by what
+    nobody foresees, and cannot be told from the plate.
+    """
+    if rows.evidence is None or not isinstance(one.effect, ChannelEffect | InstalledPlate):
+        return False
+    steps = [o for o in rows.evidence.observations if o.plate and o.contact[1]]
+    plate = one.effect.target.partition(":")[0]
+    own = {o.contact for o in steps if o.plate == plate or plate not in {p.plate for p in steps}}
+    exact = rows.evidence.contacts(cause_key(one)) if cause_key(one) in rows.evidence.causes else 0
+    return len(own) == 1 and exact < CONTACTS
 
 
 def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
@@ -292,7 +306,7 @@ def _habit(best: Hypothesis, rows: Rows, findings: tuple[Finding, ...]) -> tuple
         for one in (rows.evidence.observations if rows.evidence else ())
         if any(LANDMARK in n for n in one.norms)
     }
-    if not shown or len(contacts) < 2 or any(a.effect == ToeLandmark.name for f in findings for a in f.set):
+    if not shown or len(contacts) < CONTACTS or any(a.effect == ToeLandmark.name for f in findings for a in f.set):
         return ()
     sizes = tuple(
         Estimate("backwards" if name.endswith("along") else "inwards", v, sd, "m") for name, (v, sd) in shown.items()

@@ -12,7 +12,7 @@ from biodance.diagnosis.model import build_model, causes_of
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
 from biodance.diagnosis.reasons import Reason
-from biodance.diagnosis.witness_evidence import ObservedEvidence
+from biodance.diagnosis.witness_evidence import CONTACTS, ObservedEvidence
 from biodance.effects import Case, Cause, Effect, Transient
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.contact import with_contacts
@@ -201,7 +201,7 @@ def _turned(
         return ()
     best, name = max(found)
     probability = float(1 / (1 + np.exp(-best)))
-    if probability < NAMED or counting.contacts() < 2:
+    if probability < NAMED or counting.contacts() < CONTACTS:
         return ()
     alike = tuple(Alias(*other, float(value)) for value, other in sorted(found, reverse=True) if best - value <= 3.0)
     advice = (
