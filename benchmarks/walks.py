@@ -113,7 +113,7 @@ def named(session: Session, evidence: ObservedEvidence) -> tuple[Finding, ...]:
     """Return what checks and witnesses name in a session."""
     checks = check_quality(session, chosen=("clipping", "axis_error"))
     failed = tuple(Finding(one.effect, one.target, (), (), 1.0) for one in checks if not one.ok)
-    said = judge(None, evidence, shipped(), causes(), Diagnosis("unexplained", ())).diagnosis.findings
+    said = judge(None, evidence, shipped(), causes(), Diagnosis(False, ())).diagnosis.findings
     return (*failed, *(one for one in said if not failed or one.effect == "axis_error"))
 
 

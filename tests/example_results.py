@@ -162,15 +162,15 @@ def refused_session() -> SessionResult:
 LEFT = (Adequacy("Fx", (0.3, 1.0), 12.0, "walk", 1.0, 5.0),)
 UNLIKE = {Reason.FORCES_LEFT: ()}
 FOUND = Finding("plate_gain", "Fz", (Estimate("gain", 0.06, 0.002, "1"),), (Alias("plate_gain", "Fz", 80.0),), 0.9)
-WHOLE = Diagnosis("nothing wrong", ())
+WHOLE = Diagnosis(True, ())
 VERDICTS = (
     WHOLE,
-    replace(WHOLE, verdict="named, complete", findings=(FOUND,)),
-    replace(WHOLE, verdict="named, incomplete", findings=(FOUND,), adequacy=LEFT, why=UNLIKE),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, why=UNLIKE),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, resembles=(FOUND,), why=UNLIKE),
-    replace(WHOLE, verdict="unexplained", adequacy=LEFT, why={Reason.ONLY_STANDING: (), **UNLIKE}),
-    replace(WHOLE, verdict="unexplained"),
+    replace(WHOLE, explained=True, findings=(FOUND,)),
+    replace(WHOLE, explained=False, findings=(FOUND,), adequacy=LEFT, why=UNLIKE),
+    replace(WHOLE, explained=False, adequacy=LEFT, why=UNLIKE),
+    replace(WHOLE, explained=False, adequacy=LEFT, resembles=(FOUND,), why=UNLIKE),
+    replace(WHOLE, explained=False, adequacy=LEFT, why={Reason.ONLY_STANDING: (), **UNLIKE}),
+    replace(WHOLE, explained=False),
 )
 """Every verdict, with what may stand beside it."""
 

@@ -7,7 +7,7 @@ from biodance.identification.added_mass import LoadCandidate, LoadSearch
 from biodance.identification.load_posterior import MASSES, LoadPosterior
 
 PLACE = np.array([0.01, -0.12, 0.02])
-NOTHING = Diagnosis("nothing wrong", ())
+NOTHING = Diagnosis(True, ())
 GAIN = Finding("plate_gain", "Fz", (Estimate("gain", 0.04, 0.01, "1"),), (Alias("plate_gain", "Fz", 9.0),), 0.2)
 OWN = Finding(
     "added_mass", "left_thigh", (Estimate("mass", 1.9, 0.2, "kg"),), (Alias("added_mass", "left_thigh", 30.0),), 0.1

@@ -17,7 +17,7 @@ from biodance.uncertainty.tolerances import Tolerances, shipped
 
 SILENT = ObservedEvidence((), {}, {}, {})
 """Nothing observed."""
-BARE = Diagnosis("unexplained", ())
+BARE = Diagnosis(False, ())
 """Before any judgement."""
 
 

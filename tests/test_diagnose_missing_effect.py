@@ -19,7 +19,7 @@ def test_several_crosstalks_are_a_plate_that_lies_elsewhere() -> None:
     assert (one.verdict, one.findings) == ("unexplained", ())
     assert {f.effect for f in one.resembles} == {"plate_crosstalk"}
     assert len(one.resembles) > 1
-    assert Reason.SEVERAL_CROSSTALKS in one.reasons
+    assert Reason.SEVERAL_CROSSTALKS in one.why
 
 
 def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
@@ -27,4 +27,4 @@ def test_what_nobody_looks_for_does_not_hide_in_its_tolerance() -> None:
     some = windows(1, trials=2, hidden=gain(0.05))
     one = inferred(body(), some, tolerances=known(), effects=("time_delay",)).diagnosis
     assert (one.verdict, one.findings) == ("unexplained", ())
-    assert Reason.OUTSIDE_TOLERANCES in one.reasons
+    assert Reason.OUTSIDE_TOLERANCES in one.why

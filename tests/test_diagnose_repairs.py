@@ -13,7 +13,7 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
 from biodance.diagnosis.repairs import with_repairs
 from biodance.uncertainty.tolerances import shipped
 
-CLEAN = Diagnosis("nothing wrong", ())
+CLEAN = Diagnosis(True, ())
 HIP = JointError("right_hip", 0.012, 0.0, contradicted=True, moved=0.066)
 
 
@@ -64,7 +64,7 @@ def test_no_marker_moved_beside_a_joint_that_stood_off_its_axes(joint: str, told
 @pytest.mark.parametrize("pair", ["RKNE/LKNE", "LWRA/LWRB"])
 def test_nothing_moved_in_a_body_that_exchanged_labels_placed(pair: str) -> None:
     exchanged = Finding("labels_swapped", pair, (), (Alias("labels_swapped", pair, 30.0),), 1.0)
-    told = replace(CLEAN, verdict="named, incomplete", findings=(exchanged,))
+    told = replace(CLEAN, explained=False, findings=(exchanged,))
     assert named(JointError("right_knee", 0.007, 0.1, moved=0.04, spared="RKNE"), told) == told
 
 
@@ -74,7 +74,7 @@ def test_nothing_moved_in_a_body_that_exchanged_labels_placed(pair: str) -> None
         (JointError("right_knee", 0.007, 0.1, moved=0.15, spared="RKNE"), CLEAN, None),
         (JointError("right_hip", 0.012, 0.0, moved=0.02), CLEAN, None),
         (HIP._replace(reach=0.03, reach_sd=0.02), CLEAN, None),
-        (HIP, replace(CLEAN, verdict="unexplained"), None),
+        (HIP, replace(CLEAN, explained=False), None),
         (HIP, CLEAN, ("plate_gain", "marker_misplaced")),
     ],
     ids=[
@@ -93,6 +93,6 @@ def test_no_marker_is_accused_beside_a_joint_that_a_named_girdle_carries() -> No
     """The movement placed the shoulder on a trunk that was taken for stiff."""
     error = JointError("right_knee", 0.007, 0.1, moved=0.04, spared="RKNE")
     girdle = Finding("shoulder_girdle", "", (), (Alias("shoulder_girdle", "", 90.0),), 1.0)
-    told = replace(CLEAN, verdict="named, complete", findings=(girdle,))
+    told = replace(CLEAN, explained=True, findings=(girdle,))
     assert len(named(error, told).findings) == 2
     assert named(error._replace(joint="right_shoulder"), told) == told

@@ -37,7 +37,7 @@ def roped(effect: str = "rope") -> Diagnosis:
     """Return a diagnosis as the engine writes it: effects by name."""
     size = Estimate("pull", 30.0, 2.0, "N")
     other = Finding("plate_offset", "Fz", (size,), (Alias("plate_offset", "Fz", 9.0), Alias(effect, "", 8.0)), 1.0)
-    return Diagnosis("named, complete", (Finding(effect, "", (size,), (Alias(effect, "", 9.0),), 1.0), other))
+    return Diagnosis(True, (Finding(effect, "", (size,), (Alias(effect, "", 9.0),), 1.0), other))
 
 
 def test_a_cause_given_as_an_object_is_told_in_its_own_words() -> None:

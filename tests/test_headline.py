@@ -61,7 +61,7 @@ def found() -> list[Diagnosis]:
     for effect, size, others in itertools.product({*causes(), "shaking_floor"}, (0.0212, -1234.5), ((), ALSO)):
         one = named(effect, size, others)
         for more, why in itertools.product(((), (named("body_mass", 2.0, ()),) * 7), ({}, {Reason.FORCES_LEFT: ()})):
-            out.append(Diagnosis("named, incomplete", (one, *more), adequacy=LEFT, why=why))
+            out.append(Diagnosis(False, (one, *more), adequacy=LEFT, why=why))
     for reason in Reason:
         for about in (
             (),
@@ -69,7 +69,7 @@ def found() -> list[Diagnosis]:
             (thigh,),
             ("far " * 40,),
         ):
-            out.append(Diagnosis("unexplained", (), adequacy=LEFT, why={reason: about}))
+            out.append(Diagnosis(False, (), adequacy=LEFT, why={reason: about}))
     return out
 
 
@@ -119,21 +119,21 @@ def test_every_headline_is_short_plain_and_has_one_thing_to_do(judged: tuple[Jud
     ],
 )  # fmt: skip
 def test_a_cause_is_told_with_its_size_its_interval_and_what_to_do(finding: Finding, told: str) -> None:
-    assert headline(Diagnosis("named, complete", (finding,)), (STATIC,), frozenset({"static"})).text == told
+    assert headline(Diagnosis(True, (finding,)), (STATIC,), frozenset({"static"})).text == told
 
 
 def test_exchanged_labels_are_told_in_one_breath() -> None:
     labels = tuple(
         Finding("labels_swapped", f"L{a}/R{a}", (), (Alias("labels_swapped", a, 9.0),), 1.0) for a in ("FIN", "WRA")
     )
-    said = headline(Diagnosis("named, incomplete", labels), (STATIC,), frozenset({"static"}))
+    said = headline(Diagnosis(False, labels), (STATIC,), frozenset({"static"}))
     assert (
         said.text == "LFIN and RFIN, LWRA and RWRA carry each other's names. Exchange them, or accept the correction."
     )
 
 
 def test_a_clean_session_says_what_it_rests_on() -> None:
-    clean = Diagnosis("nothing wrong", ())
+    clean = Diagnosis(True, ())
     said = headline(clean, (STATIC, WALKED), frozenset({"static"}))
     assert (said.level, said.text) == ("note", "Nothing wrong was found in 3 s of standing and 12 s of movement.")
     stepped = headline(clean, (STATIC, STEPS), frozenset({"static"}))
@@ -145,7 +145,7 @@ def test_a_clean_session_says_what_it_rests_on() -> None:
 
 @pytest.mark.parametrize("reason", list(Reason))
 def test_what_a_session_ends_with_follows_from_its_reasons(reason: Reason) -> None:
-    one = Diagnosis("unexplained", (), why={reason: ()})
+    one = Diagnosis(False, (), why={reason: ()})
     untold = reason in DOUBTS | STRANGE
     assert (one.status is DiagnosisStatus.CANNOT_TELL) is untold
     assert replace(one, why={reason: (), Reason.LIMIT_BROKEN: ()}).status is DiagnosisStatus.UNKNOWN

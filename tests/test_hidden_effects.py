@@ -126,7 +126,7 @@ def test_a_fault_written_into_real_standing_is_told_as_what_weighing_can_see(
     weight = {"plate_gain": 0.08 * static.subject.mass, "plate_offset": 30 / 9.81}[text.partition(":")[0]]
     size = {"body_mass": weight, "plate_gain": weight / static.subject.mass, "plate_offset": 9.81 * weight}
     assert finding.parameters[0].value == pytest.approx(size[finding.effect], abs=2.5 * finding.parameters[0].sd)
-    assert Reason.ONLY_STANDING in diagnosis.reasons
+    assert Reason.ONLY_STANDING in diagnosis.why
 
 
 def test_a_real_walk_gets_no_name_that_feet_and_clocks_exclude(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,7 +34,7 @@ def test_standing_alone_names_nothing_however_large() -> None:
     assert [one.effect for one in moving.diagnosis.findings] == ["plate_offset"]
     quiet = inferred(body(), standing_looks(40.0), tolerances=known(), effects=FAST).diagnosis
     assert (quiet.findings, quiet.resembles) == ((), ())
-    assert Reason.ONLY_STANDING in quiet.reasons
+    assert Reason.ONLY_STANDING in quiet.why
 
 
 def test_only_what_is_physics_keeps_a_mean_and_the_rest_is_spread() -> None:

@@ -12,11 +12,11 @@ from scipy.stats import multivariate_normal, norm
 from biodance.diagnosis.candidates import SCALE
 from biodance.effects import NamedCause
 from biodance.inference.causes import UNLIKE
-from biodance.inference.hypotheses import Hypothesis, Posterior
+from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior
 from biodance.inference.scales import FLOOR, Scales, nominal, posterior, prior_sd
 from biodance.inference.scales import LOUD as LOUDNESS
 from biodance.inference.sets import hypothesis, infer, screen
-from biodance.inference.unknown import EXCESS, OWN, P_UNKNOWN, UNKNOWN, energies, with_unknown
+from biodance.inference.unknown import EXCESS, OWN, P_UNKNOWN, energies, with_unknown
 
 
 class Likely(Drawn):

@@ -11,7 +11,7 @@ CAUSES = ("time_delay", "plate_offset", "added_mass", "body_mass")
 
 def test_a_delay_is_named_however_strange_the_body_is() -> None:
     one = inferred(body(), windows(1, hidden=delay, unlike=4.0), tolerances=known(), effects=CAUSES).diagnosis
-    assert Reason.UNUSUAL_BODY in one.reasons
+    assert Reason.UNUSUAL_BODY in one.why
     (finding,) = one.findings
     (size,) = finding.parameters
     assert finding.effect == "time_delay"

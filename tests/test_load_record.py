@@ -43,13 +43,13 @@ def test_the_finding_is_the_record_of_the_search(named: tuple[Finding, ...]) -> 
 
 def test_a_load_is_never_beside_nothing_wrong() -> None:
     assert with_load(NOTHING, found(*FOREARM)).verdict == "named, complete"
-    assert with_load(replace(NOTHING, verdict="unexplained"), found(*FOREARM)).verdict == "named, incomplete"
+    assert with_load(replace(NOTHING, explained=False), found(*FOREARM)).verdict == "named, incomplete"
     assert with_load(NOTHING, None) is NOTHING
     assert with_load(NOTHING, replace(found(*FOREARM), p_no_load=0.9)) is NOTHING
 
 
 def test_weight_that_a_gain_explains_is_no_second_cause() -> None:
-    told = with_load(replace(NOTHING, verdict="named, complete", findings=(GAIN,)), found(*FOREARM))
+    told = with_load(replace(NOTHING, explained=True, findings=(GAIN,)), found(*FOREARM))
     (one,) = told.findings
     assert (one.effect, [a.effect for a in one.set]) == ("plate_gain", ["plate_gain", "added_mass", "added_mass"])
     assert alternatives(one) == ["a load"]
@@ -66,7 +66,7 @@ HEAVY = Finding(
 
 
 def test_a_load_of_which_only_the_weight_is_known_lies_where_the_search_says() -> None:
-    weighed = replace(NOTHING, verdict="named, incomplete", findings=(HEAVY,))
+    weighed = replace(NOTHING, explained=False, findings=(HEAVY,))
     (sure,) = with_load(weighed, found(*FOREARM)).findings
     assert (sure.effect, sure.target, sure.parameters[0].value) == (
         "added_mass", "left_forearm_hand", found(*FOREARM).best.mass
@@ -82,9 +82,9 @@ def test_a_load_of_which_only_the_weight_is_known_lies_where_the_search_says() -
 
 def test_a_load_that_was_found_goes_before_a_gain_that_is_not_told_from_it() -> None:
     same = replace(GAIN, set=(*GAIN.set, Alias("added_mass", "trunk_head", 8.0)))
-    (one,) = with_load(replace(NOTHING, verdict="named, complete", findings=(same,)), found(*FOREARM)).findings
+    (one,) = with_load(replace(NOTHING, explained=True, findings=(same,)), found(*FOREARM)).findings
     assert [a.effect for a in one.set] == ["added_mass", "added_mass", "plate_gain"]
-    unsure = replace(NOTHING, verdict="named, complete", findings=(same,))
+    unsure = replace(NOTHING, explained=True, findings=(same,))
     assert with_load(unsure, replace(found(*FOREARM), p_no_load=0.3)).findings == (same,)
 
 

@@ -109,7 +109,7 @@ def test_diagnose_begins_with_its_headline() -> None:
 )
 def test_what_is_strange_is_no_alarm_before_a_limit_is_broken(reasons: tuple[Reason, ...]) -> None:
     quiet, why = (replace(LEFT[0], z=1.0),), dict.fromkeys(reasons, ())
-    strange = replace(WHOLE, verdict="unexplained", adequacy=quiet, why=why, resembles=(FOUND,))
+    strange = replace(WHOLE, explained=False, adequacy=quiet, why=why, resembles=(FOUND,))
     for one, level, begins in (
         (strange, "warn", "Nobody can tell whether anything is wrong"),
         (replace(strange, why=why | {Reason.OUTSIDE_EVERY_LABORATORY: ()}), "fail", "Something is wrong"),
@@ -124,7 +124,7 @@ def test_what_is_strange_is_no_alarm_before_a_limit_is_broken(reasons: tuple[Rea
 @pytest.mark.parametrize(
     ("verdict", "judged", "then"),
     [
-        (replace(WHOLE, verdict="unexplained"), (MISSED,), "Mend what stands below"),
+        (replace(WHOLE, explained=False), (MISSED,), "Mend what stands below"),
         (WHOLE, (replace(STATIC, seconds=0.0), MISSED), "Record a few squats"),
         (VERDICTS[5], (STATIC,), "Record a few squats"),
         (
@@ -200,9 +200,7 @@ def test_a_trial_with_a_failed_check_is_not_ok() -> None:
 
 
 SURE = replace(FOUND, probability=0.9712)
-NAMED = replace(
-    WHOLE, verdict="named, complete", findings=(SURE, replace(FOUND, effect="time_delay", probability=0.88))
-)
+NAMED = replace(WHOLE, explained=True, findings=(SURE, replace(FOUND, effect="time_delay", probability=0.88)))
 ALONE = {Reason.FORCES_LEFT: ()}
 
 
@@ -212,9 +210,9 @@ ALONE = {Reason.FORCES_LEFT: ()}
         (replace(WHOLE, p_clean=0.93, p_unknown=0.02), 0.93, "Nothing is wrong in what was judged: P = 0.93."),
         (replace(WHOLE, p_clean=0.9999), 0.9999, "Nothing is wrong in what was judged: P &gt; 0.99."),
         (NAMED, 0.9712, "there: P = 0.97."),
-        (replace(WHOLE, verdict="unexplained", why=ALONE, p_unknown=0.61), 0.61, "is not named: P = 0.61."),
-        (replace(WHOLE, verdict="unexplained", why={Reason.LIMIT_BROKEN: ()}, p_unknown=0.1), 1.0, "P &gt; 0.99."),
-        (replace(WHOLE, verdict="unexplained", why={Reason.ONLY_STANDING: ()}, p_unknown=0.7), None, ""),
+        (replace(WHOLE, explained=False, why=ALONE, p_unknown=0.61), 0.61, "is not named: P = 0.61."),
+        (replace(WHOLE, explained=False, why={Reason.LIMIT_BROKEN: ()}, p_unknown=0.1), 1.0, "P &gt; 0.99."),
+        (replace(WHOLE, explained=False, why={Reason.ONLY_STANDING: ()}, p_unknown=0.7), None, ""),
     ],
     ids=("clean", "surely clean", "named", "unknown", "limit broken", "cannot tell"),
 )

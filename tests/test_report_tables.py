@@ -20,7 +20,7 @@ from biodance.report.tables import tables_folder, write_tables
 
 GAIN = Gain(np.ones(6), np.full(6, 0.8), (0.1, 0.3), ("squat_1",))
 DIAGNOSIS = Diagnosis(
-    "named, complete",
+    True,
     (
         Finding(
             "joint_centre",

@@ -103,7 +103,7 @@ def test_accepting_writes_lab_file_and_corrected_trials(tmp_path: Path) -> None:
     load = replace(place, effect="added_mass", target="trunk_head", parameters=(Estimate("mass", 2.0, 0.1, "kg"),))
     turned = replace(place, effect="plate_rotation", target="plate1:z", gain=replace(proven, ci95=(-0.1, 0.2)))
     unmeasured = replace(turned, target="plate1:x", gain=None)
-    found = SessionDiagnosis(Diagnosis(verdict="named, complete", findings=(place, zero, load, turned, unmeasured)))
+    found = SessionDiagnosis(Diagnosis(explained=True, findings=(place, zero, load, turned, unmeasured)))
     told, files = _accepted(replace(session_result(), session=session), found, tmp_path, ())
     assert told["trials"] == ("t",)
     assert told["not_in_recordings"] == []

@@ -69,28 +69,23 @@ def test_forces_that_fit_a_doubtful_body_do_not_end_as_nothing_wrong() -> None:
     trials = tuple(replace(trial, checks=()) for trial in result.trials)
     odd = replace(body(), notes=("Warning: the right thigh is 38 mm shorter than the left thigh: check the markers.",))
     doubtful = replace(result, trials=trials, checks=(), body=odd)
-    one = reconcile_with_checks(Diagnosis("nothing wrong", ()), doubtful, (STATIC,))
+    one = reconcile_with_checks(Diagnosis(True, ()), doubtful, (STATIC,))
     assert one.verdict == "unexplained"
     assert one.status is DiagnosisStatus.CANNOT_TELL
     assert one.attention[0].text == (
         "Nobody can tell whether anything is wrong: the right thigh is 38 mm shorter than the left thigh. Mend it, and "
         "run this again."
     )
-    assert (
-        reconcile_with_checks(Diagnosis("named, complete", (FOUND,)), doubtful, (STATIC,)).verdict
-        == "named, incomplete"
-    )
+    assert reconcile_with_checks(Diagnosis(True, (FOUND,)), doubtful, (STATIC,)).verdict == "named, incomplete"
     thigh = replace(FOUND, effect="segment_length", target="right_thigh")
-    assert (
-        reconcile_with_checks(Diagnosis("named, complete", (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
-    )
+    assert reconcile_with_checks(Diagnosis(True, (thigh,)), doubtful, (STATIC,)).verdict == "named, complete"
 
 
 def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
     full = full_session()
     result = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=())
-    assert reconcile_with_checks(Diagnosis("nothing wrong", ()), result, (STATIC,)).verdict == "nothing wrong"
-    one = reconcile_with_checks(Diagnosis("nothing wrong", ()), result, (replace(STATIC, seconds=0.0), WALK))
+    assert reconcile_with_checks(Diagnosis(True, ()), result, (STATIC,)).verdict == "nothing wrong"
+    one = reconcile_with_checks(Diagnosis(True, ()), result, (replace(STATIC, seconds=0.0), WALK))
     assert one.verdict == "unexplained"
     assert one.attention[0].text.startswith("Nobody can tell whether anything is wrong: none of the movement")
     assert not is_well(one)
@@ -99,7 +94,7 @@ def test_a_session_whose_walks_were_all_left_out_cannot_tell() -> None:
 def test_a_unit_whose_factor_has_no_interval_is_told_in_words() -> None:
     said = "The plates carry 0.4536 times the declared weight: pounds declared as kilograms."
     quality = QualityCheck("weight on the plates", False, said, "unit_error", "", 0.4536, "factor", "1")
-    one = with_failed((quality,), Diagnosis("unexplained", ()))
+    one = with_failed((quality,), Diagnosis(False, ()))
     assert (
         headline(one, (), frozenset()).text == "A unit is mistaken by a factor of 0.45. Correct it, and run this again."
     )
@@ -110,10 +105,10 @@ def test_beside_a_refused_step_nothing_is_well() -> None:
     full = full_session()
     calm = replace(full, trials=tuple(replace(trial, checks=()) for trial in full.trials), checks=(), steps=())
     refused = replace(calm, steps=(Step("body", "refused", "No stature."),))
-    told = [reconcile_with_checks(Diagnosis("nothing wrong", ()), some, (STATIC,)) for some in (calm, refused)]
+    told = [reconcile_with_checks(Diagnosis(True, ()), some, (STATIC,)) for some in (calm, refused)]
     assert [one.verdict for one in told] == ["nothing wrong", "nothing wrong"]
     assert [is_well(one) for one in told] == [True, False]
-    light = reconcile_with_checks(Diagnosis("nothing wrong", ()), replace(calm, weighed=None), (STATIC,))
+    light = reconcile_with_checks(Diagnosis(True, ()), replace(calm, weighed=None), (STATIC,))
     assert is_well(light)
     assert [line.text for line in light.attention[1:]] == [NOT_WEIGHED]
 
@@ -138,7 +133,7 @@ def test_a_size_that_is_hardly_known_says_so() -> None:
     shaky = replace(FOUND, parameters=(Estimate("gain", 0.06, 0.05, "1"),))
     assert "hardly known" in in_words(shaky)
     assert "hardly known" not in in_words(FOUND)
-    assert "6 % too much (0 to 16)" in headline(Diagnosis("named, complete", (shaky,)), (STATIC,), frozenset()).text
+    assert "6 % too much (0 to 16)" in headline(Diagnosis(True, (shaky,)), (STATIC,), frozenset()).text
 
 
 @pytest.mark.parametrize(("late", "told"), [(0.034, "forces late"), (-0.034, "forces early")])

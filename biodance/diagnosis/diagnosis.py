@@ -28,14 +28,12 @@ if TYPE_CHECKING:
 
 Verdict = Literal["nothing wrong", "named, complete", "named, incomplete", "unexplained"]
 ABOUT = "diagnosis"
-"""What the one of a diagnosis's sentences is about that says the verdict."""
+"""What the sentence is about that says the verdict."""
 
 
 @dataclass(frozen=True)
 class Alias:
-    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` (natural) against "nothing wrong";
-    ``kind`` as in `Finding`.
-    """
+    """A cause that the data cannot tell from the one named; ``log_bayes_factor`` against none; ``kind``: `Finding`."""
 
     effect: str
     target: str
@@ -143,8 +141,8 @@ class Diagnosis:
 
     Parameters
     ----------
-    verdict : str
-        "nothing wrong", "named, complete", "named, incomplete" or "unexplained".
+    explained : bool
+        Whether the findings explain all that matters, and it could be judged.
     findings : tuple of Finding
         In the order found.
     checks : tuple
@@ -180,7 +178,7 @@ class Diagnosis:
     Diagnosis(nothing wrong)
     """
 
-    verdict: Verdict
+    explained: bool
     findings: tuple[Finding, ...]
     checks: "tuple[QualityCheck, ...]" = ()
     adequacy: tuple[Adequacy, ...] = ()
@@ -204,9 +202,16 @@ class Diagnosis:
         return display.card(repr(self), self.table(), self.notes)
 
     @property
-    def reasons(self) -> tuple[Reason, ...]:
-        """The reasons alone."""
-        return tuple(self.why)
+    def verdict(self) -> Verdict:
+        """What it ends with, in the words of the results (`status` is the enum)."""
+        if self.faults:
+            return "named, complete" if self.explained else "named, incomplete"
+        return "nothing wrong" if self.explained else "unexplained"
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing wrong was found, and all that matters could be judged."""
+        return self.explained and not self.faults
 
     @property
     def doubted(self) -> bool:
@@ -216,7 +221,7 @@ class Diagnosis:
     @property
     def status(self) -> DiagnosisStatus:
         """What it ends with."""
-        return status_of(self.why, named=bool(self.faults), clean=self.verdict == "nothing wrong")
+        return status_of(self.why, named=bool(self.faults), clean=self.is_clean)
 
     @property
     def probability(self) -> float:
@@ -237,9 +242,8 @@ class Diagnosis:
     def told(self) -> str:
         """Verdict and names of the causes in one line."""
         causes = ", ".join(f"{one.effect} {one.target}".strip() for one in self.faults)
-        said = [one.level for one in self.attention if one.about == ABOUT]
-        part = self.verdict == "nothing wrong" and said not in ([], ["note"])
-        return f"{self.verdict}{' in what could be judged' if part else ''}{f': {causes}' if causes else ''}"
+        partly = self.is_clean and any(one.level != "note" for one in self.attention if one.about == ABOUT)
+        return f"{self.verdict}{' in what could be judged' if partly else ''}{f': {causes}' if causes else ''}"
 
     def table(self) -> "pd.DataFrame":
         """Return one row for each parameter of each finding.

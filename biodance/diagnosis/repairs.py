@@ -38,14 +38,13 @@ def with_repairs(
         joint for one in diagnosis.findings if one.effect in family for joint in family[one.effect].carries
     )
     found = () if exchanged else tuple(repairs(cases, known, family, carried))
-    if not found or diagnosis.verdict == "unexplained":
+    if not found or not (diagnosis.explained or diagnosis.faults):
         return diagnosis
-    told = diagnosis.verdict
-    if told == "nothing wrong":  # what is left may be too small to matter and still no normal band
-        told = "named, complete" if all(row.z <= LIMIT for row in diagnosis.adequacy) else "named, incomplete"
+    # what is left may be too small to matter and still no normal band
+    explained = diagnosis.explained and (diagnosis.faults or all(row.z <= LIMIT for row in diagnosis.adequacy))
     new = {(one.effect, one.target) for one in found}
     rest = tuple(one for one in diagnosis.findings if (one.effect, one.target) not in new)
-    return replace(diagnosis, verdict=told, findings=(*found, *rest))
+    return replace(diagnosis, explained=bool(explained), findings=(*found, *rest))
 
 
 def repairs(
@@ -127,7 +126,6 @@ def with_failed(failed: tuple[QualityCheck, ...], left: Diagnosis) -> Diagnosis:
     raw = tuple(one for one in told if one.cause.raw)
     return replace(
         left,
-        verdict="named, complete" if left.verdict in ("nothing wrong", "named, complete") else "named, incomplete",
         findings=(*raw, *rest, *(one for one in told if one not in raw)),
         notes=(note, *left.notes),
         why={reason: about for reason, about in left.why.items() if reason not in DOUBTS},
@@ -153,7 +151,6 @@ def named_first(diagnosis: Diagnosis, checks: tuple[QualityCheck, ...], *notes: 
     rest = tuple(one for one in diagnosis.findings if (one.effect, one.target) not in named)
     return replace(
         diagnosis,
-        verdict="named, complete" if diagnosis.verdict == "nothing wrong" else diagnosis.verdict,
         findings=(*rest, *found) if all(quality.mended for quality in checks) else (*found, *rest),
         notes=(*notes, *diagnosis.notes),
     )

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 
 from biodance.diagnosis.candidates import TOGETHER, changes
 from biodance.diagnosis.consequence import matters
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.witness_evidence import CONTACTS
 from biodance.effects import ChannelEffect, InstalledPlate, NamedCause, unit_at
@@ -23,12 +23,11 @@ from biodance.effects.body_mass import BodyMass
 from biodance.effects.time_delay import TimeDelay
 from biodance.effects.toe_landmark import ToeLandmark
 from biodance.inference.causes import cause_key
-from biodance.inference.hypotheses import Hypothesis, Posterior
+from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Key, Posterior
 from biodance.inference.left import adequacy
 from biodance.inference.rows import BODY, SOFT, Rows
 from biodance.inference.scales import prior_sd
 from biodance.inference.sets import Search, hypothesis
-from biodance.inference.unknown import UNKNOWN
 from biodance.observations import LANDMARK, shift_per_sd
 from biodance.observations.newton import Newton
 from biodance.records import SIDES, Array
@@ -45,7 +44,6 @@ _HABIT = 0.010
 
 UNPLACED_LOAD = (AddedMass.name, "")
 """Effect and target of a load of which only the weight is known."""
-Key = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +103,29 @@ class Inferred:
 
 
 def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
-    """Return every cause of the most probable set, with what may stand in its place; where one of several is not sure
-    beside the others, of the most probable set without it.
+    """Return every cause of the most probable set, with what may stand in its place, as probable as with and without
+    an unknown cause; where one of several is not sure beside the others, of the most probable set without it.
     """
-    best = posterior.best
+    lead = posterior.lead
+    return tuple(replace(one, probability=_whatever_the_noise(posterior, one)) for one in _places(lead, prior))
+
+
+def _whatever_the_noise(posterior: Posterior, place: Place) -> float:
+    """Return the probability that a cause of a ``place`` is there: with an unknown cause, which makes all louder, or
+    without.
+    """
+    if posterior.louder is None:
+        return place.probability
+    with_it = posterior.lead is posterior.louder
+    other = replace(posterior, louder=None) if with_it else posterior.louder
+    share = posterior.unknown if with_it else 1 - posterior.unknown
+    names = {name for name, *_ in place.shares}
+    return share * place.probability + (1 - share) * other.share(names)
+
+
+def _places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
+    """Return the places of the causes at one noise."""
+    best = posterior.unexplained
     while True:
         found = tuple(_place(posterior, best, cause, prior) for cause in best.causes)
         unsure = min(found, key=lambda one: one.probability, default=None)
@@ -163,15 +180,12 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     unknown = posterior.unknown >= UNKNOWN and any(row.matters for row in left)
     why = dict(bare.why) | dict.fromkeys(_strange(posterior.unexplained, rows) if unknown or named else (), ())
     why |= {Reason.FORCES_LEFT: ()} if unknown else {}
-    verdict: Verdict = "unexplained" if unknown else "nothing wrong"
-    if named:
-        verdict = "named, incomplete" if unknown or resembled else "named, complete"
     findings = tuple(replace(f, set=(*f.set, *_habit_alias(p, best, rows), *_load_alias(p, rows))) for p, f in named)
     habit = _habit(best, rows, findings)
     clean = float(posterior.weights[[not one.causes for one in posterior.hypotheses], 0].sum())
     told = replace(
         bare,
-        verdict=verdict,
+        explained=not (unknown or (named and resembled)),
         why=why,
         findings=(*findings, *habit),
         resembles=tuple(resembled),

@@ -1,5 +1,6 @@
 """What a search over sets of causes finds: each set with its sizes and scales, and the probability of each."""
 
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,11 @@ from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import Rows
 from biodance.inference.scales import ScaledFit
 from biodance.records import Array
+
+Key = tuple[str, str]
+"""Effect and target of a cause."""
+UNKNOWN = 0.5
+"""Probability from which there is an unknown cause."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +52,7 @@ class Hypothesis:
         return float(np.log(self.surety).sum())
 
     @property
-    def names(self) -> frozenset[tuple[str, str]]:
+    def names(self) -> frozenset[Key]:
         """Effect and target of its causes."""
         return frozenset(cause_key(one) for one in self.causes)
 
@@ -90,19 +96,18 @@ class Scored:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone. Where an unknown cause
-    was more probable than none (``known_unknown``), they are at its noise, and ``before`` is the best one without.
+    """Every hypothesis that was fitted; ``screened`` what the score says of every cause alone; ``louder`` the posterior
+    at the noise that an unknown cause makes, where one is probable enough to matter.
     """
 
     hypotheses: tuple[Hypothesis, ...]
     screened: tuple[Scored, ...]
-    known_unknown: float = 0.0
-    before: Hypothesis | None = None
+    louder: "Posterior | None" = None
 
     @property
     def unknown(self) -> float:
         """Probability of an unknown cause."""
-        return max(self.known_unknown, float(self.weights[:, 1].sum()))
+        return float(self.weights[:, 1].sum())
 
     @property
     def weights(self) -> Array:
@@ -111,19 +116,28 @@ class Posterior:
         return np.asarray(np.exp(both - logsumexp(both)))
 
     @property
+    def lead(self) -> "Posterior":
+        """The more probable of the two: as loud as laboratories are, or as an unknown cause makes it."""
+        return self if self.louder is None or self.unknown < UNKNOWN else self.louder
+
+    @property
     def best(self) -> Hypothesis:
-        """The most probable hypothesis."""
-        return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
+        """The most probable hypothesis of the more probable noise."""
+        return self.lead.unexplained
 
     @property
     def unexplained(self) -> Hypothesis:
-        """The hypothesis beside which more may be left than laboratories leave."""
-        return self.before or self.best
+        """The most probable hypothesis where noise is as in laboratories: beside it more may be left."""
+        return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
 
-    def probabilities(self) -> dict[tuple[str, str], float]:
+    def share(self, names: Set[Key]) -> float:
+        """Return the probability that any of the causes ``names`` is there, whatever the noise."""
+        held = [not names.isdisjoint(one.names) for one in self.hypotheses]
+        own = float(self.weights[held].sum())
+        return own if self.louder is None else (1 - self.unknown) * own + self.unknown * self.louder.share(names)
+
+    def probabilities(self) -> dict[Key, float]:
         """Return the probability of every cause."""
-        out: dict[tuple[str, str], float] = {}
-        for one, weight in zip(self.hypotheses, self.weights.sum(axis=1), strict=True):
-            for name in one.names:
-                out[name] = out.get(name, 0.0) + float(weight)
+        every = (*self.hypotheses, *(self.louder.hypotheses if self.louder else ()))
+        out = {name: self.share({name}) for one in every for name in one.names}
         return dict(sorted(out.items(), key=lambda pair: -pair[1]))

@@ -116,7 +116,8 @@ class ScaledFit:
 
     def curvature(self, count: int) -> Curvature:
         """Return what the data tell of the scales of ``count`` groups."""
-        half, group = dpotri(self.lower, lower=True)[0], self.products.group  # C below its diagonal, zero above
+        group = self.products.group
+        half = dpotri(self.lower, lower=True)[0] if group.size else self.lower  # C below its diagonal, zero above
         own, known = np.diag(half), np.zeros(count)
         for g in range(count):
             here = np.flatnonzero(group == g)

@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.candidates import Candidate
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding, Verdict
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Finding
 from biodance.diagnosis.model import build_model, causes_of
 from biodance.diagnosis.observability import detection_limits, hidden, visibility
 from biodance.diagnosis.problem import Problem, TrialWindow, problem
@@ -91,7 +91,7 @@ def judge(
     found = decide(search, posterior, bare)
     sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
     if sign:  # what all other causes do holds only once the sign is mended
-        told = replace(found.diagnosis, findings=sign, verdict="named, incomplete")
+        told = replace(found.diagnosis, findings=sign, explained=False)
         found = replace(found, diagnosis=told, named=())
     return found if rows.problem is not None else replace(found, diagnosis=_with_rest(found.diagnosis, seen, known))
 
@@ -173,15 +173,14 @@ def _with_rest(one: Diagnosis, seen: Seen | None, known: Tolerances) -> Diagnosi
     where nothing was compared with a body, nothing found is not nothing wrong.
     """
     if seen is None:
-        return replace(one, verdict="unexplained") if one.verdict == "nothing wrong" else one
+        return replace(one, explained=one.explained and bool(one.faults))
     rows = rows_of(seen.problem, seen.causes, known, None)
     bare = with_unknown(hypothesis(Search.of(rows, ()), ()))
     left = adequacy(bare, rows)
     if not (bare.log_unknown > bare.log_posterior and any(row.matters for row in left)):
         return replace(one, adequacy=left)
-    verdict: Verdict = "unexplained" if one.verdict == "nothing wrong" else "named, incomplete"
     unknown = float(1 / (1 + np.exp(bare.log_posterior - bare.log_unknown)))
-    return replace(one, adequacy=left, verdict=verdict, why={**one.why, Reason.FORCES_LEFT: ()}, p_unknown=unknown)
+    return replace(one, adequacy=left, explained=False, why={**one.why, Reason.FORCES_LEFT: ()}, p_unknown=unknown)
 
 
 def _turned(

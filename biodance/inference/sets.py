@@ -19,7 +19,7 @@ from biodance.diagnosis.candidates import SCALE, Candidate, bases_of
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key, unlike
 from biodance.inference.columns import VisibleColumns
-from biodance.inference.hypotheses import Hypothesis, Posterior, Scored
+from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior, Scored
 from biodance.inference.rows import TOLERATED, Rows
 from biodance.inference.scales import (
     CONVERGED,
@@ -34,13 +34,15 @@ from biodance.inference.scales import (
     prior_sd,
     products,
 )
-from biodance.inference.unknown import UNKNOWN, energies, with_unknown
+from biodance.inference.unknown import energies, with_unknown
 from biodance.records import CHANNELS, Array
 
 MOST, _REFINED, _BRANCHES = 3, 6, 2
 _ROUNDS = 12
 _LEAST, _BEHIND = -3.0, 6.0
 """Log posterior gain below which no cause is fitted, and by how far a set may lie behind the best and be widened."""
+_IGNORED = 0.05
+"""Probability of an unknown cause below which it changes no name."""
 _GROWN = 0.1
 """Logarithm of the scale from which tolerances are larger than anywhere."""
 
@@ -110,8 +112,8 @@ Further = Callable[[Search, Hypothesis], tuple[Hypothesis, ...]]
 
 def infer(search: Search, further: Further = lambda _search, _base: ()) -> Posterior:
     """Return the posterior over sets of causes. Where an unknown cause is more probable than none, ``further`` causes
-    are added to the best set and to none; where they do not explain it, the simulation is as far off everywhere as it
-    is there: names are then sought at that noise.
+    are added to the best set and to none. Where one is left, the simulation is as far off everywhere as it is there:
+    causes are sought at that noise, too, and are as probable as in both.
     """
     found = _searched(search)
     if found.unknown >= UNKNOWN:
@@ -119,10 +121,10 @@ def infer(search: Search, further: Further = lambda _search, _base: ()) -> Poste
         bases = dict.fromkeys((bare, found.best))
         more = tuple(with_unknown(new) for base in bases for new in further(search, base))
         found = replace(found, hypotheses=(*found.hypotheses, *more))
-    if found.unknown < UNKNOWN:
+    if found.unknown < _IGNORED:
         return found
     louder = replace(search, least=_as_loud_everywhere(search, found.best))
-    return replace(_searched(louder), known_unknown=found.unknown, before=found.best)
+    return replace(found, louder=_searched(louder))
 
 
 def _as_loud_everywhere(search: Search, one: Hypothesis) -> float:

@@ -11,9 +11,9 @@ from biodance.inference.hypotheses import Hypothesis
 from biodance.inference.scales import LOUD, prior_sd
 from biodance.records import CHANNELS, Array
 
-P_UNKNOWN, UNKNOWN = (0.06, 0.03, 0.01), 0.5
+P_UNKNOWN = (0.06, 0.03, 0.01)
 """Probability of an unknown cause in a session, before any data: in one band and channel, in the whole noise, in body
-or tolerances; and from which there is one. Those of causes stand in their effects (`Effect.prior`)."""
+or tolerances. Those of causes stand in their effects (`Effect.prior`)."""
 OWN, EXCESS = 0.4, 1.4
 """Standard deviation of the logarithm of the noise of one band and channel beside that of the session: without fault,
 and with an unknown cause.

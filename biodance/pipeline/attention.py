@@ -45,18 +45,18 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     outside = tuple(check for check in result.all_checks if not check.inside and check.what not in _NOTED)
     found = [finding.target.replace("_", " ") for finding in one.findings if finding.target]
     doubts = [text for text in result.doubts if not any(target in text for target in found)]
-    if one.verdict == "named, complete" and (outside or doubts or any(row.missed for row in judged)):
-        one = replace(one, verdict="named, incomplete")
-    if one.verdict == "unexplained" and not one.adequacy:
+    if one.faults and (outside or doubts or any(row.missed for row in judged)):
+        one = replace(one, explained=False)
+    if not (one.faults or one.explained or one.adequacy):
         well = not (one.why or one.resembles) and _compared_by_steps(result, judged)
-        why = {**one.why, Reason.NOT_COMPARED: ()}
-        one = replace(one, verdict="nothing wrong" if well else one.verdict, why=why)
-    if one.verdict == "nothing wrong" and (against := _not_clean(result, judged, outside)):
-        one = replace(one, verdict="unexplained", why={**against, **one.why})
-    if one.verdict == "unexplained" and not any(row.seconds > 0 for row in judged):
-        one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
-    if one.verdict == "unexplained" and any(step.name == "subject" and step.status != "done" for step in result.steps):
-        one = replace(one, why={Reason.PERSON_UNKNOWN: (), **one.why})
+        one = replace(one, explained=well, why={**one.why, Reason.NOT_COMPARED: ()})
+    if one.is_clean and (against := _not_clean(result, judged, outside)):
+        one = replace(one, explained=False, why={**against, **one.why})
+    if not (one.faults or one.explained):
+        if not any(row.seconds > 0 for row in judged):
+            one = replace(one, why={**one.why, Reason.NOT_COMPARED: ()})
+        if any(step.name == "subject" and step.status != "done" for step in result.steps):
+            one = replace(one, why={Reason.PERSON_UNKNOWN: (), **one.why})
     one = replace(one, notes=(*one.notes, *reason_notes(one)), judged=judged)
     others = session_attention(result, one.findings)
     first = headline(one, judged, static_trials(result), others)
@@ -150,7 +150,7 @@ def identified_attention(result: SessionResult, checks: Sequence[QualityCheck]) 
     findings = tuple(failed_check(quality) for quality in checks)
     if not findings:
         return session_attention(result)
-    one = Diagnosis("named, incomplete", findings, checks=tuple(checks))
+    one = Diagnosis(False, findings, checks=tuple(checks))
     others = session_attention(result, findings)
     return (headline(one, (), static_trials(result), others), *others)
 

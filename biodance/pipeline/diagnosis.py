@@ -176,7 +176,7 @@ def _judged(
     if any(asked[quality.effect].raw for quality in failed if quality.effect in asked):
         evidence = evidence.only(_ANYWAY)
     bare = Diagnosis(
-        "unexplained", (), checks=checks, notes=result.doubts, witnesses=evidence if evidence.observations else None
+        False, (), checks=checks, notes=result.doubts, witnesses=evidence if evidence.observations else None
     )
     tell("looking for causes")
     seen, own, looked_at, simulate = None, None, frozenset[str](), not failed

@@ -85,7 +85,7 @@ def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tupl
         reasons.append(WHY_IMPOSSIBLE)
     reasons += [check.what for check in result.all_checks if not check.inside]
     reasons += [WHY_DOUBTED] if result.doubts else []
-    if diagnosis and (diagnosis.diagnosis.faults or diagnosis.diagnosis.verdict == "unexplained"):
+    if diagnosis and not diagnosis.diagnosis.is_clean:
         reasons.append(WHY_FAULTY)
     return tuple(dict.fromkeys(reasons))
 

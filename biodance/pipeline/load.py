@@ -4,7 +4,7 @@ and the diagnosis names that load, not a second one.
 
 from dataclasses import replace
 
-from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Verdict
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.effects import CheckKind
 from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
@@ -67,10 +67,7 @@ def with_load(one: Diagnosis, search: LoadSearch | None) -> Diagnosis:
     alike = next((finding for finding in one.findings if CheckKind.WEIGHT in finding.cause.explains), None)
     if alike is not None:
         return _with(one, alike, replace(alike, set=(*alike.set, *load.set)))
-    told: Verdict = one.verdict if one.faults else "named, incomplete"
-    if one.verdict == "nothing wrong":
-        told = "named, complete"
-    return replace(one, verdict=told, findings=(*one.findings, load))
+    return replace(one, findings=(*one.findings, load))
 
 
 def _with(one: Diagnosis, finding: Finding, other: Finding) -> Diagnosis:

@@ -133,7 +133,7 @@ def diagnosis_document(found: SessionDiagnosis) -> dict[str, Any]:
         "told": one.told,
         "status": one.status,
         "probability": one.probability,
-        "reasons": one.reasons,
+        "reasons": tuple(one.why),
         "findings": [_finding(finding) for finding in one.findings],
         "resembles": [_finding(finding) for finding in one.resembles],
         "within_tolerance": [_finding(finding) for finding in one.tolerated],
