@@ -104,7 +104,7 @@ class Inferred:
 
 def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
     """Return every cause of the most probable set, with what may stand in its place, as probable as with and without
-    an unknown cause; where one of several is not sure beside the others, of the most probable set without it.
+    an unknown cause; where one of several is not sure beside the others, of the most probable set of one fewer.
     """
     lead = posterior.lead
     return tuple(replace(one, probability=_whatever_the_noise(posterior, one)) for one in _places(lead, prior))
@@ -124,17 +124,16 @@ def _whatever_the_noise(posterior: Posterior, place: Place) -> float:
 
 
 def _places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
-    """Return the places of the causes at one noise."""
+    """Return the places of the causes at one noise: of the most probable set all of whose causes are sure beside the
+    others, or of that of a single one.
+    """
     best = posterior.unexplained
     while True:
         found = tuple(_place(posterior, best, cause, prior) for cause in best.causes)
-        unsure = min(found, key=lambda one: one.probability, default=None)
-        if unsure is None or len(found) == 1 or unsure.probability >= NAMED:
+        if len(found) < 2 or all(one.probability >= NAMED for one in found):
             return found
-        rest = best.names - {cause_key(unsure.cause)}
-        best = next((one for one in posterior.hypotheses if one.names == rest), best)
-        if best.names != rest:
-            return found
+        fewer = [one for one in posterior.hypotheses if len(one.causes) == len(best.causes) - 1]
+        best = max(fewer, key=lambda one: np.logaddexp(one.log_posterior, one.log_unknown))
 
 
 def _place(posterior: Posterior, best: Hypothesis, cause: NamedCause, prior: Mapping[Key, float]) -> Place:
