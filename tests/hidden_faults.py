@@ -24,12 +24,19 @@ MORE = (*TRIALS, "move_3")
 """What a small load, or a cause that hides behind others, needs."""
 
 
-def hidden(folder: Path, *texts: str, seed: int = 41, visit: int = 0, trials: tuple[str, ...] = TRIALS) -> Path:
+def hidden(
+    folder: Path,
+    *texts: str,
+    seed: int = 41,
+    visit: int = 0,
+    trials: tuple[str, ...] = TRIALS,
+    person: Subject = SUBJECT,
+) -> Path:
     """Write a session of few ``trials`` with something hidden in it; ``visit`` another day of the same person."""
     plan = read_protocol("diagnosis")
     plan = replace(plan, trials=tuple(trial for trial in plan.trials if trial.name in trials))
-    how, loads = hide(tuple(parse_cause(text) for text in texts), SUBJECT, plan, seed=seed, visit=LabVisit(visit))
-    return simulate_session(SUBJECT, plan, folder, seed=seed, visit=how, loads=loads)
+    how, loads = hide(tuple(parse_cause(text) for text in texts), person, plan, seed=seed, visit=LabVisit(visit))
+    return simulate_session(person, plan, folder, seed=seed, visit=how, loads=loads)
 
 
 def examined(folder: Path, monkeypatch: pytest.MonkeyPatch) -> SessionResult:
