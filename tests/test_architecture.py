@@ -233,8 +233,8 @@ NAMED_ELSEWHERE = {
     "biodance.uncertainty.caution": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.sources": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.tolerances": "joint_centre, a row of the table of error sizes",
-    "biodance.report.documents.identification": "added_mass, a key of the documents that programs read",
-    "biodance.report.documents.session": "added_mass, a key of the documents that programs read",
+    "biodance.report.tables.identification": "added_mass, a key of the documents that programs read",
+    "biodance.report.tables.session": "added_mass, a key of the documents that programs read",
 }
 """Modules that write a word that is an effect's name, too, and why: below `effects`, or another thing of that name."""
 APART = ("biodance.effects", "biodance.virtual_lab")

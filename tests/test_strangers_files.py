@@ -23,7 +23,7 @@ from biodance.library import read_toml
 from biodance.pipeline.lab_file import read_lab
 from biodance.report.live import LivePage
 from biodance.report.pages.template import script_json
-from biodance.report.tables import write_tables
+from biodance.report.tables.write import write_tables
 from biodance.report.terminal import SafeConsole
 
 

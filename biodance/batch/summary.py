@@ -14,7 +14,7 @@ from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 from biodance.library import parse_json
 from biodance.report.files import write_files
-from biodance.report.tables import for_spreadsheets
+from biodance.report.tables.write import for_spreadsheets
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -43,9 +43,9 @@ def foresee_command(
         The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.pipeline.dance_result import foresee_dance, plate_sentence
-    from biodance.report.documents.diagnosis import foresight_document
     from biodance.report.files import refuse_page, write_files
     from biodance.report.pages.foresight import foresight_page
+    from biodance.report.tables.diagnosis import foresight_document
     from biodance.report.terminal import print_foresight
 
     with progress() as tell:

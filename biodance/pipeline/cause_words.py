@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
-from biodance.display import digits, shown_unit
+from biodance.display import digits, listed, shown_unit, spaced
 from biodance.identification.knowledge import SIGMAS
-from biodance.pipeline.finding_words import listed
 
 _SHORT = 8
 """Words of advice that fit into a headline."""
@@ -32,7 +31,7 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
     """Return a finding in words; ``others`` of the same effect without a size of their own are told together."""
     words, size = finding.cause.words, _size(finding.parameters)
     if words is None:
-        name = finding.effect.replace("_", " ")
+        name = spaced(finding.effect)
         at = f" at {place_in_words(finding.target)}" if finding.target else ""
         do = finding.advice.split(". ")[0].rstrip(".")
         fact = f"a {name} was found{at}{f', {size.value}' if size.value else ''}"
@@ -121,4 +120,4 @@ def _alternative(alias: Alias, same: bool) -> str:
         whole, _, channel = alias.target.rpartition(":")
         return place_in_words(whole if whole and channel in "xyz" else alias.target)
     known = alias.cause.words
-    return known.alternative if known else f"a {alias.effect.replace('_', ' ')}"
+    return known.alternative if known else f"a {spaced(alias.effect)}"

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from biodance.diagnosis.diagnosis import Estimate, Finding
-from biodance.display import digits, shown_unit
+from biodance.display import cause_in_words, digits, listed, shown_unit, spaced
 from biodance.effects.added_mass import AddedMass
 
 LOAD = AddedMass.name
@@ -31,15 +31,10 @@ def _elsewhere(finding: Finding) -> str:
     return f" or {listed(places)}" if any(places) else ""
 
 
-def cause_in_words(effect: str, target: str) -> str:
-    """Return a cause with its place: ``plate crosstalk Fz into My``."""
-    return f"{effect} {target}".replace("_", " ").replace("->", " into ").strip()
-
-
 def _size(one: Estimate) -> str:
     """Return a parameter with its standard deviation as people say it: ``gain 6 ± 0.2 %``."""
     factor, unit = shown_unit(one.unit)
-    return f"{one.name.replace('_', ' ')} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
+    return f"{spaced(one.name)} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
 
 
 def cause_of(checked: str, findings: Sequence[Finding]) -> str:
@@ -51,8 +46,3 @@ def cause_of(checked: str, findings: Sequence[Finding]) -> str:
 def explained(cause: str) -> str:
     """Return the sentence that points from a check or a doubt to a cause (`cause_of`) that was found."""
     return f"{cause[:1].upper()}{cause[1:]}, which was found, may explain it."
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as a list in words, the fourth and later ones counted only."""
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -3,7 +3,8 @@
 from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.reasons import Reason
-from biodance.pipeline.finding_words import in_words, listed
+from biodance.display import listed, spaced
+from biodance.pipeline.finding_words import in_words
 
 _SENTENCES = {
     Reason.UNUSUAL_BODY: (
@@ -58,7 +59,7 @@ _EACH = (Reason.MAY_NOT_MATTER, Reason.SIZE_VARIES)
 
 def reason_notes(one: Diagnosis) -> tuple[str, ...]:
     """Return why a diagnosis says no more, and what it only resembles, as sentences for the reader."""
-    notes, varies = [], {_name(f.effect, f.target): f.varies_with for f in one.resembles}
+    notes, varies = [], {f"{spaced(f.effect)} {f.target}".strip(): f.varies_with for f in one.resembles}
     for reason, about in one.why.items():
         for name in about if reason in _EACH else (listed(about),):
             sentence = _left(one) if reason is Reason.FORCES_LEFT else _SENTENCES[reason]
@@ -77,7 +78,3 @@ def _left(one: Diagnosis) -> str:
         f"{row.channel} at {row.band_hz[0]:g} to {row.band_hz[1]:g} Hz is {row.size:.2g} {row.unit} off "
         f"({row.z:.1f} standard deviations of sessions without fault), most in {row.trial} around {row.second:.1f} s."
     )
-
-
-def _name(effect: str, target: str) -> str:
-    return f"{effect.replace('_', ' ')} {target}".strip()

@@ -9,6 +9,7 @@ from biodance.dance.cues import dance_instructions
 from biodance.dance.problem.stance import stance_words
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult, not_safe
+from biodance.pipeline.preview import held_postures
 from biodance.records import Array
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.pages.template import render
@@ -61,13 +62,11 @@ def cards_page(result: DanceResult) -> str:
 
     dance = result.dance
     assert dance is not None
-    x = [dance.chain.plant(x[None], s.planted, s.ankle)[0] for x, s in zip(dance.postures, dance.stances, strict=True)]
-    motion = dance.chain.motion(np.arange(len(x), dtype=float), np.array(x), *np.zeros((2, *np.shape(x))))
-    cues = []
+    postures, cues = held_postures(dance).q, []
     for p, (said, stance) in enumerate(zip(dance_instructions(dance), dance.stances, strict=True)):
         name, feet = dance.names[p] if dance.names else "posture", stance_words(stance)
         title = f"{p + 1}. {name}, {feet}"
-        picture = Markup(mannequin_svg(dance.body, motion.q[p], str(Markup.escape(title))))
+        picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title))))
         cues.append(
             {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said, "picture": picture}
         )

@@ -4,7 +4,8 @@ from typing import Any
 
 from biodance.pipeline.provenance import now
 from biodance.report.pages.template import render
-from biodance.report.wording import causes_by_effect, size_seen
+from biodance.report.tables.diagnosis import CONFUSION_ROW, LIMIT_ROW
+from biodance.report.wording import causes_by_effect
 from biodance.version import __version__
 
 
@@ -16,9 +17,8 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         movement=name,
         version=__version__,
         created=now(),
-        words=_words,
+        schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
         some=_some,
-        size_seen=size_seen,
     )
 
 
@@ -26,7 +26,3 @@ def _some(causes: list[str]) -> str:
     """Return causes ("effect target") by effect, the first targets of each by name."""
     parted = (cause.partition(" ") for cause in causes)
     return causes_by_effect((effect, target) for effect, _, target in parted)
-
-
-def _words(cause: str) -> str:
-    return cause.replace("_", " ").replace("->", "→")
