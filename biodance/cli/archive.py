@@ -20,7 +20,7 @@ from biodance.cli.app import (
     show,
     whole,
 )
-from biodance.cli.place import put_results
+from biodance.cli.session import put_results
 from biodance.errors import without_codes
 
 

@@ -20,8 +20,7 @@ from biodance.cli.app import (
     show,
 )
 from biodance.cli.identify import diagnose_robot
-from biodance.cli.place import put_session_results
-from biodance.cli.session import examine_with_reference, exit_code, tabled
+from biodance.cli.session import examine_with_reference, exit_code, put_session_results, tabled
 
 
 @app.command(name="foresee")

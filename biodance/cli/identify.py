@@ -18,8 +18,7 @@ from biodance.cli.app import (
     progress,
     show,
 )
-from biodance.cli.place import put_results, put_session_results
-from biodance.cli.session import examine_with_reference, exit_code, tabled
+from biodance.cli.session import examine_with_reference, exit_code, put_results, put_session_results, tabled
 
 if TYPE_CHECKING:
     from biodance.pipeline.results import SessionResult

@@ -11,13 +11,11 @@ from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
-from biodance.pipeline.cause_words import alternatives, spoken
-from biodance.pipeline.finding_words import LOAD, cause_of, explained
+from biodance.pipeline.checks import NOT_WEIGHED
 from biodance.pipeline.headline import headline
-from biodance.pipeline.reason_words import reason_notes
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, Step, TrialResult
-from biodance.pipeline.weighing import NOT_WEIGHED
+from biodance.pipeline.words import LOAD, alternatives, cause_of, explained, reason_notes, spoken
 from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, Level, strongest_first, without_path
 
 _WEIGHED = "kg are declared: check the mass"

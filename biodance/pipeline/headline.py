@@ -7,7 +7,7 @@ from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.display import digits
-from biodance.pipeline.cause_words import alternatives, names_markers, spoken
+from biodance.pipeline.words import alternatives, names_markers, spoken
 from biodance.records.attention import LEVELS, Attention, Judged, Level
 
 WORDS = 30

@@ -36,7 +36,7 @@ def lab_file_text(found: LearnedLaboratory) -> str:
         f"learned_utc = {found.created}",
         f"archive = {json.dumps(found.archive.resolve().name)}",
         f"sessions = {json.dumps(list(found.sessions), ensure_ascii=False)}",
-        *[f"# left out: {name}: {_one_line(why)}" for name, why in found.left_out.items()],
+        *[f"# left out: {name}: {' '.join(why.split())}" for name, why in found.left_out.items()],
         "",
     ]
     return "\n".join([*head, *_tolerances(found), "", *_norms(found), *normal_toml(found.normal)]).rstrip() + "\n"
@@ -74,10 +74,6 @@ def _norms(found: LearnedLaboratory) -> list[str]:
             "",
         ]
     return lines
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 def write_lab_file(found: LearnedLaboratory, path: Path) -> None:

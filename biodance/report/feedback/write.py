@@ -16,6 +16,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
 from biodance.dance.problem.footprint import plate_corners
 from biodance.dance.problem.stance import Stance, stance_words
+from biodance.display import spaced
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import not_safe
@@ -52,7 +53,9 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
         "still": told.still.tolist(),
         "about": told.about.tolist(),
         "gravity": body.gravity.tolist(),
-        "segments": [_called(name) for name in body.segments],
+        "segments": [
+            spaced(name.replace("_head", " and head").replace("_hand", " and hand")) for name in body.segments
+        ],
         "carriers": list(body.segment_joint),
         "joints": [
             {
@@ -76,10 +79,6 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
             for phase in dance.phases
         ],
     }
-
-
-def _called(segment: str) -> str:
-    return segment.replace("_head", " and head").replace("_hand", " and hand").replace("_", " ")
 
 
 def _packed(values: ArrayLike, kind: str = "<f4") -> str:
@@ -251,7 +250,7 @@ def feedback_page(
 
     return render(
         "feedback.html.j2",
-        name=name.replace("_", " "),
+        name=spaced(name),
         unsafe=unsafe,
         version=__version__,
         style=Markup(template_text("feedback.css")),

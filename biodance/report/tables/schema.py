@@ -113,8 +113,8 @@ def table_of(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> "Data
 
 def markdown_table(schema: Schema, rows: Iterable[Row]) -> str:
     """Return rows as a Markdown table, as their schema shows them."""
-    lines = [schema.columns, ["---"] * len(schema.columns), *map(schema.cells, rows)]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    head, *body = (f"| {' | '.join(cells)} |\n" for cells in (schema.columns, *map(schema.cells, rows)))
+    return f"{head}{'|---' * len(schema.columns)}|\n{''.join(body)}"
 
 
 _SPEC = re.compile(r"(?P<kind>mm|ms|%|deg|)(?P<digits>\d)(?P<unit> .+)?")
