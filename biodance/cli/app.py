@@ -220,7 +220,7 @@ class Results:
 
     def make_tables_folder(self, session: Path) -> Path | None:
         """Return the folder for tables, made; None where none are wanted."""
-        from biodance.report.tables.write import tables_folder
+        from biodance.report.files import tables_folder
 
         return None if self.tables is None else tables_folder(self.tables, session, force=self.force)
 

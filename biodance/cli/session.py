@@ -75,8 +75,8 @@ def tabled(
     movement: "SessionMovement | None" = None,
 ) -> None:
     """Write the tables of a result into a folder that is ready for them; nothing without one."""
+    from biodance.report.files import write_tables
     from biodance.report.tables.frames import session_tables
-    from biodance.report.tables.write import write_tables
 
     if folder is not None:
         write_tables(session_tables(result, diagnosis, movement), folder)

@@ -79,7 +79,9 @@ def _not_clean(
         for what, said in _BROKEN.items()
         if one.what.startswith(what)
     )
-    doubts = tuple(_first_sentence(text.removeprefix(WARNING).partition(": check")[0]) for text in result.doubts)
+    doubts = tuple(
+        text.removeprefix(WARNING).partition(": check")[0].partition(". ")[0].rstrip(".") for text in result.doubts
+    )
     why = {Reason.LIMIT_BROKEN: broken, Reason.BODY_DOUBTFUL: doubts}
     if _only_standing_judged(result, judged):
         return {Reason.MOVEMENT_NOT_JUDGED: ()} | {reason: about for reason, about in why.items() if about}
@@ -175,10 +177,6 @@ def _level(step: Step) -> Level:
     if step.status == "refused":
         return "note" if step.name == "identify" else "fail"
     return "warn"
-
-
-def _first_sentence(reason: str) -> str:
-    return reason.split(". ")[0].rstrip(".")
 
 
 def stepped(rows: tuple[Judged, ...], evidence: ObservedEvidence | None) -> tuple[Judged, ...]:

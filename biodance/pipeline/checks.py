@@ -12,7 +12,7 @@ from biodance.identification.validation import TrialValidation
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.observations import recording
 from biodance.observations.stride_force import StrideForce
-from biodance.pipeline.trial_result import Check, TrialResult, WeighedBy, Weighing, WrenchComparison
+from biodance.pipeline.trial_result import Check, TrialResult, WeighedBy, Weighing
 from biodance.records import Session, Subject
 from biodance.settings import CheckLimits
 
@@ -98,18 +98,13 @@ def trial_checks(result: TrialResult, mass: float) -> list[Check]:
     if comparison and comparison.used.any():
         weight = mass * result.trial.settings.gravity
         share = 100 * float(np.max(comparison.rms[:3])) / weight
-        limit = np.ceil(max(limits.force, limits.force_moving * _moving(comparison, weight)))
+        # the error of a simulated force is that of its accelerations, by which the measured one moves about the weight
+        force = comparison.measured[comparison.used, :3] - [0.0, 0.0, weight]
+        moving = float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) / weight
+        limit = np.ceil(max(limits.force, limits.force_moving * moving))
         advice = "See the trial's wrench figure: is it an offset, a delay or a scale?"
         found.append(_upper("force difference, worst axis", name, share, float(limit), "% of weight", advice))
     return found
-
-
-def _moving(comparison: WrenchComparison, weight: float) -> float:
-    """Return the RMS by which the measured force moves about the ``weight`` (N), as a share of it: the error of a
-    simulated force is that of its accelerations.
-    """
-    force = comparison.measured[comparison.used, :3] - [0.0, 0.0, weight]
-    return float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) / weight
 
 
 UNEXPLAINED = 0.5

@@ -70,11 +70,6 @@ def write_robot(result: RobotResult, folder: Path) -> Row:
     return dict(plain_values(numbers))
 
 
-def _feet(standing: list[Row]) -> str:
-    """Return which foot the motion hangs on until when."""
-    return ", ".join(f"{one['foot']} {one['end_s']:.1f}" for one in standing)
-
-
 def _page(result: RobotResult, numbers: Row) -> str:
     from markupsafe import Markup
 
@@ -84,7 +79,10 @@ def _page(result: RobotResult, numbers: Row) -> str:
         model=result.body.name,
         numbers=numbers,
         schemas={"matched": _MATCHED},
-        matched=[row | {"feet": _feet(row["standing"])} for row in numbers["matched"]],
+        matched=[
+            row | {"feet": ", ".join(f"{one['foot']} {one['end_s']:.1f}" for one in row["standing"])}
+            for row in numbers["matched"]
+        ],
         version=__version__,
         section=Markup(identification_section(result.identified)),
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.consequence import LIMIT, Adequacy, Unobservable
-from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import ABOUT, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
@@ -126,13 +126,6 @@ _CERTAIN = 14.0
 """Natural logarithm of a million: above it odds are no longer printed."""
 
 
-def _short_answer(one: Diagnosis) -> str:
-    """Return what the section begins with below the verdict, which stands at the top of the page."""
-    if one.findings:
-        return "What was found, its size, and what to do:"
-    return "No cause is named; the verdict stands at the top of this page."
-
-
 def odds(log_bayes_factor: float) -> str:
     """Return evidence against "nothing wrong" as odds in words."""
     if log_bayes_factor != log_bayes_factor or log_bayes_factor == float("inf"):
@@ -171,6 +164,8 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
     from markupsafe import Markup
 
     one = found.diagnosis
+    nothing = "No cause is named; the verdict stands at the top of this page."
+    start = "What was found, its size, and what to do:" if one.findings else nothing
     failures = Markup("").join(
         Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause)
         for what, cause in found.failures.items()
@@ -188,7 +183,7 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
         '<section id="wrong"><h2>What the simulation gets wrong</h2><p>{}</p>{}{}'
         "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it "
         "changes.</p></section>"
-    ).format(_short_answer(one), failures, table)
+    ).format(start, failures, table)
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:

@@ -18,11 +18,5 @@ def foresight_page(document: dict[str, Any], name: str) -> str:
         version=__version__,
         created=now(),
         schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
-        some=_some,
+        some=lambda causes: causes_by_effect(cause.partition(" ")[::2] for cause in causes),
     )
-
-
-def _some(causes: list[str]) -> str:
-    """Return causes ("effect target") by effect, the first targets of each by name."""
-    parted = (cause.partition(" ") for cause in causes)
-    return causes_by_effect((effect, target) for effect, _, target in parted)

@@ -69,7 +69,8 @@ def movement_figure(
         same = [group for group in groups if group.quantity == quantity]
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (kind, quantity, same[0].unit)]
-            curves = [*_normal(behind), *_curves(same)]
+            usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
+            curves = [*usual, *_curves(same)]
             cells.append([Strip(_title(same[0]), curves, least=_LEAST.get(same[0].unit, 0.0))])
     if not cells:
         return ""
@@ -79,10 +80,6 @@ def movement_figure(
     if any(n.kind == kind for n in normal):
         band += "; grey: ± 1 sd, people"
     return CurveFigure(PERCENT, cells, about, label=_AXES[kind], band=band).html()
-
-
-def _normal(bands: Sequence[NormalCurve]) -> list[Curve]:
-    return [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in bands]
 
 
 def _title(group: CurveGroup) -> str:

@@ -14,11 +14,10 @@ from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
 from biodance.report.figures.style import figure, look, svg_address
-from biodance.report.files import write_files
+from biodance.report.files import for_spreadsheets, write_files
 from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.tables.laboratory import plates_document
 from biodance.report.tables.schema import Row, Schema, plain_values, to_text
-from biodance.report.tables.write import for_spreadsheets
 from biodance.report.wording import moment
 from biodance.version import __version__
 

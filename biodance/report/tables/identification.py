@@ -41,18 +41,18 @@ def prior_source(found: Identification, name: str) -> str:
     return " and ".join(["table", *([f"girths ({girths})"] if girths else []), *shapes])
 
 
-_COM, _INERTIA = slice(1, 4), slice(4, 10)
-"""Of a segment's ten quantities."""
+def _each(attribute: str, first: int, last: int) -> str:
+    """Return the places of an attribute in some of a segment's ten quantities."""
+    return ",".join(f"{k}.{attribute}" for k in range(first, last + 1))
+
+
 SEGMENT_ROW = Schema(
-    "name=0.segment mass_kg=0.value mass_sd_kg=0.sd mass_prior_kg=0.table mass_prior_sd_kg=0.table_sd",
+    "name=0.segment mass_kg=0.value mass_sd_kg=0.sd mass_prior_kg=0.table mass_prior_sd_kg=0.table_sd "
+    f"com_m={_each('value', 1, 3)} com_sd_m={_each('sd', 1, 3)} com_prior_m={_each('table', 1, 3)} "
+    f"inertia_kgm2={_each('value', 4, 9)} inertia_sd_kgm2={_each('sd', 4, 9)} "
+    f"inertia_prior_kgm2={_each('table', 4, 9)}",
     {
         "mass_prior_source": lambda _: "table",
-        "com_m": lambda rows: [row.value for row in rows[_COM]],
-        "com_sd_m": lambda rows: [row.sd for row in rows[_COM]],
-        "com_prior_m": lambda rows: [row.table for row in rows[_COM]],
-        "inertia_kgm2": lambda rows: [row.value for row in rows[_INERTIA]],
-        "inertia_sd_kgm2": lambda rows: [row.sd for row in rows[_INERTIA]],
-        "inertia_prior_kgm2": lambda rows: [row.table for row in rows[_INERTIA]],
         "information": information_share,
         "from_data": lambda rows: {row.quantity: row.from_data for row in rows},
         "verdict": lambda rows: {row.quantity: row.verdict for row in rows},

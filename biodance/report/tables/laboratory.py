@@ -1,10 +1,8 @@
 """What the sessions of a laboratory say of its plates and of its own tolerances."""
 
-from collections.abc import Callable, Iterable
-
 from biodance.diagnosis.archive.changes import Change, Stranger
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.judge import PlateCard, PlateFinding, PlateLevel, said
+from biodance.diagnosis.archive.judge import PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.display import spaced
 from biodance.pipeline.learn import LearnedLaboratory
@@ -12,37 +10,19 @@ from biodance.pipeline.plates import PlatesJudged
 from biodance.report.tables.schema import Row, Schema
 from biodance.uncertainty.tolerances import shipped
 
-_PLACE, _OFFSET = ("place_x", "place_y"), ("offset_x", "offset_y", "offset_z")
+_OFFSET = ("offset_x", "offset_y", "offset_z")
 
 
 def _unit(one: PlateLevel | ConditionEffect | PlateFinding | Change) -> str:
     return PLATE_QUANTITIES[one.quantity].unit
 
 
-def _level(card: PlateCard, quantity: str) -> PlateLevel | None:
-    return next((one for one in card.levels if one.quantity == quantity), None)
-
-
-def _levels(names: Iterable[str], attribute: str) -> Callable[[PlateCard], list[float | None]]:
-    return lambda card: [getattr(_level(card, name), attribute, None) for name in names]
-
-
-def _taken_off(card: PlateCard) -> float | None:
-    return min((one.taken_off for one in card.levels if one.quantity in _OFFSET), default=None)
-
-
 CARD_ROW = Schema(
-    "plate visits",
+    "plate visits place_m=place_x.value,place_y.value place_sd_m=place_x.sd,place_y.sd gain=gain.value gain_sd=gain.sd "
+    "offset_n=offset_x.value,offset_y.value,offset_z.value offset_sd_n=offset_x.sd,offset_y.sd,offset_z.sd "
+    "delay_s=delay.value delay_sd_s=delay.sd",
     {
-        "place_m": _levels(_PLACE, "value"),
-        "place_sd_m": _levels(_PLACE, "sd"),
-        "gain": lambda card: getattr(_level(card, "gain"), "value", None),
-        "gain_sd": lambda card: getattr(_level(card, "gain"), "sd", None),
-        "offset_n": _levels(_OFFSET, "value"),
-        "offset_sd_n": _levels(_OFFSET, "sd"),
-        "offset_taken_off": _taken_off,
-        "delay_s": lambda card: getattr(_level(card, "delay"), "value", None),
-        "delay_sd_s": lambda card: getattr(_level(card, "delay"), "sd", None),
+        "offset_taken_off": lambda card: min((card[one].taken_off for one in _OFFSET if one in card), default=None),
         "levels": Schema("quantity value sd between_visits_sd=between visits", {"unit": _unit}),
         "changes": Schema(
             "visit=visit.name plate quantity before after ci95=interval matters",
@@ -58,7 +38,9 @@ CARD_ROW = Schema(
     "plate: {plate} | visits: {visits} | place x, y (mm): {place_m:mm1} | gain (%): {gain:%2} | "
     "offset Fx, Fy, Fz (N): {offset_n:1} | delay (ms): {delay_s:ms1} | changes: {changes:count}",
 )
-"""A plate over all its visits. Of a change ``ci95`` is of the step, ``date`` of the first visit after it."""
+"""A plate over all its visits, its levels by their quantity, too. Of a change ``ci95`` is of the step, ``date`` of the
+first visit after it.
+"""
 _CONDITION = Schema(
     "plate quantity factor level base value=shared.mean ci95=shared.interval between_persons_sd=shared.spread "
     "persons=#visits",
@@ -74,7 +56,7 @@ def plates_document(found: PlatesJudged) -> Row:
     return {
         "archive": found.archive.resolve().name,
         "visits": Schema("visit=name person date", {"date": lambda one: one.date or None}).rows(judged.visits),
-        "plates": CARD_ROW.rows(judged.plates),
+        "plates": CARD_ROW.rows(vars(card) | {one.quantity: one for one in card.levels} for card in judged.plates),
         "persons": _persons(found),
         "common": _CONDITION.rows(judged.conditions),
         "attention": [

@@ -29,7 +29,8 @@ class Schema:
     ----------
     fields : str
         Keys, the unit as suffix, each with its place in the record: ``"segment kg=mass unit=cause.unit low=interval.0
-        count=#trials"``. Without a place the key is the attribute's name; ``#`` counts; behind None all is None.
+        count=#trials place_m=x.value,y.value"``. Without a place the key is the attribute's name; ``#`` counts; behind
+        None all is None.
     parts : mapping
         More keys -> `Schema` of the record or records of that name, or a function of the whole record; one that stands
         among the fields, too, has its place there.
@@ -91,14 +92,18 @@ class Schema:
 
 
 def value_at(record: Any, place: str) -> Any:
-    """Return what stands at a path of attributes, keys and numbers of items (``#``: how many); None behind None."""
+    """Return what stands at a path of attributes, keys and numbers of items (``#``: how many; several, parted by a
+    comma: as a list); None behind None, and where there is no such key.
+    """
+    if "," in place:
+        return [value_at(record, one) for one in place.split(",")]
     for name in place.removeprefix("#").split("."):
         if record is None:
             return None
         if name.isdigit():
             record = record[int(name)]
         else:
-            record = record[name] if isinstance(record, Mapping) else getattr(record, name)
+            record = record.get(name) if isinstance(record, Mapping) else getattr(record, name)
     return len(record) if place.startswith("#") and record is not None else record
 
 
