@@ -227,7 +227,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         noted=[(trial_and_subject(said), said.text) for said in others if said.level == "note"],
         failures={**result.failures, **found.failures},
         provenance=provenance,
-        channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),
+        channels=CHANNEL_TITLES,
         masses=masses,
         left=Markup(left_figure(found.left)) if found.left else "",
         adequacy=Markup(adequacy_table(one.adequacy)) if one.adequacy else "",

@@ -12,7 +12,7 @@ from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
 from biodance.identification.torques import Impact, TorqueBands
 from biodance.pipeline.identification import SessionIdentification
-from biodance.records import CHANNELS, AngleState
+from biodance.records import CHANNEL_TITLES, AngleState
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.session import bar_list
 from biodance.report.figures.vector import (
@@ -193,7 +193,6 @@ def torque_figure(bands: TorqueBands) -> str:
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
 LISTED = "Cannot be known"
 """Start of the note whose content the page shows as a table."""
-_UNITS = ("N",) * 3 + ("N·m",) * 3
 
 
 _SCHEMAS = {"segment": SEGMENT_ROW, "torque": TORQUE_ROW, "suspect": SUSPECT_ROW, "difference": DIFFERENCE_ROW}
@@ -224,7 +223,7 @@ def identification_section(found: SessionIdentification) -> str:
         marks=MARKS,
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
-        channels=list(zip(CHANNELS, _UNITS, strict=True)),
+        channels=CHANNEL_TITLES,
         ranked=Markup(impact_figure(found.impacts)) if found.impacts else "",
         torques=found.torques,
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biodance.errors import BiodanceError
-from biodance.report.tables.schema import Row, Schema
+from biodance.report.tables.schema import Row, Schema, plain_values
 from biodance.report.wording import format_number, millimetres, moment
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def three_js() -> str:
 
 def script_json(document: object) -> str:
     """Return a document as JSON that may stand in a ``<script>`` of a page: no text in it can end or open one."""
-    return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c")
+    return json.dumps(plain_values(document), separators=(",", ":")).replace("<", "\\u003c")
 
 
 def template_text(name: str) -> str:
