@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from biodance.cli import archive, dance, diagnose, files, live, session, virtual
+from biodance.cli import archive, dance, diagnose, files, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "dance",
     "diagnose",
     "files",
-    "live",
     "main",
     "run",
     "session",

@@ -47,7 +47,7 @@ def foresee_command(
     """
     from biodance.pipeline.dance_result import foresee_dance, plate_sentence
     from biodance.report.files import refuse_page, write_files
-    from biodance.report.pages.foresight import foresight_page
+    from biodance.report.pages.diagnosis import foresight_page
     from biodance.report.tables.diagnosis import foresight_document
     from biodance.report.terminal import print_foresight
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from biodance.display import spaced
 from biodance.effects import DiscreteEffect, Effect, QualityCheck, Recorded
 from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError
@@ -154,7 +155,7 @@ def with_faults_undone(
         if not new:
             break
         found += [replace(one, advice=kind.advice) for kind, one in new]
-        tell(f"examining a copy without {', '.join(sorted({one.effect.replace('_', ' ') for _, one in new}))}")
+        tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
         trials = tuple(_undone(trial, new) for trial in result.session.trials)
         result = examine(replace(result.session, trials=trials), reference=reference)
     if not found:

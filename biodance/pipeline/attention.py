@@ -9,6 +9,7 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.witness_evidence import ObservedEvidence
+from biodance.display import spaced
 from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.checks import NOT_WEIGHED
@@ -41,7 +42,7 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     """
     judged = stepped(judged, one.witnesses)
     outside = tuple(check for check in result.all_checks if not check.inside and check.what not in _NOTED)
-    found = [finding.target.replace("_", " ") for finding in one.findings if finding.target]
+    found = [spaced(finding.target) for finding in one.findings if finding.target]
     doubts = [text for text in result.doubts if not any(target in text for target in found)]
     if one.faults and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, explained=False)

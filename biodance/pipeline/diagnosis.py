@@ -281,5 +281,5 @@ def unmodelled_joints(body: Body, joints: tuple[str, ...]) -> dict[Reason, tuple
     """
     hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
     if hidden:
-        return {Reason.UNSEEN_JOINTS: tuple(name.replace("_", " ") for name in hidden)}
+        return {Reason.UNSEEN_JOINTS: tuple(display.spaced(name) for name in hidden)}
     return {Reason.UNDESCRIBED_JOINTS: joints} if joints else {}

@@ -6,7 +6,7 @@ from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT, Diagnosis
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.spectrum import SHORTEST_RUN
-from biodance.display import digits
+from biodance.display import digits, spaced
 from biodance.pipeline.words import alternatives, names_markers, spoken
 from biodance.records.attention import LEVELS, Attention, Judged, Level
 
@@ -99,7 +99,7 @@ def _named(one: Diagnosis) -> Iterator[str]:
         for alike in sets:
             yield _sentence(f"{start}{fact}{alike}{rest}. {told.do}")
     yield _sentence(f"{start}{told.plain}{sets[-1]}. {told.do}")
-    yield _sentence(f"{len(one.faults)} things are wrong, the first: {first.effect.replace('_', ' ')}. {_MEND}")
+    yield _sentence(f"{len(one.faults)} things are wrong, the first: {spaced(first.effect)}. {_MEND}")
 
 
 def _either(names: Sequence[str]) -> str:

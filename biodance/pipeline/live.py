@@ -275,7 +275,7 @@ class LiveSession:
         open_ = [i for i in np.argsort(-rows) if verdicts[names[i]] != "known" and names[i] not in standing]
         if not open_:
             return "All masses but those of the feet are known well enough: the session can end."
-        return f"Move the {names[open_[0]].replace('_', ' ')} further and faster, both feet on the plates."
+        return f"Move the {display.spaced(names[open_[0]])} further and faster, both feet on the plates."
 
     def _fit(self) -> Fit | None:
         """Return all frames that were taken in as one trial."""

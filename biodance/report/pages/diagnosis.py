@@ -1,5 +1,5 @@
-"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do,
-what changes.
+"""The pages on causes for the analyst: of a diagnosis (what is wrong, how we know, how big, how sure, what else, what to
+do, what changes), and of what a planned movement will see.
 """
 
 from html import escape
@@ -14,14 +14,14 @@ from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
 from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.provenance import Provenance
+from biodance.pipeline.provenance import Provenance, now
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNEL_TITLES, CHANNELS
 from biodance.records.attention import told_together
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables.diagnosis import LIMIT_ROW, OBSERVED_ROW, VISIBILITY_ROW, observed_rows
+from biodance.report.tables.diagnosis import CONFUSION_ROW, LIMIT_ROW, OBSERVED_ROW, VISIBILITY_ROW, observed_rows
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.wording import (
     NEVER,
@@ -33,6 +33,7 @@ from biodance.report.wording import (
     sized,
     trial_and_subject,
 )
+from biodance.version import __version__
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -259,3 +260,16 @@ def _witnesses(evidence: ObservedEvidence | None) -> dict[str, Any] | None:
 
 
 _MASS = Schema("", shown="segment: {segment:name} | as it is (kg): {before:2} | accepted (kg): {after:2}")
+
+
+def foresight_page(document: dict[str, Any], name: str) -> str:
+    """Return the page (HTML) of what `foresight_document` says of the movement ``name``."""
+    return render(
+        "foresight.html.j2",
+        found=document,
+        movement=name,
+        version=__version__,
+        created=now(),
+        schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
+        some=lambda causes: causes_by_effect(cause.partition(" ")[::2] for cause in causes),
+    )

@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.display import BLACK, BLUE, GREY
+from biodance.display import BLACK, BLUE, GREY, spaced
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.pipeline.still import silhouettes
@@ -163,7 +163,7 @@ def _picture(account: SubjectAccount, room: _Room) -> str:
 
 
 def _name(part: PartMass) -> str:
-    *first, last = [PLAIN_NAMES.get(name, name.replace("_", " ")) for name in part.segments]
+    *first, last = [PLAIN_NAMES.get(name, spaced(name)) for name in part.segments]
     return f"{', '.join(first)} and {last}" if first else last
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from biodance.display import spaced
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import SIGMAS, Known, known_together
@@ -37,7 +38,7 @@ def prior_source(found: Identification, name: str) -> str:
     """Return where the prior mass of a segment comes from: "table", "table and girths (knee) and scan"."""
     said = found.body.girths.get(name, ())
     shapes = [word for word in said if word in ("foot outline", "scan")]
-    girths = ", ".join(word for word in said if word not in shapes).replace("_", " ")
+    girths = spaced(", ".join(word for word in said if word not in shapes))
     return " and ".join(["table", *([f"girths ({girths})"] if girths else []), *shapes])
 
 
