@@ -1,5 +1,5 @@
-"""The pages on causes for the analyst: of a diagnosis (what is wrong, how we know, how big, how sure, what else, what to
-do, what changes), and of what a planned movement will see.
+"""The pages on causes for the analyst: of a diagnosis (what is wrong, how we know, how big, how sure, what else, what
+to do, what changes), and of what a planned movement will see.
 """
 
 from html import escape
