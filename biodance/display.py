@@ -69,6 +69,21 @@ def digits(value: float, count: int) -> str:
     return f"{float(f'{value:.{count}g}'):g}"
 
 
+def spaced(name: str) -> str:
+    """Return a name as words: ``left forearm hand``."""
+    return name.replace("_", " ")
+
+
+def cause_in_words(effect: str, target: str = "") -> str:
+    """Return a cause with its place: ``plate crosstalk Fz into My``."""
+    return spaced(f"{effect} {target}").replace("->", " into ").strip()
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in words, the fourth and later ones counted only."""
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+
+
 def axes_or_new(axes: "Axes | None") -> "Axes":
     """Return ``axes``, or those of a new figure."""
     if axes is not None:

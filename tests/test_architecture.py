@@ -19,6 +19,7 @@ ONE_ALGORITHM = {
     "lab/plates/parameters.py": "what a file and session.toml say of a plate, entry by entry",
     "lab/plates/decode.py": "a plate's channels to its wrench: corners, origin, gaps, units, zero, wrench",
     "inference/decision.py": "what a session ends with: places, sizes, habits, reasons, from one posterior",
+    "pipeline/live.py": "a recording as a stream: every frame tracked, the wrench watched, the body identified",
     "inference/sets.py": "the search over sets of causes: score, fit, widen, lessen, again beside an unknown",
     "lab/plates/sense.py": "the directions of a plate: every hypothesis is judged by the same load on the same plate",
 }
@@ -233,8 +234,8 @@ NAMED_ELSEWHERE = {
     "biodance.uncertainty.caution": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.sources": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.tolerances": "joint_centre, a row of the table of error sizes",
-    "biodance.report.documents.identification": "added_mass, a key of the documents that programs read",
-    "biodance.report.documents.session": "added_mass, a key of the documents that programs read",
+    "biodance.report.tables.identification": "added_mass, a key of the documents that programs read",
+    "biodance.report.tables.session": "added_mass, a key of the documents that programs read",
 }
 """Modules that write a word that is an effect's name, too, and why: below `effects`, or another thing of that name."""
 APART = ("biodance.effects", "biodance.virtual_lab")

@@ -11,7 +11,7 @@ from biodance.dance.followable.walk import freer_dance
 from biodance.dance.metrics import DanceMetrics
 from biodance.dance.problem.plan import Plan
 from biodance.pipeline.dance_result import DanceResult
-from biodance.report.documents.dance import dance_document
+from biodance.report.tables.dance import dance_document
 
 PLAN = Plan("x", "", (("parallel", 4),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.35, gentle=True)
 

@@ -202,7 +202,7 @@ def test_a_limit_of_a_robots_likeness_grows_with_it() -> None:
 
 def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
     room = Path(limits.__file__).parents[2]
-    told = (room / "pipeline" / "dance.py", room / "report" / "dance_write.py", room / "report/documents/dance.py")
+    told = (room / "pipeline" / "dance.py", room / "report" / "dance_write.py", room / "report/tables/dance.py")
     files = [*(room / "dance").rglob("*.py"), *told]
     known = {(path.name, limit.name) for path in files for limit in family() if f'"{limit.name}"' in path.read_text()}
     assert {one for one in known if f"{one[1]}.py" != one[0]} == {

@@ -7,8 +7,8 @@ from diagnosed_sessions import body, known, motion
 
 from biodance.diagnosis.foresight import foresee, planned, session_of
 from biodance.effects import effects
-from biodance.report.documents.diagnosis import foresight_document
-from biodance.report.pages.foresight import foresight_page
+from biodance.report.pages.diagnosis import foresight_page
+from biodance.report.tables.diagnosis import foresight_document
 
 CHOSEN = ("plate_gain", "plate_offset", "body_mass", "time_delay", "added_mass")
 

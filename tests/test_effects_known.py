@@ -9,9 +9,8 @@ from biodance.diagnosis.consequence import matters
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.of_family import of_family
 from biodance.effects import About, Case, CauseWords, CheckKind, Effect, Parameter, causes, effects, known_cause
-from biodance.pipeline.cause_words import alternatives, spoken
-from biodance.pipeline.finding_words import cause_of, in_words
 from biodance.pipeline.headline import headline
+from biodance.pipeline.words import alternatives, cause_of, in_words, spoken
 from biodance.records import Array
 from biodance.records.attention import Judged
 

@@ -12,7 +12,7 @@ from biodance.pipeline.session import examine
 from biodance.records import LeftOut
 from biodance.records.attention import Judged
 from biodance.records.left_out import seconds_left_out
-from biodance.report.documents.diagnosis import judged_document
+from biodance.report.tables.diagnosis import JUDGED_ROW
 from biodance.virtual_lab.faults.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.recording.laboratory import LabVisit
@@ -25,7 +25,7 @@ def test_a_frame_counts_once_at_the_first_gate() -> None:
     found = seconds_left_out({LeftOut.FORCES_DIFFER: unlike, LeftOut.FOOT_BESIDE: beside}, 100.0)
     assert found == {LeftOut.FOOT_BESIDE: 0.4, LeftOut.FORCES_DIFFER: 0.2}
     assert seconds_left_out({LeftOut.NO_LOAD: np.zeros(100, dtype=bool)}, 100.0) == {}
-    (row,) = judged_document([Judged("walk", 0.4, left_out=found)])
+    (row,) = JUDGED_ROW.rows([Judged("walk", 0.4, left_out=found)])
     assert row == {
         "trial": "walk",
         "seconds": 0.4,

@@ -17,8 +17,7 @@ from biodance.diagnosis.watch import LiveWarning, silent_plates
 from biodance.errors import BiodanceError
 from biodance.identification.identification import identify_body
 from biodance.identification.recursive import initial_posterior
-from biodance.pipeline.live import LiveSession, LiveState
-from biodance.pipeline.live_watch import StreamWatch
+from biodance.pipeline.live import LiveSession, LiveState, StreamWatch
 from biodance.pipeline.stream import body_and_stream, replay
 from biodance.records import Markers, Sip, Subject, Wrench
 from biodance.report.live import LivePage

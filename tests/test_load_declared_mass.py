@@ -12,7 +12,7 @@ from biodance.pipeline.checks import load_doubts
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check
-from biodance.report.documents.identification import identification_document
+from biodance.report.tables.identification import identification_document
 
 LOAD = 2.4
 

@@ -13,13 +13,12 @@ from biodance.effects.added_mass import AddedMass
 from biodance.identification.load_place import nearest_segment
 from biodance.identification.load_words import say_load
 from biodance.motion.kinematics import poses
-from biodance.pipeline.cause_words import alternatives
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.finding_words import in_words
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.trial_result import Check
-from biodance.report.documents.diagnosis import diagnosis_document
-from biodance.report.documents.identification import added_mass_document
+from biodance.pipeline.words import alternatives, in_words
+from biodance.report.tables.diagnosis import diagnosis_document
+from biodance.report.tables.identification import added_mass_document
 from biodance.report.wording import sizes_in_words
 
 FOREARM = (("left_forearm_hand", 0.8), ("left_upper_arm", 0.2))

@@ -13,7 +13,7 @@ from biodance.effects.time_delay import TimeDelay
 from biodance.lab.session.read import read_session
 from biodance.motion.newton import newton_of
 from biodance.observations import observe, recording
-from biodance.pipeline.weighing import WeighedBy, weigh
+from biodance.pipeline.checks import WeighedBy, weigh
 from biodance.records import Wrench
 
 CLEAN = {

@@ -18,9 +18,9 @@ from biodance.identification.sessions import differences
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.identification import identify_trials
 from biodance.records.attention import Attention
-from biodance.report.documents.identification import identification_document
-from biodance.report.documents.plain import plain_values
 from biodance.report.pages.identification import identification_section
+from biodance.report.tables.identification import identification_document
+from biodance.report.tables.schema import plain_values
 
 FORCED = FailedFit("No possible body, by force. Check the scaling.")
 

@@ -13,11 +13,11 @@ from biodance.pipeline.identification import can_identify, identify_trials
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.session import identification_of
 from biodance.records import Plate, Wrench
-from biodance.report.documents.identification import identification_document
-from biodance.report.documents.plain import plain_values, to_text
-from biodance.report.documents.session import results_document
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.session import page
+from biodance.report.tables.identification import identification_document
+from biodance.report.tables.schema import plain_values, to_text
+from biodance.report.tables.session import results_document
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ import biodance
 from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.errors import SessionRefused
-from biodance.pipeline.body import starting_from
-from biodance.pipeline.same_person import refuse_another_reference
+from biodance.pipeline.body import refuse_another_reference, starting_from
 
 
 def _person(*, stature: float, mass: float = SUBJECT.mass):

@@ -21,11 +21,11 @@ from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.trial_result import Check
 from biodance.records.attention import Attention, Judged, told_together
-from biodance.report.documents.diagnosis import attention_document, diagnosis_document
-from biodance.report.documents.plain import to_text
-from biodance.report.documents.session import results_document
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.session import page
+from biodance.report.tables.diagnosis import ATTENTION_ROW, diagnosis_document
+from biodance.report.tables.schema import to_text
+from biodance.report.tables.session import results_document
 from biodance.report.terminal import print_diagnosis, print_session
 
 WELL = re.compile(
@@ -62,7 +62,7 @@ def surfaces(verdict: Diagnosis, check: Check, judged: tuple[Judged, ...]) -> di
     numbers = json.loads(to_text(diagnosis_document(found)))
     screen = StringIO()
     console = Console(file=screen, width=1000)
-    print_session(result, {"attention": attention_document(first)}, console)
+    print_session(result, {"attention": ATTENTION_ROW.rows(first)}, console)
     print_diagnosis(numbers, console)
     pages = (
         page(result, made, attention=first, diagnosis=diagnosis_section(found)),
@@ -178,7 +178,7 @@ def test_report_asks_for_a_person_whenever_its_diagnosis_does(verdict: Diagnosis
     trial = replace(FULL.trials[0], fit=None, comparison=None, standing=None, checks=())
     result = replace(FULL, trials=(trial,), checks=(), standing=None, still=None)
     said = reconcile_with_checks(verdict, result, (STATIC,)).attention if verdict else ()
-    found = {"attention": attention_document(said), "diagnosis": None}
+    found = {"attention": ATTENTION_ROW.rows(said), "diagnosis": None}
     assert not result.needs_a_person
     assert print_reported(result, tmp_path, found, json=True) == code
 

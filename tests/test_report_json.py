@@ -7,8 +7,8 @@ import pytest
 from example_results import full_session, refused_session
 
 from biodance.pipeline.provenance import provenance
-from biodance.report.documents.plain import plain_values, to_text
-from biodance.report.documents.session import results_document
+from biodance.report.tables.schema import plain_values, to_text
+from biodance.report.tables.session import results_document
 
 
 def read_back(result):

@@ -4,7 +4,7 @@ from copy import deepcopy
 
 import pytest
 
-from biodance.report.documents.methods import CLAUSES, REFERENCES, methods_text
+from biodance.report.methods import CLAUSES, REFERENCES, methods_text
 
 AGREEMENT = {"rms": [5.0, 6.0, 19.5, 4.0, 3.0, 1.0], "cc": [0.9] * 6}
 GAIT = {"trial": "walk", "cycles": [{"kind": "gait"}] * 3 + [{"kind": "squat"}]}

@@ -15,8 +15,8 @@ from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Un
 from biodance.diagnosis.gain import Gain
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import session_movement
-from biodance.pipeline.tables import session_tables
-from biodance.report.tables import tables_folder, write_tables
+from biodance.report.files import tables_folder, write_tables
+from biodance.report.tables.frames import session_tables
 
 GAIN = Gain(np.ones(6), np.full(6, 0.8), (0.1, 0.3), ("squat_1",))
 DIAGNOSIS = Diagnosis(

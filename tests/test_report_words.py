@@ -33,10 +33,9 @@ def test_a_size_has_three_significant_digits_at_most(value, unit, text):
 
 
 def test_a_size_beyond_what_occurs_is_never_seen():
-    row = {"limit": 0.29, "typical": 0.01, "unit": "m"}
-    assert size_seen(row, "limit") == "290 mm"
-    assert size_seen({**row, "limit": 35.387}, "limit") == "never"
-    assert size_seen({**row, "limit": None}, "limit") == "never"
+    assert size_seen(0.29, 0.01, "m") == "290 mm"
+    assert size_seen(35.387, 0.01, "m") == "never"
+    assert size_seen(None, 0.01, "m") == "never"
 
 
 def test_small_shares_are_not_nothing_and_nothing_has_no_sign():
@@ -54,7 +53,7 @@ def test_a_change_has_its_sign_its_unit_and_no_more_digits_than_it_deserves():
 def test_causes_are_told_by_effect_and_counted_beyond_the_sixth():
     causes = [("plate_crosstalk", f"F{k}->Mz") for k in range(8)] + [("clock_drift", "")]
     said = causes_by_effect(causes)
-    assert said.startswith("plate crosstalk (F0→Mz, F1→Mz")
+    assert said.startswith("plate crosstalk (F0 into Mz, F1 into Mz")
     assert said.endswith("and 2 more); clock drift")
 
 

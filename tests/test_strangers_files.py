@@ -21,9 +21,9 @@ from biodance.lab.plain_text import for_spreadsheet
 from biodance.lab.session.manifest import read_manifest
 from biodance.library import read_toml
 from biodance.pipeline.lab_file import read_lab
+from biodance.report.files import write_tables
 from biodance.report.live import LivePage
 from biodance.report.pages.template import script_json
-from biodance.report.tables import write_tables
 from biodance.report.terminal import SafeConsole
 
 

@@ -7,7 +7,7 @@ from inferred_sessions import BARE, SILENT
 from biodance.diagnosis.reasons import Reason
 from biodance.effects import causes
 from biodance.inference.session import judge, see
-from biodance.pipeline.unmodelled_joints import unmodelled_joints
+from biodance.pipeline.diagnosis import unmodelled_joints
 
 
 def test_a_body_as_usual_has_none() -> None:

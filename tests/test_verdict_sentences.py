@@ -17,10 +17,10 @@ from biodance.pipeline.attention import (
     reconcile_with_checks,
     session_attention,
 )
-from biodance.pipeline.finding_words import in_words
+from biodance.pipeline.checks import NOT_WEIGHED
 from biodance.pipeline.headline import headline
 from biodance.pipeline.trial_result import Check, Step
-from biodance.pipeline.weighing import NOT_WEIGHED
+from biodance.pipeline.words import in_words
 from biodance.records.attention import Attention, Judged, strongest_first
 
 GOOD = Check("marker distance, RMS", "walk", "8.0 mm", "at most 20 mm", True)

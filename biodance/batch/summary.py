@@ -13,8 +13,7 @@ from biodance.batch.work import ROW_TYPES
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
 from biodance.library import parse_json
-from biodance.report.files import write_files
-from biodance.report.tables import for_spreadsheets
+from biodance.report.files import for_spreadsheets, write_files
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from biodance.cli import archive, dance, diagnose, files, identify, live, session, virtual
+from biodance.cli import archive, dance, diagnose, files, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
@@ -20,8 +20,6 @@ __all__ = [
     "dance",
     "diagnose",
     "files",
-    "identify",
-    "live",
     "main",
     "run",
     "session",

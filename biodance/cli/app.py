@@ -35,7 +35,7 @@ def say(sentence: str) -> None:
 
 def print_json(document: object) -> None:
     """Write one JSON document to stdout."""
-    from biodance.report.documents.plain import to_text
+    from biodance.report.tables.schema import to_text
 
     sys.stdout.write(to_text(document))
 
@@ -220,7 +220,7 @@ class Results:
 
     def make_tables_folder(self, session: Path) -> Path | None:
         """Return the folder for tables, made; None where none are wanted."""
-        from biodance.report.tables import tables_folder
+        from biodance.report.files import tables_folder
 
         return None if self.tables is None else tables_folder(self.tables, session, force=self.force)
 

@@ -20,7 +20,7 @@ from biodance.cli.app import (
     show,
     whole,
 )
-from biodance.cli.place import put_results
+from biodance.cli.session import put_results
 from biodance.errors import without_codes
 
 
@@ -110,7 +110,8 @@ def learn_command(
         Folder that contains session folders, at any depth.
     """
     from biodance.pipeline.learn import learn_laboratory
-    from biodance.report.laboratory import learned_document, print_learned, refuse_existing, write_lab_file
+    from biodance.report.laboratory import print_learned, refuse_existing, write_lab_file
+    from biodance.report.tables.laboratory import learned_document
 
     refuse_existing(out)
     with progress() as tell:

@@ -25,6 +25,7 @@ from biodance.cli.app import (
     not_negative,
     print_json,
     say,
+    show,
     show_place,
     whole,
 )
@@ -104,7 +105,8 @@ def dance_command(
         make_robot_dance,
         robot_dancer,
     )
-    from biodance.report.dance_write import print_dance, write_dance
+    from biodance.report.dance_write import write_dance
+    from biodance.report.terminal import print_dance
 
     if robot.given and asked.plate is not None:
         raise BiodanceError("--plate is for people: a robot's feet stand as far apart as its hips. Leave it out.")
@@ -125,11 +127,7 @@ def dance_command(
         result = result if isinstance(who, RobotFile) else designed_for(result, who)
         found = write_dance(result, folder, despite=despite)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
-    if json:
-        print_json(found)
-    else:
-        print_dance(found)
-        show_place(folder)
+    show(found, print_dance, json=json, path=folder)
     if result.dance is not None and result.dance.unsafe and not despite:
         say("No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same.")
     if not result.feasible:
@@ -181,8 +179,8 @@ def play_command(
     """
     from biodance.dance.dance import Dance
     from biodance.dance.rehearsal import rehearse
-    from biodance.report.documents.dance import playback_document
     from biodance.report.figures.film import film_path, write_film
+    from biodance.report.tables.dance import playback_document
 
     place, one = film_path(out, force=force), Dance.load(dance)
     with counted_progress() as tell:

@@ -1,5 +1,6 @@
 """The command report, and what the commands on a session share."""
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +19,6 @@ from biodance.cli.app import (
     say,
     show,
 )
-from biodance.cli.place import put_session_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from biodance.pipeline.identification import SessionIdentification
     from biodance.pipeline.movement import SessionMovement
     from biodance.pipeline.results import SessionResult
+    from biodance.records import Session
 
 
 def report_session(
@@ -74,8 +75,8 @@ def tabled(
     movement: "SessionMovement | None" = None,
 ) -> None:
     """Write the tables of a result into a folder that is ready for them; nothing without one."""
-    from biodance.pipeline.tables import session_tables
-    from biodance.report.tables import write_tables
+    from biodance.report.files import write_tables
+    from biodance.report.tables.frames import session_tables
 
     if folder is not None:
         write_tables(session_tables(result, diagnosis, movement), folder)
@@ -162,3 +163,20 @@ def report_command(
         folder = put_session_results(place, result.session)
     results.show_page(folder)
     return print_reported(result, folder, found, results.json)
+
+
+def put_session_results(place: "ResultsFolder", session: "Session") -> Path:
+    """Put the results of a session in place and return the folder."""
+    return put_results(place, session.folder, {trial.source.path: trial.source.sha256 for trial in session.trials})
+
+
+def put_results(place: "ResultsFolder", source: Path, inputs: Mapping[Path, str]) -> Path:
+    """Put results in place, bound to the recordings ``inputs`` (path -> SHA-256) of ``source``, and return the folder;
+    say where files went that were there and are not of biodance.
+    """
+    from biodance.lab.session.results_folder import inputs_of
+
+    kept = place.finish(source, inputs_of(inputs, source))
+    if kept is not None:
+        say(f"look: files in {place.place} that biodance did not write were kept in {kept}.")
+    return place.place

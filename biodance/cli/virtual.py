@@ -20,8 +20,7 @@ from biodance.cli.app import (
     show_place,
     whole,
 )
-from biodance.cli.place import put_session_results
-from biodance.cli.session import print_reported, report_session
+from biodance.cli.session import print_reported, put_session_results, report_session
 
 
 @Parameter(name="*")

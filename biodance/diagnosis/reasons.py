@@ -1,5 +1,5 @@
 """What a diagnosis ends with and why it says no more: enums, which are compared; words are made for the reader alone
-(`pipeline.reason_words`).
+(`pipeline.words`).
 """
 
 from collections.abc import Collection

@@ -1,14 +1,18 @@
-"""What accepting the findings of a session writes: corrected trials, and copies with exchanged labels put right."""
+"""Copies of a session in which faults are undone: corrected trials and labels put right, as accepting the findings
+writes them; and the copy without faults that are too large for statistics, in which all else is judged, since a
+large fault has small companions everywhere.
+"""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from biodance.effects import Recorded
+from biodance.display import spaced
+from biodance.effects import DiscreteEffect, Effect, QualityCheck, Recorded
 from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.exchanged import write_exchanged
@@ -20,10 +24,11 @@ from biodance.lab.corrections import (
     corrections_text,
     joined_corrections,
 )
+from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of
 from biodance.pipeline.results import MendedCopy, SessionResult
 from biodance.pipeline.session import examine
-from biodance.records import Session
+from biodance.records import Session, Trial
 
 CORRECTED = "corrected"
 """Folder with the trials that were corrected."""
@@ -121,3 +126,47 @@ def write_mended(session: Session, right: MendedCopy, folder: Path) -> tuple[tup
         elif pairs:
             refused.append(f"Trial {trial.name} was not written with its labels put right: only C3D files are copied.")
     return tuple(written), tuple(refused)
+
+
+_ROUNDS = 3
+"""How often it is looked again: with one fault undone, another one shows."""
+
+_Cause = Effect | DiscreteEffect
+
+
+def with_faults_undone(
+    result: SessionResult,
+    mended: MendedCopy | None,
+    chosen: Mapping[str, _Cause],
+    *,
+    reference: SessionIdentification | None,
+    tell: Callable[[str], None],
+) -> MendedCopy | None:
+    """Return a copy of the session examined again without what the checks of the ``chosen`` causes find and can undo
+    (`Checked.undone`), beside what was ``mended`` already; that, if there is none.
+    """
+    undoing = [kind for kind in chosen.values() if kind.undoes()]
+    found: list[QualityCheck] = []
+    for _ in range(_ROUNDS):
+        recorded = Recorded(result.session, cases_of(result.body, all_windows(result.trials)))
+        known = {(one.effect, one.target, one.trials) for one in found}
+        failed = [(kind, one) for kind in undoing for one in kind.check(recorded) if not one.ok]
+        new = [(kind, one) for kind, one in failed if (one.effect, one.target, one.trials) not in known]
+        if not new:
+            break
+        found += [replace(one, advice=kind.advice) for kind, one in new]
+        tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
+        trials = tuple(_undone(trial, new) for trial in result.session.trials)
+        result = examine(replace(result.session, trials=trials), reference=reference)
+    if not found:
+        return mended
+    exchanged, checks = (mended.exchanged, mended.checks) if mended else ({}, ())
+    return MendedCopy(result, exchanged, (*checks, *found))
+
+
+def _undone(trial: Trial, found: Iterable[tuple[_Cause, QualityCheck]]) -> Trial:
+    """Return a trial as read without what was found in it."""
+    for kind, one in found:
+        if trial.plates and one.meant(trial):
+            trial = kind.undone(trial, one)
+    return trial

@@ -9,15 +9,14 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.witness_evidence import ObservedEvidence
+from biodance.display import spaced
 from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
-from biodance.pipeline.cause_words import alternatives, spoken
-from biodance.pipeline.finding_words import LOAD, cause_of, explained
+from biodance.pipeline.checks import NOT_WEIGHED
 from biodance.pipeline.headline import headline
-from biodance.pipeline.reason_words import reason_notes
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import Check, Step, TrialResult
-from biodance.pipeline.weighing import NOT_WEIGHED
+from biodance.pipeline.words import LOAD, alternatives, cause_of, explained, reason_notes, spoken
 from biodance.records.attention import LIMIT_TOLD, WARNING, Attention, Judged, Level, strongest_first, without_path
 
 _WEIGHED = "kg are declared: check the mass"
@@ -43,7 +42,7 @@ def reconcile_with_checks(one: Diagnosis, result: SessionResult, judged: tuple[J
     """
     judged = stepped(judged, one.witnesses)
     outside = tuple(check for check in result.all_checks if not check.inside and check.what not in _NOTED)
-    found = [finding.target.replace("_", " ") for finding in one.findings if finding.target]
+    found = [spaced(finding.target) for finding in one.findings if finding.target]
     doubts = [text for text in result.doubts if not any(target in text for target in found)]
     if one.faults and (outside or doubts or any(row.missed for row in judged)):
         one = replace(one, explained=False)
@@ -81,7 +80,9 @@ def _not_clean(
         for what, said in _BROKEN.items()
         if one.what.startswith(what)
     )
-    doubts = tuple(_first_sentence(text.removeprefix(WARNING).partition(": check")[0]) for text in result.doubts)
+    doubts = tuple(
+        text.removeprefix(WARNING).partition(": check")[0].partition(". ")[0].rstrip(".") for text in result.doubts
+    )
     why = {Reason.LIMIT_BROKEN: broken, Reason.BODY_DOUBTFUL: doubts}
     if _only_standing_judged(result, judged):
         return {Reason.MOVEMENT_NOT_JUDGED: ()} | {reason: about for reason, about in why.items() if about}
@@ -177,10 +178,6 @@ def _level(step: Step) -> Level:
     if step.status == "refused":
         return "note" if step.name == "identify" else "fail"
     return "warn"
-
-
-def _first_sentence(reason: str) -> str:
-    return reason.split(". ")[0].rstrip(".")
 
 
 def stepped(rows: tuple[Judged, ...], evidence: ObservedEvidence | None) -> tuple[Judged, ...]:

@@ -27,6 +27,7 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
 from biodance.dance.robot import design_robot, expect_robot, robot_plan
 from biodance.dance.verify import Margin, broken
+from biodance.display import cause_in_words
 from biodance.errors import BiodanceError
 from biodance.pipeline.dance_result import DanceResult
 from biodance.records import Subject
@@ -118,7 +119,9 @@ def make_dance(
             free = aside.submit(_freer_expectation, own, plan, seed)
             expected, counted, freely = makers.expect(dance), numbers.result(), free.result()
         reason = " ".join(
-            _broken_limit(margin) for margin in broken(margins) if not margin.limit.endswith(OF_PERFORMERS)
+            f"The limit on {cause_in_words(m.limit, m.what)} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
+            for m in broken(margins)
+            if not m.limit.endswith(OF_PERFORMERS)
         )
     if reason:
         dance = counted = expected = freely = None
@@ -129,11 +132,6 @@ def make_dance(
 def _freer_expectation(body: Body, plan: Plan, seed: int) -> Expectation | None:
     """Return what the same postures chosen freely would tell; None where the plan leaves the choice free."""
     return expect(freer_dance(body, plan, seed=seed), steps=1) if np.isfinite(plan.instructions) else None
-
-
-def _broken_limit(m: Margin) -> str:
-    what = f"{m.limit} {m.what}".replace("_", " ").strip()
-    return f"The limit on {what} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
 
 
 def dance_folder(out: Path, *, force: bool = False) -> Path:

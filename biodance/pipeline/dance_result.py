@@ -198,7 +198,7 @@ class DanceResult:
 
 
 def _names(segments: tuple[str, ...]) -> str:
-    return ", ".join(name.replace("_", " ") for name in segments)
+    return ", ".join(display.spaced(name) for name in segments)
 
 
 def not_safe(dance: Dance) -> tuple[str, ...]:
@@ -206,7 +206,7 @@ def not_safe(dance: Dance) -> tuple[str, ...]:
     words = {f"{limit.name}_{OF_PERFORMERS}": one.words for limit, one in for_imprecise(family()).items()}
     return tuple(
         f"NOT SAFE when imprecise: {-100 * m.worst:.1f} cm of the {words.get(m.limit, m.limit)} that is needed are "
-        f"missing at {m.where_s:.0f} s ({m.what.replace('_', ' ')}) for the worst of {PERFORMER_COUNT} simulated "
+        f"missing at {m.where_s:.0f} s ({display.spaced(m.what)}) for the worst of {PERFORMER_COUNT} simulated "
         f"people. Try another seed or an easier protocol."
         for m in dance.unsafe
     )

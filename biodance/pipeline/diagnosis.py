@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from biodance import display
+from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.gain import Gain
@@ -23,20 +24,20 @@ from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
+from biodance.pipeline.accepted import with_faults_undone
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
 from biodance.pipeline.results import MendedCopy, SessionResult
-from biodance.pipeline.undone import with_faults_undone
-from biodance.pipeline.unmodelled_joints import unmodelled_joints
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 _ANYWAY = ("standing_twist",)
 """Observations to which other channels hardly matter: believed beside one that is wrong."""
@@ -272,3 +273,13 @@ def _with_gains(result: SessionResult, found: Inferred) -> SessionDiagnosis:
     told = accepted(result, found, before)
     one = told.inferred
     return SessionDiagnosis(one.diagnosis, one, before, told.identified, told.left, told.failures, gain=told.gain)
+
+
+def unmodelled_joints(body: Body, joints: tuple[str, ...]) -> dict[Reason, tuple[str, ...]]:
+    """Return why what a simulation of ``body`` leaves may be the body's own: joints that no marker shows, or ``joints``
+    that it moves at beside the usual ones, for which nobody has learned what is usual; empty where it moves as usual.
+    """
+    hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
+    if hidden:
+        return {Reason.UNSEEN_JOINTS: tuple(display.spaced(name) for name in hidden)}
+    return {Reason.UNDESCRIBED_JOINTS: joints} if joints else {}

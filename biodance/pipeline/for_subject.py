@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.identification.knowledge import SIGMAS, Known, Together, known_together
+from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.lab.session.file import VisitEntry, read_session_file
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.results import SessionResult
@@ -71,7 +71,10 @@ def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None
     reach = SIGMAS * standing.mass_sd if standing else 0.0
     weight = (standing.mass - reach, standing.mass + reach) if standing else SubjectAccount.weight
     sums = known_together(one.sip)
-    together = _together(sums[0]) if sums and not masses[0].measured else None
+    together = None
+    if sums and not masses[0].measured:
+        pair, reach = sums[0], SIGMAS * sums[0].sd
+        together = PartMass(pair.segments, pair.mass - reach, pair.mass + reach)
     return SubjectAccount(result.subject, visit, weight, masses, together, body=result.body)
 
 
@@ -96,8 +99,3 @@ def _part(known: Known) -> PartMass:
         return PartMass((known.segment,))
     low, high = known.interval
     return PartMass((known.segment,), max(low, 0.0), high, known.verdict == "known")
-
-
-def _together(pair: Together) -> PartMass:
-    reach = SIGMAS * pair.sd
-    return PartMass(pair.segments, pair.mass - reach, pair.mass + reach)

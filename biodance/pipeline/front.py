@@ -12,12 +12,12 @@ from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels
+from biodance.pipeline.body import refuse_another_reference
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
 from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.same_person import refuse_another_reference
 from biodance.pipeline.saved_results import known_body
 from biodance.pipeline.session import examine, identification_of
 from biodance.records import Session

@@ -15,6 +15,7 @@ from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.gain import Gain
+from biodance.display import cause_in_words, spaced
 from biodance.effects import Case, NamedCause
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
@@ -81,7 +82,8 @@ def accepted(result: SessionResult, inferred: Inferred, before: Identification) 
         worst = _worthless(found.inferred.diagnosis.findings)
         if worst is None:
             return found
-        inferred = _taken_back(found.inferred, worst)
+        gone = found.inferred.diagnosis.findings[worst]
+        inferred = noted(found.inferred.without(worst), _taken_back_words(gone))
     return Accepted(inferred)
 
 
@@ -103,17 +105,12 @@ def _phi(result: SessionResult, found: Inferred) -> Array:
     return phi if phi.size else result.body.sip.phi
 
 
-def _taken_back(inferred: Inferred, index: int) -> Inferred:
-    """Return the diagnosis without one finding, which is only resembled, and say so."""
-    return noted(inferred.without(index), _taken_back_words(inferred.diagnosis.findings[index]))
-
-
 def _taken_back_words(gone: Finding) -> str:
     """Return why a finding was taken back."""
     assert gone.gain is not None
     low, high = (-100 * x for x in reversed(gone.gain.ci95))
-    said = f"{gone.effect.replace('_', ' ')} {gone.target}".strip()
-    return f"{said} was taken back: accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
+    name = cause_in_words(gone.effect, gone.target)
+    return f"{name} was taken back: accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
 
 
 def _accepted(result: SessionResult, inferred: Inferred, before: Identification) -> Accepted:
@@ -210,7 +207,7 @@ def _changes(before: Identification, after: Identification) -> tuple[str, ...]:
     change = {name: now.get(name, 0.0) - mass for name, mass in then.items()}
     most = sorted(change, key=lambda name: -abs(change[name]))[:3]
     return tuple(
-        f"{name.replace('_', ' ')}: {then[name]:.2f} kg becomes {now.get(name, 0.0):.2f} kg"
+        f"{spaced(name)}: {then[name]:.2f} kg becomes {now.get(name, 0.0):.2f} kg"
         for name in most
         if abs(change[name]) >= 0.01
     )

@@ -3,11 +3,11 @@
 from collections.abc import Iterator, Sequence
 
 from biodance.diagnosis.consequence import LIMIT
-from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Finding
+from biodance.diagnosis.diagnosis import ABOUT, Diagnosis
 from biodance.diagnosis.reasons import DiagnosisStatus, Reason
 from biodance.diagnosis.spectrum import SHORTEST_RUN
-from biodance.display import digits
-from biodance.pipeline.cause_words import alternatives, names_markers, spoken
+from biodance.display import digits, spaced
+from biodance.pipeline.words import alternatives, names_markers, spoken
 from biodance.records.attention import LEVELS, Attention, Judged, Level
 
 WORDS = 30
@@ -88,7 +88,7 @@ def _clean(seen: str, missed: Sequence[str], *, well: bool) -> Iterator[str]:
 def _named(one: Diagnosis) -> Iterator[str]:
     """Yield the first cause with its size, its alternatives and what to do, ever shorter."""
     first = one.faults[0]
-    together = _together(first, one.faults[1:])
+    together = tuple(other for other in one.faults[1:] if other.effect == first.effect and names_markers(first))
     told, more = spoken(first, together), len(one.faults) - len(together)
     start = "" if more == 1 else f"{more} things are wrong. First, "
     also = alternatives(first)
@@ -99,12 +99,7 @@ def _named(one: Diagnosis) -> Iterator[str]:
         for alike in sets:
             yield _sentence(f"{start}{fact}{alike}{rest}. {told.do}")
     yield _sentence(f"{start}{told.plain}{sets[-1]}. {told.do}")
-    yield _sentence(f"{len(one.faults)} things are wrong, the first: {first.effect.replace('_', ' ')}. {_MEND}")
-
-
-def _together(first: Finding, rest: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return the findings that are told in one breath with the first: markers with the same fault."""
-    return tuple(one for one in rest if one.effect == first.effect and names_markers(first))
+    yield _sentence(f"{len(one.faults)} things are wrong, the first: {spaced(first.effect)}. {_MEND}")
 
 
 def _either(names: Sequence[str]) -> str:

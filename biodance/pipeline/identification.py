@@ -186,7 +186,9 @@ def identify_trials(
             f"no change is told. {reference.failures['segments']}"
         )
         reference = None
-    doubts = _doubts(results, checks, reference)
+    own = (*checks, *(check for one in results if one.trial.role in FITTED_ROLES for check in one.checks))
+    earlier = () if reference is None else (f"Session {reference.name}: {one}" for one in reference.search.doubts)
+    doubts = (*load_doubts(own, weighed=reference is not None), *earlier)
     search = added_mass(found, reference=reference.identification if reference else None, doubts=doubts)
     lies_on = nearest_segment(body, tuple(fit.motion for fit in fits), search.best.segment, search.best.place)
     one = SessionIdentification(
@@ -204,15 +206,6 @@ def identify_trials(
     if reference is not None and found.status == "solved":
         return _weighed(_predicted(one, results, fits, others), reference)
     return one if found.status == "failed" else _predicted(one, results, fits, others)
-
-
-def _doubts(
-    results: tuple[TrialResult, ...], checks: tuple[Check, ...], reference: SessionIdentification | None
-) -> tuple[str, ...]:
-    """Return why no load may be stated: checks of the session and of its fitted trials, and of the reference's."""
-    own = (*checks, *(check for one in results if one.trial.role in FITTED_ROLES for check in one.checks))
-    earlier = () if reference is None else (f"Session {reference.name}: {one}" for one in reference.search.doubts)
-    return (*load_doubts(own, weighed=reference is not None), *earlier)
 
 
 def _weighed(one: SessionIdentification, reference: SessionIdentification) -> SessionIdentification:

@@ -10,8 +10,8 @@ from biodance.effects.added_mass import AddedMass
 from biodance.identification.added_mass import LoadSearch
 from biodance.inference.decision import UNPLACED_LOAD
 from biodance.pipeline.checks import load_doubts
-from biodance.pipeline.finding_words import LOAD, cause_of, explained
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.words import LOAD, cause_of, explained
 
 
 def as_diagnosed(result: SessionResult, diagnosis: Diagnosis) -> SessionResult:

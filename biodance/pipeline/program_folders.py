@@ -33,7 +33,7 @@ from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import CHANNELS, Markers, Motion, Plate, Session, Trial, Wrench, longest_run, runs
+from biodance.records import CHANNELS, Motion, Plate, Session, Trial, Wrench, longest_run, runs
 from biodance.version import __version__
 
 _DERIVED = "derivatives/biodance"
@@ -100,20 +100,15 @@ def _stem(subject: str, trial: str, system: str = _SYSTEM) -> str:
 def _recorded(trial: Trial, place: Path, subject: str) -> None:
     assert trial.markers is not None
     about = {"TrackingSystemName": _SYSTEM, "SourceFile": trial.source.path.name}
-    write_motion(place, _stem(subject, trial.name), _points(trial.markers), task=bids_label(trial.name), about=about)
+    names, xyz, time = trial.markers.names, trial.markers.xyz, trial.markers.time
+    rows = [(f"{name}_{axis}", axis, "POS", name, "m", "lab") for name in names for axis in COMPONENTS]
+    points = BidsChannels(time, xyz.reshape(time.size, -1), rows)
+    write_motion(place, _stem(subject, trial.name), points, task=bids_label(trial.name), about=about)
     if trial.plates:
-        told = about | {"TrackingSystemName": "forceplates", "Plates": [_plate(plate) for plate in trial.plates]}
+        plates = [{"Name": plate.name, "Corners_m": plate.corners.tolist()} for plate in trial.plates]
+        told = about | {"TrackingSystemName": "forceplates", "Plates": plates}
         stem = _stem(subject, trial.name, "forceplates")
         write_motion(place, stem, _wrenches(trial.plates), task=bids_label(trial.name), about=told)
-
-
-def _points(markers: Markers) -> BidsChannels:
-    rows = [(f"{name}_{axis}", axis, "POS", name, "m", "lab") for name in markers.names for axis in COMPONENTS]
-    return BidsChannels(markers.time, markers.xyz.reshape(markers.time.size, -1), rows)
-
-
-def _plate(plate: Plate) -> dict[str, object]:
-    return {"Name": plate.name, "Corners_m": plate.corners.tolist()}
 
 
 def _wrenches(plates: tuple[Plate, ...]) -> BidsChannels:
@@ -245,7 +240,8 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     if contact is None:
         return OpensimTrial(name, tuple(files), None, "It has no force plate.")
     feet = foot_wrenches(one.trial, contact, soles_from_body(body, motion))
-    ground = {foot: _finite(wrench) for foot, wrench in feet.items()}
+    # the files hold finite numbers only; no dynamics is set up where the plates tell nothing
+    ground = {foot: Wrench(wrench.time, np.nan_to_num(wrench.value)) for foot, wrench in feet.items()}
     files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
     loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
     files.append(write_new(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
@@ -264,13 +260,6 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     files.append(write_new(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
     files.append(write_mot(folder / f"{name}_torques.sto", _torques(body, motion, ground, span, name)).name)
     return OpensimTrial(name, tuple(files), between)
-
-
-def _finite(wrench: Wrench) -> Wrench:
-    """Return a wrench with zeros where the plates tell nothing: OpenSim's files hold finite numbers only, and no
-    dynamics is set up there.
-    """
-    return Wrench(wrench.time, np.nan_to_num(wrench.value))
 
 
 def _span(contact: Contact, motion: Motion) -> slice | None:

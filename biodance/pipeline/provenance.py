@@ -52,11 +52,6 @@ def _version(library: str) -> str:
         return "not installed"
 
 
-def _name(path: Path, folder: Path) -> str:
-    """Return the file's path inside the session folder; its name alone where it lies elsewhere."""
-    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
-
-
 @cache
 def commit(package: Path = PACKAGE) -> str:
     """Return the git commit of the checkout that holds ``package``, with "+changed" where files of it differ; else
@@ -103,8 +98,9 @@ def provenance(result: SessionResult, *, created: str) -> Provenance:
         "python": platform.python_version(),
         **{name: _version(name) for name in LIBRARIES},
     }
-    inputs = {
-        _name(trial.trial.source.path, result.session.folder): trial.trial.source.sha256 for trial in result.trials
-    }
+    inputs, folder = {}, result.session.folder
+    for source in (trial.trial.source for trial in result.trials):
+        inside = source.path.is_relative_to(folder)
+        inputs[source.path.relative_to(folder).as_posix() if inside else source.path.name] = source.sha256
     visit = visit_words(result.session.folder, [trial.name for trial in result.trials])
     return Provenance(created, commit(), versions, blas(), inputs, result.settings.as_dict(), visit)

@@ -118,7 +118,7 @@ def identify_robot(
     tell("looking for what is not as drawn")
     causes, *without = _without_causes(body, fitted, kept)
     best = _identified(body, found.folder.name, *without) if causes else plain
-    doubtful = bool(causes) and not _predicts_better(best.identified, plain.identified)
+    doubtful = bool(causes) and _residual_rms(best.identified) >= _residual_rms(plain.identified)
     best = plain if doubtful else best
     wrong = misweighed(best.identified)
     words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best.identified.identification))
@@ -150,14 +150,10 @@ def _identified(body: Body, name: str, fitted: list[MatchedTrial], kept: list[Ma
     return _Identified(identified, alone, rooted)
 
 
-def _predicts_better(one: SessionIdentification, other: SessionIdentification) -> bool:
-    """Whether ``one`` leaves less of the kept motions than ``other``: mean logarithm, over all channels, of the RMS of
-    what is slower than `_SLOW`, where causes show.
-    """
-    return bool(_residual_rms(one) < _residual_rms(other))
-
-
 def _residual_rms(one: SessionIdentification) -> float:
+    """Return what is left of the kept motions: mean logarithm, over all channels, of the RMS of what is slower than
+    `_SLOW`, where causes show.
+    """
     rms = []
     for trial in one.validations or one.fitted:
         slow = low_pass(trial.measured.value - trial.identified.value, trial.measured.rate, LowPass(cutoff=_SLOW))

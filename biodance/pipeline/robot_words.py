@@ -4,6 +4,7 @@ import numpy as np
 
 from biodance.diagnosis.robot import RobotFinding
 from biodance.diagnosis.robot_columns import RobotCause
+from biodance.display import cause_in_words
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_gain import PlateGain
 from biodance.effects.time_delay import TimeDelay
@@ -69,7 +70,7 @@ def cause_words(causes: tuple[RobotFinding, ...], *, doubtful: bool = False) -> 
 
 
 def _named(cause: RobotCause) -> str:
-    return f"{cause.kind.replace('_', ' ')} of {cause.where}"
+    return f"{cause_in_words(cause.kind)} of {cause.where}"
 
 
 def _finding_sentence(one: RobotFinding) -> str:
@@ -88,15 +89,12 @@ def _finding_sentence(one: RobotFinding) -> str:
         case "backlash":
             return f"{where} {'have' if several else 'has'} play: {angle} between the two sides."
         case PlateGain.name:
-            return f"The plate reads {where} {100 * abs(value):.1f} ± {100 * reach:.1f} % too {_size(value)}."
+            too = "large" if value > 0 else "small"
+            return f"The plate reads {where} {100 * abs(value):.1f} ± {100 * reach:.1f} % too {too}."
         case PlateCrosstalk.name:
             return f"The plate's crosstalk from {where} is {100 * value:.1f} ± {100 * reach:.1f} %."
         case _:
             return f"The {_named(one.cause)} is {value:.3g} ± {reach:.2g} {one.cause.unit}."
-
-
-def _size(value: float) -> str:
-    return "large" if value > 0 else "small"
 
 
 def misweighed(found: SessionIdentification) -> list[Attention]:

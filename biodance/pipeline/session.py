@@ -8,15 +8,13 @@ from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused
 from biodance.motion.quiet_standing import QuietStanding
-from biodance.pipeline.body import body_of, shown_joints, starting_from, with_forces
-from biodance.pipeline.checks import mass_check, standing_check, trial_checks
+from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
+from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult
-from biodance.pipeline.same_person import refuse_another_reference
 from biodance.pipeline.still import load_still, still_of, worst_still
 from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
-from biodance.pipeline.weighing import weigh
 from biodance.records import Session
 from biodance.threads import one_thread
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.changes import parts_as_segments
-from biodance.body.solids import shape_parts
+from biodance.body.solids import box_solid, shape_parts
 from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.load_words import size_and_segments
@@ -62,6 +62,22 @@ def bone_lines(body: Body, pose: Poses) -> tuple[Array, tuple[str, ...]]:
         if not children or segment.startswith("trunk"):
             lines.append((start, place[:, i] + pose.rotation[:, i] @ _tip(body.boxes[i]), side_in_name(segment)))
     return np.stack([np.stack(line[:2], axis=1) for line in lines], axis=1), tuple(line[2] for line in lines)
+
+
+def silhouettes(body: Body, q: Array, eye: tuple[float, float]) -> list[tuple[str, Array, float]]:
+    """Return the parts of a body in the posture ``q`` (nq,) as seen from the horizontal direction ``eye``: segment,
+    outline (n, 2) m, across and up, and how near it is, m.
+    """
+    from scipy.spatial import ConvexHull
+
+    pose, out = poses(body, q), []
+    toward = np.array([*eye, 0.0])
+    seen = np.array([[-eye[1], eye[0], 0.0], [0.0, 0.0, 1.0]])
+    for segment, box in shape_parts(body):
+        points = np.asarray(box_solid(box).vertices) @ pose.rotation[0, segment].T + pose.position[0, segment]
+        flat = points @ seen.T
+        out.append((body.segments[segment], flat[ConvexHull(flat).vertices], float((points @ toward).mean())))
+    return out
 
 
 def still_of(body: Body, results: tuple[TrialResult, ...]) -> Still:

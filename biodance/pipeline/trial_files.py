@@ -21,7 +21,7 @@ from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
-from biodance.records import SIDES, AngleSpan, Array, Wrench
+from biodance.records import SIDES, Array, Wrench
 from biodance.settings import COP_FORCE
 from biodance.version import __version__
 
@@ -188,14 +188,13 @@ def results_into_c3d(
         "SOURCE": [source[:255]],
         "SEGMENTS": list(body.segments),
         "MASS": body.sip.mass,
-        "NOT_MEASURED": [_when(span)[:255] for span in one.motion.spans()][:255] or ["none"],
+        "NOT_MEASURED": [
+            f"{span.joint} {span.state.words} {span.start:.3f} {span.end:.3f} s"[:255] for span in one.motion.spans()
+        ][:255]
+        or ["none"],
     }
     write_results_c3d(path, one.trial.source.path, outputs=outputs, events=events, parameters=said, subject=subject)
     return path, f"The recording of trial {trial} with {len(outputs)} results and {len(events)} events. {source}"
-
-
-def _when(span: AngleSpan) -> str:
-    return f"{span.joint} {span.state.words} {span.start:.3f} {span.end:.3f} s"
 
 
 def _groups(body: Body) -> Iterator[tuple[str, list[int], str]]:

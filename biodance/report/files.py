@@ -1,9 +1,17 @@
-"""Files that stand whole or not at all, and never over what is there."""
+"""Files that stand whole or not at all, and never over what is there. Tables are written twice: as CSV, for eyes and
+spreadsheets, and as Parquet, which keeps types and is read ten times faster.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from biodance.errors import BiodanceError
+from biodance.errors import BiodanceError, SessionRefused
+from biodance.lab.plain_text import for_spreadsheet
+from biodance.lab.session.results_folder import made_folder
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 def refuse_page(path: Path, *, force: bool) -> None:
@@ -41,3 +49,61 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
                 f"{folder / name}: cannot be written ({error.strerror or error}). Make room or choose another --out, "
                 f"and run again."
             ) from error
+
+
+ENDINGS = (".csv", ".parquet")
+
+
+def tables_folder(folder: Path, session: Path, *, force: bool) -> Path:
+    """Return the folder for tables, made if missing, before any long work starts.
+
+    Raises
+    ------
+    SessionRefused
+        It is the session folder or one above it, a file, holds anything else than tables, or holds tables and not
+        ``force``.
+    """
+    folder, session = folder.resolve(), session.resolve()
+    if folder == session or folder in session.parents:
+        raise SessionRefused(f"{folder}: tables must not lie among the recordings. Give another folder for --tables.")
+    if folder.exists() and not folder.is_dir():
+        raise SessionRefused(f"{folder}: is a file; the tables need a folder. Choose another name for --tables.")
+    files = sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")) if folder.is_dir() else []
+    other = [name for name in files if Path(name).suffix not in ENDINGS]
+    if files and (other or not force):
+        wanted = "Give another folder for --tables" if other else "Give another folder, or --force"
+        raise SessionRefused(
+            f"{folder}: holds files already ({(other or files)[0]}) and nothing is overwritten. {wanted}."
+        )
+    return made_folder(folder)
+
+
+def for_spreadsheets(frame: "DataFrame") -> "DataFrame":
+    """Return a table with all its texts and headings as `for_spreadsheet`."""
+    from pandas.api.types import is_numeric_dtype
+
+    texts = {name: frame[name].map(for_spreadsheet) for name in frame.columns if not is_numeric_dtype(frame[name])}
+    return frame.assign(**texts).rename(columns=for_spreadsheet)
+
+
+def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path, ...]:
+    """Write every table as ``NAME.csv`` and ``NAME.parquet`` into a folder that exists, and return the paths.
+
+    In the CSV, texts are as `for_spreadsheet`. Both by pyarrow: its text is the shortest that reads back exactly, like
+    pandas' own, in a tenth of the time.
+    """
+    from pyarrow import Table, csv, parquet
+
+    plain, written = csv.WriteOptions(quoting_style="needed", quoting_header="needed"), []
+    for name, frame in tables.items():
+        for ending in ENDINGS:
+            shown = for_spreadsheets(frame) if ending == ".csv" else frame
+            table = Table.from_pandas(shown, preserve_index=False)
+            part, path = folder / f".{name}{ending}.part", folder / f"{name}{ending}"
+            if ending == ".csv":
+                csv.write_csv(table, part, plain)
+            else:
+                parquet.write_table(table, part)
+            part.replace(path)
+            written.append(path)
+    return tuple(written)

@@ -9,23 +9,20 @@ that were accepted stand in ``[corrections]`` of the same file.
 
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from biodance.cycles.curves import normal_toml
 from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
-from biodance.report.documents.plain import keyed
 from biodance.report.files import refuse_missing_folder
-from biodance.report.wording import format_number, millimetres
+from biodance.report.tables.laboratory import CARD_ROW, HARDLY, NORM_ROW
+from biodance.report.tables.schema import Row
+from biodance.report.terminal import print_line, print_table
 from biodance.uncertainty.tolerances import shipped, to_toml
 
-_HARDLY = 0.5
-"""Coefficients below which a size is the shipped one."""
 _SIZE = re.compile(r'^"(?P<key>[^"]+)" = (?P<value>[-+.\deE]+)$')
 
 
@@ -39,7 +36,7 @@ def lab_file_text(found: LearnedLaboratory) -> str:
         f"learned_utc = {found.created}",
         f"archive = {json.dumps(found.archive.resolve().name)}",
         f"sessions = {json.dumps(list(found.sessions), ensure_ascii=False)}",
-        *[f"# left out: {name}: {_one_line(why)}" for name, why in found.left_out.items()],
+        *[f"# left out: {name}: {' '.join(why.split())}" for name, why in found.left_out.items()],
         "",
     ]
     return "\n".join([*head, *_tolerances(found), "", *_norms(found), *normal_toml(found.normal)]).rstrip() + "\n"
@@ -57,7 +54,7 @@ def _tolerances(found: LearnedLaboratory) -> list[str]:
 
 def _basis(key: str, found: LearnedLaboratory, before: float) -> str:
     count = found.shown.get(key, 0.0)
-    if count < _HARDLY:
+    if count < HARDLY:
         return "as shipped: no session shows it"
     return f"{count:.1f} values in {len(found.sessions)} sessions; shipped {before:.4g}"
 
@@ -77,10 +74,6 @@ def _norms(found: LearnedLaboratory) -> list[str]:
             "",
         ]
     return lines
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
@@ -109,65 +102,28 @@ def refuse_existing(path: Path) -> None:
     refuse_missing_folder(path)
 
 
-def learned_document(found: LearnedLaboratory) -> dict[str, Any]:
-    """Return what was learned as plain values: sessions, norms, and the sizes that changed most."""
-    before = shipped()
-    ratio = {
-        key: size / before.size(key)
-        for key, size in found.tolerances.sizes.items()
-        if before.size(key) > 0 and found.shown.get(key, 0.0) >= _HARDLY
-    }
-    most = sorted(ratio, key=lambda key: -max(ratio[key], 1 / ratio[key]))[:10]
-    return {
-        "sessions": list(found.sessions),
-        "left_out": dict(found.left_out),
-        "learned_utc": found.created,
-        "norms": [
-            keyed(norm, "name value sd between_sessions_sd=between unit sessions observations") for norm in found.norms
-        ],
-        "changed_most": [
-            {"key": key, "size": found.tolerances.size(key), "shipped": before.size(key), "values": found.shown[key]}
-            for key in most
-        ],
-    }
+def _print_left_out(left_out: Mapping[str, str], console: Console) -> None:
+    for what, why in left_out.items():
+        print_line(console, f"{what} was left out: {why.splitlines()[0]}")
 
 
-def print_plates(document: dict[str, Any], console: Console) -> None:
+def print_plates(document: Row, console: Console) -> None:
     """Print a row per plate, then everything that a person must see."""
-    table = Table("plate", "visits", "place x, y (mm)", "gain (%)", "offset Fx, Fy, Fz (N)", "delay (ms)", "changes")
-    for card in document["plates"]:
-        gain, delay = card["gain"], card["delay_s"]
-        table.add_row(
-            card["plate"],
-            str(card["visits"]),
-            ", ".join(millimetres(value) for value in card["place_m"]),
-            format_number(None if gain is None else 100 * gain, 2),
-            ", ".join(format_number(value) for value in card["offset_n"]),
-            millimetres(delay),
-            str(len(card["changes"])),
-        )
-    console.print(table)
+    print_table(CARD_ROW, document["plates"], console)
     for one in document["attention"]:
-        console.print(escape(one["text"]), soft_wrap=True)
+        print_line(console, one["text"])
     for person in document["persons"]:
         for one in person["findings"]:
-            console.print(escape(f"Person {person['person']}: {one['text']}"), soft_wrap=True)
-    for what, why in document["refused"].items():
-        console.print(escape(f"{what} was left out: {why.splitlines()[0]}"), soft_wrap=True)
+            print_line(console, f"Person {person['person']}: {one['text']}")
+    _print_left_out(document["refused"], console)
     for note in document["notes"]:
-        console.print(escape(note), soft_wrap=True)
+        print_line(console, note)
 
 
-def print_learned(document: dict[str, Any], console: Console) -> None:
+def print_learned(document: Row, console: Console) -> None:
     """Print what a laboratory learned: sessions, norms, what changed most."""
-    console.print(f"Learned from {len(document['sessions'])} sessions: {', '.join(document['sessions'])}")
-    table = Table("what", "usual", "sd between sessions", "unit", "sessions")
-    for one in document["norms"]:
-        table.add_row(
-            one["name"], f"{one['value']:.3g}", f"{one['between_sessions_sd']:.2g}", one["unit"], str(one["sessions"])
-        )
-    console.print(table)
+    print_line(console, f"Learned from {len(document['sessions'])} sessions: {', '.join(document['sessions'])}")
+    print_table(NORM_ROW, document["norms"], console)
     for one in document["changed_most"]:
-        console.print(f"{one['key']}: {one['size']:.3g} instead of {one['shipped']:.3g}", highlight=False)
-    for what, why in document["left_out"].items():
-        console.print(escape(f"{what} was left out: {why.splitlines()[0]}"), soft_wrap=True)
+        print_line(console, f"{one['key']}: {one['size']:.3g} instead of {one['shipped']:.3g}")
+    _print_left_out(document["left_out"], console)

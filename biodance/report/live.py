@@ -14,32 +14,33 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from biodance.diagnosis.watch import LiveWarning
+from biodance.display import cause_in_words, spaced
 from biodance.errors import BiodanceError
 from biodance.pipeline.live import LiveResult, LiveState
-from biodance.report.documents.identification import ASKED
-from biodance.report.documents.plain import keyed
-from biodance.report.wording import format_number
+from biodance.report.tables.identification import ASKED
+from biodance.report.tables.schema import Row, Schema
+from biodance.report.terminal import print_table
+
+KNOWN_ROW = Schema(
+    "segment quantity unit value sd low=interval.0 high=interval.1 verdict",
+    shown="segment: {segment:name} | mass (kg): {value:2} | 95 % interval: {low:2} to {high:2} | verdict: {verdict}",
+)
+_WARNING = Schema("time_s effect target text")
 
 
-def live_document(found: LiveResult) -> dict[str, Any]:
+def live_document(found: LiveResult) -> Row:
     """Return the content of ``biodance live --json``: times a frame in ms (processor time of the one core that is used;
     ``wall`` by the clock, which other programs lengthen), what is known, and what was warned of.
     """
     one = found.identification
-    rows = [known for known in one.known if known.quantity in ASKED] if one else []
     return {
         "frames": found.frame_s.size,
         "frames_used": int(found.fit.use.sum()) if found.fit else 0,
         "frame_ms": _spread(found.frame_s) | {"wall": _spread(found.wall_s)},
-        "known": [
-            keyed(known, "segment quantity unit value sd")
-            | {"low": known.interval[0], "high": known.interval[1], "verdict": known.verdict}
-            for known in rows
-        ],
-        "warnings": [keyed(said, "time_s effect target text") for said in found.warnings],
+        "known": KNOWN_ROW.rows(known for known in (one.known if one else ()) if known.quantity in ASKED),
+        "warnings": _WARNING.rows(found.warnings),
         "next": found.state.advice,
         "cause": found.cause,
     }
@@ -56,27 +57,22 @@ def _spread(seconds: np.ndarray) -> dict[str, float]:
 
 def state_line(state: LiveState) -> str:
     """Return what an operator must see now, in one line."""
-    sure = [name.replace("_", " ") for name, verdict in state.verdicts.items() if verdict == "known"]
+    sure = [spaced(name) for name, verdict in state.verdicts.items() if verdict == "known"]
     known = f"known: {', '.join(sure)}" if sure else "no mass is known yet"
-    suspect = f"; SUSPECT: {' '.join(state.suspect)}" if state.suspect else ""
+    suspect = f"; SUSPECT_ROW: {' '.join(state.suspect)}" if state.suspect else ""
     return f"{state.time:.0f} s, {known}{suspect}; next: {state.advice}"
 
 
 def warning_line(said: LiveWarning) -> str:
     """Return a warning as one line."""
-    return f"{said.time_s:.2f} s, {said.effect} {said.target}: {said.text}"
+    return f"{said.time_s:.2f} s, {cause_in_words(said.effect, said.target)}: {said.text}"
 
 
-def print_live(found: LiveResult, document: dict[str, Any], console: Console) -> None:
+def print_live(found: LiveResult, document: Row, console: Console) -> None:
     """Print what is known of every segment, what is suspect, and what to do next."""
-    if found.identification is not None and found.identification.known:
-        table = Table("segment", "mass (kg)", "95 % interval", "verdict", box=None)
-        for row in document["known"]:
-            if row["quantity"] == "mass":
-                low, high = format_number(row["low"], 2), format_number(row["high"], 2)
-                name = row["segment"].replace("_", " ")
-                table.add_row(name, format_number(row["value"], 2), f"{low} to {high}", row["verdict"])
-        console.print(table)
+    masses = [row for row in document["known"] if row["quantity"] == "mass"]
+    if masses:
+        print_table(KNOWN_ROW, masses, console)
     for said in found.warnings:
         console.print(escape(f"look: {warning_line(said)}"))
     if found.cause:
@@ -141,7 +137,7 @@ class LivePage:
     def warn(self, said: LiveWarning) -> None:
         """Add a warning."""
         with self._lock:
-            self._said["warnings"] = [*self._said["warnings"], keyed(said, "time_s text")]
+            self._said["warnings"] = [*self._said["warnings"], Schema("time_s text").row(said)]
 
     def end(self, state: LiveState, cause: str) -> None:
         """Show the last state, and that the stream has ended, with the ``cause`` where nothing was identified."""

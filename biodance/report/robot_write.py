@@ -1,24 +1,44 @@
 """What was found of a robot, as numbers and as a page."""
 
 from pathlib import Path
-from typing import Any
 
 from biodance.body.body_file import body_text
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
-from biodance.pipeline.robot_trials import MatchedTrial
 from biodance.pipeline.saved_results import BODY_FILE
-from biodance.report.documents.diagnosis import attention_document, judged_document
-from biodance.report.documents.identification import agreement, identification_document
-from biodance.report.documents.plain import keyed, plain_values, to_text
 from biodance.report.files import write_files
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.template import render, template_text
+from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW
+from biodance.report.tables.identification import AGREEMENT_ROW, identification_document
+from biodance.report.tables.schema import Row, Schema, plain_values, to_text
 from biodance.report.write import PAGE
 from biodance.version import __version__
 
+_ROBOT = Schema(
+    "recording=recording.folder.name",
+    {
+        "robot": Schema("name=body.name urdf=urdf.name joints=#body.joints").row,
+        "attention": ATTENTION_ROW,
+        "judged": JUDGED_ROW,
+    },
+)
+_IN_ROOT = Schema("", {"table": AGREEMENT_ROW.at("0"), "identified": AGREEMENT_ROW.at("1")})
+_CAUSE = Schema(
+    "cause=cause.kind where=cause.where value sd unit=cause.unit evidence_nats=gain evidence_on_kept_nats=kept_gain",
+    {"not_told_from": lambda one: [f"{rival.kind} {rival.where}" for rival in one.rivals]},
+)
+_MATCHED = Schema(
+    "trial=recorded.name role=recorded.role encoders=recorded.files.0.name plate=recorded.files.1.name "
+    "encoders_hz=recorded.encoders.rate plate_hz=recorded.wrench.rate delay_s=plate.delay place_m=plate.place "
+    "yaw_rad=plate.yaw correlation=plate.correlation scale=plate.scale surprise=innovation history=recorded.history",
+    {"standing": Schema("foot=0 start_s=1 end_s=2").at("motion.grounded.supports")},
+    "trial: {trial} | role: {role} | delay (s): {delay_s:+.3f} | x, y (mm): {place_m:mm0} | "
+    "turn (deg): {yaw_rad:deg1} | correlation: {correlation:.3f} | foot, until (s): {feet}",
+)
 
-def robot_document(result: RobotResult) -> dict[str, Any]:
+
+def robot_document(result: RobotResult) -> Row:
     """Return all that was found: as of a person (`identification_document`; "table" is the URDF), and how plate and
     encoders were brought together.
 
@@ -28,53 +48,16 @@ def robot_document(result: RobotResult) -> dict[str, Any]:
     found = identification_document(result.identified)
     found["base_parameters"]["well_known_every_frame_independent"] = len(result.alone.well_known)
     return {
-        "recording": result.recording.folder.name,
-        "robot": {"name": result.body.name, "urdf": result.urdf.name, "joints": len(result.body.joints)},
-        "attention": attention_document(result.attention),
-        "judged": judged_document(result.judged),
+        **_ROBOT.row(result),
         **found,
-        "diagnosis": _diagnosis(result),
-        "in_root_frame": {
-            name: {"table": agreement(table), "identified": agreement(found)}
-            for name, (table, found) in result.in_root.items()
-        },
-        "matched": [_matched(one) for one in result.trials],
+        "diagnosis": {"verdict": result.verdict, "findings": _CAUSE.rows(result.causes)},
+        "in_root_frame": {name: _IN_ROOT.row(pair) for name, pair in result.in_root.items()},
+        "matched": _MATCHED.rows(result.trials),
         "provenance": {"created": now(), "versions": {"biodance": __version__}},
     }
 
 
-def _diagnosis(result: RobotResult) -> dict[str, Any]:
-    """Return what is not as drawn: the verdict, and the findings."""
-    keys = (
-        "cause=cause.kind where=cause.where value sd unit=cause.unit evidence_nats=gain evidence_on_kept_nats=kept_gain"
-    )
-    findings = [
-        keyed(one, keys) | {"not_told_from": [f"{rival.kind} {rival.where}" for rival in one.rivals]}
-        for one in result.causes
-    ]
-    return {"verdict": result.verdict, "findings": findings}
-
-
-_MATCHED = (
-    "delay_s=plate.delay place_m=plate.place yaw_rad=plate.yaw correlation=plate.correlation scale=plate.scale "
-    "surprise=innovation"
-)
-
-
-def _matched(one: MatchedTrial) -> dict[str, Any]:
-    encoders, plate = one.recorded.files
-    return {
-        **keyed(one, "trial=recorded.name role=recorded.role"),
-        "encoders": encoders.name,
-        "plate": plate.name,
-        **keyed(one.recorded, "encoders_hz=encoders.rate plate_hz=wrench.rate"),
-        **keyed(one, _MATCHED),
-        "standing": [{"foot": f, "start_s": a, "end_s": b} for f, a, b in one.motion.grounded.supports],
-        "history": one.recorded.history,
-    }
-
-
-def write_robot(result: RobotResult, folder: Path) -> dict[str, Any]:
+def write_robot(result: RobotResult, folder: Path) -> Row:
     """Write ``report.html``, ``results.json`` and, where a body was found, ``body.json``; return the numbers."""
     numbers = robot_document(result)
     content = {"results.json": to_text(numbers), PAGE: _page(result, numbers)}
@@ -87,7 +70,7 @@ def write_robot(result: RobotResult, folder: Path) -> dict[str, Any]:
     return dict(plain_values(numbers))
 
 
-def _page(result: RobotResult, numbers: dict[str, Any]) -> str:
+def _page(result: RobotResult, numbers: Row) -> str:
     from markupsafe import Markup
 
     return render(
@@ -95,6 +78,11 @@ def _page(result: RobotResult, numbers: dict[str, Any]) -> str:
         scripts=[template_text("curves.js")],
         model=result.body.name,
         numbers=numbers,
+        schemas={"matched": _MATCHED},
+        matched=[
+            row | {"feet": ", ".join(f"{one['foot']} {one['end_s']:.1f}" for one in row["standing"])}
+            for row in numbers["matched"]
+        ],
         version=__version__,
         section=Markup(identification_section(result.identified)),
     )

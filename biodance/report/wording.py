@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from biodance.display import SHOWN_UNITS
+from biodance.display import SHOWN_UNITS, cause_in_words, spaced
 from biodance.records.attention import Attention
 
 _ABSURD = 30.0
@@ -54,6 +54,11 @@ def changed(value: float, unit: str) -> str:
     return f"{'+' if value > 0 else ''}{sized(value, unit)}"
 
 
+def small(value: float) -> str:
+    """Return a probability as text, however small."""
+    return format_number(value, 3) if value >= 0.001 else "below 0.001"
+
+
 def share_of(part: float) -> str:
     """Return a share (0 to 1) in per cent; what is small is not said to be nothing."""
     return "less than 1 %" if 0 < part < 0.01 else f"{format_number(100 * part, 0)} %"
@@ -65,7 +70,7 @@ def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
     """
     targets: dict[str, list[str]] = {}
     for effect, target in causes:
-        targets.setdefault(effect.replace("_", " "), []).append(target.replace("_", " ").replace("->", "→"))
+        targets.setdefault(spaced(effect), []).append(cause_in_words("", target))
     out = []
     for effect, of in targets.items():
         more = f" and {len(of) - _NAMED} more" if len(of) > _NAMED else ""
@@ -73,17 +78,11 @@ def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
     return "; ".join(out)
 
 
-def named(effect: str, target: str) -> str:
-    """Return a cause with its place as words: ``added mass, left forearm hand``."""
-    plain = effect.replace("_", " ")
-    return f"{plain}, {target.replace('_', ' ').replace('->', ' into ')}" if target else plain
-
-
 def sizes_in_words(parameters: dict[str, dict[str, Any]]) -> str:
     """Return the parameters of a finding (its JSON) with their standard deviations; three axes as one vector."""
     vectors = {name: row for name, row in parameters.items() if isinstance(row["value"], list)}
     rows = {name: row for name, row in parameters.items() if name.rpartition("_")[0] not in vectors}
-    return ", ".join(f"{name.replace('_', ' ')} {_size_in_words(row)}" for name, row in rows.items())
+    return ", ".join(f"{spaced(name)} {_size_in_words(row)}" for name, row in rows.items())
 
 
 def _size_in_words(row: dict[str, Any]) -> str:
@@ -94,17 +93,14 @@ def _size_in_words(row: dict[str, Any]) -> str:
     return f"{' ± '.join(filter(None, said))} {unit}".strip()
 
 
-def size_seen(row: dict[str, Any], key: str) -> str:
-    """Return a size of a cause, ``limit``, ``told_from`` or ``typical``, as a person says it: 12 mm, or never."""
-    value = row[key]
-    if value is None or not value < _ABSURD * row["typical"]:
-        return NEVER
-    return sized(value, row["unit"])
+def size_seen(value: float | None, typical: float, unit: str) -> str:
+    """Return a size from which a cause is seen or told as a person says it: 12 mm, or never."""
+    return NEVER if value is None or not value < _ABSURD * typical else sized(value, unit)
 
 
 def trial_and_subject(one: Attention) -> str:
     """Return where a sentence belongs, to stand before it: file, check and trial, step, or trial."""
-    about = one.about.replace("_", " ")
+    about = spaced(one.about)
     if one.trial and about in ("", "file"):
         return one.trial if about else f"Trial {one.trial}"
     place = f", {one.trial}" if one.trial else ""

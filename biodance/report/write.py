@@ -23,16 +23,16 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import BODY_FILE, SCALED, keep_motions
 from biodance.pipeline.session_frames import frames_of
 from biodance.records.attention import Attention
-from biodance.report.documents.diagnosis import attention_document, diagnosis_document, judged_document
-from biodance.report.documents.identification import identification_document
-from biodance.report.documents.methods import METHODS, methods_text
-from biodance.report.documents.plain import plain_values, to_text
-from biodance.report.documents.session import movement_document, provenance_document, results_document
 from biodance.report.files import write_files
+from biodance.report.methods import METHODS, methods_text
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
+from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, diagnosis_document
+from biodance.report.tables.identification import identification_document
+from biodance.report.tables.schema import plain_values, to_text
+from biodance.report.tables.session import PROVENANCE_ROW, movement_document, results_document
 
 PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
 
@@ -54,9 +54,9 @@ def write_report(
     numbers = {
         **results_document(result, made),
         "diagnosis": diagnosis_document(diagnosis) if diagnosis else None,
-        "attention": attention_document(first),
-        "judged": judged_document(judged),
-        "movement": movement_document(movement) if movement else None,
+        "attention": ATTENTION_ROW.rows(first),
+        "judged": JUDGED_ROW.rows(judged),
+        "movement": movement_document(movement),
     }
     found: dict[str, Any] = plain_values(numbers)
     files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
@@ -98,11 +98,11 @@ def write_identification(
     first = identified_attention(result, checks)
     numbers = {
         "session": result.session.folder.name,
-        "attention": attention_document(first),
-        "judged": judged_document(identified_trials(result)),
+        "attention": ATTENTION_ROW.rows(first),
+        "judged": JUDGED_ROW.rows(identified_trials(result)),
         **identification_document(found),
-        "movement": movement_document(movement) if movement else None,
-        "provenance": provenance_document(made),
+        "movement": movement_document(movement),
+        "provenance": PROVENANCE_ROW.row(made),
     }
     told: dict[str, Any] = plain_values(numbers)
     page = _page(result, made, movement=movement, attention=first)
@@ -130,9 +130,9 @@ def write_diagnosis(
     numbers = {
         "session": result.session.folder.name,
         **diagnosis_document(found),
-        "movement": movement_document(movement) if movement else None,
+        "movement": movement_document(movement),
         "failures": failures,
-        "provenance": provenance_document(made),
+        "provenance": PROVENANCE_ROW.row(made),
     }
     files = {PAGE: diagnosis_page(result, found, made)}
     if accepted:

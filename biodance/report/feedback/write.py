@@ -16,12 +16,14 @@ from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
 from biodance.dance.problem.footprint import plate_corners
 from biodance.dance.problem.stance import Stance, stance_words
+from biodance.display import spaced
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import not_safe
-from biodance.records import SIDES, side_in_name
+from biodance.records import SIDES, Array, side_in_name
 from biodance.report.files import refuse_page, write_files
 from biodance.report.pages.template import render, script_json, template_text, three_js
+from biodance.report.tables.schema import Schema
 from biodance.version import __version__
 
 _POINTS = {"upper_arm": "shoulder", "forearm_hand": "elbow", "thigh": "hip", "shank": "knee", "foot": "ankle"}
@@ -47,39 +49,28 @@ def follow_scene(dance: Dance) -> dict[str, Any] | None:
         "rate": told.rate,
         "plan": _packed(dance.motion(told.rate).q),
         "root": _packed(told.root),
-        "weights": told.weights.tolist(),
-        "edges": list(told.edges),
-        "still": told.still.tolist(),
-        "about": told.about.tolist(),
-        "gravity": body.gravity.tolist(),
-        "segments": [_called(name) for name in body.segments],
-        "carriers": list(body.segment_joint),
-        "joints": [
-            {
-                "parent": joint.parent,
-                "rotation": joint.rotation.ravel().tolist(),
-                "translation": joint.translation.tolist(),
-                "axis": joint.axis.tolist(),
-                "free": _TRUNK if joint.name.startswith("trunk") else _LIMBS,
-            }
-            for joint in body.joints
+        **Schema("weights edges still about").row(told),
+        "gravity": body.gravity,
+        "segments": [
+            spaced(name.replace("_head", " and head").replace("_hand", " and hand")) for name in body.segments
         ],
+        "carriers": body.segment_joint,
+        "joints": _JOINT.rows(body.joints),
         "points": points,
-        "phases": [
-            {
-                "kind": phase.kind,
-                "posture": phase.posture,
-                "start": phase.start,
-                "end": phase.end,
-                "planted": [body.feet[SIDES[side]].segment for side in phase.stance.planted],
-            }
-            for phase in dance.phases
-        ],
+        "phases": Schema(
+            "kind posture start end",
+            {"planted": lambda phase: [body.feet[SIDES[side]].segment for side in phase.stance.planted]},
+        ).rows(dance.phases),
     }
 
 
-def _called(segment: str) -> str:
-    return segment.replace("_head", " and head").replace("_hand", " and hand").replace("_", " ")
+_JOINT = Schema(
+    "parent translation axis",
+    {
+        "rotation": lambda joint: joint.rotation.ravel(),
+        "free": lambda joint: _TRUNK if joint.name.startswith("trunk") else _LIMBS,
+    },
+)
 
 
 def _packed(values: ArrayLike, kind: str = "<f4") -> str:
@@ -108,7 +99,7 @@ def _points(body: Body) -> list[dict[str, Any]]:
             "name": called,
             "number": _NUMBERS[name] + second,
             "segment": int(segment),
-            "place": place.tolist(),
+            "place": place,
             "asks": _ASKED.get(name, 0.0),
         }
         for called, segment, place, name, second in out
@@ -166,7 +157,7 @@ def scene_of(dance: Dance) -> dict[str, Any]:
             for name in (dance.body.segments[k] for k in chosen)
         ],
         "poses": _packed(placed, "<i2"),
-        "plate": plate_corners(dance.stances, dance.plate or _SQUARE).round(4).tolist(),
+        "plate": plate_corners(dance.stances, dance.plate or _SQUARE).round(4),
         "cues": _cues(dance),
     }
 
@@ -197,12 +188,12 @@ def _cues(dance: Dance) -> list[dict[str, Any]]:
     return out
 
 
-def _outline(stance: Stance, side: int) -> list[list[float]]:
+def _outline(stance: Stance, side: int) -> Array:
     """Return the outline of a planted sole on the floor, (P, 2) m, in order about its middle."""
     points = stance.soles[side][:, :2]
     from_middle = points - points.mean(axis=0)
     order = np.argsort(np.arctan2(from_middle[:, 1], from_middle[:, 0]))
-    return [[round(float(x), 4), round(float(y), 4)] for x, y in points[order]]
+    return points[order].round(4)
 
 
 _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json", "weights": "movenet.bin"}
@@ -251,7 +242,7 @@ def feedback_page(
 
     return render(
         "feedback.html.j2",
-        name=name.replace("_", " "),
+        name=spaced(name),
         unsafe=unsafe,
         version=__version__,
         style=Markup(template_text("feedback.css")),

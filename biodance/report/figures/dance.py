@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY
+from biodance.display import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, spaced
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines
 from biodance.records import Array
@@ -86,7 +86,7 @@ def zmp_figure(paths: "Sequence[ZmpPath]") -> "Figure":
                     label = f"zero-moment point, {what} way" if k == 0 else None
                     axes.plot(*getattr(path, what).T, color=colour, linewidth=0.7, label=label)
                 axes.set_aspect("equal")
-            panels[0, column].set_title(name.replace("_", " "))
+            panels[0, column].set_title(spaced(name))
             panels[1, column].set_xlabel("lab x, m")
         low, high = (edge(np.concatenate([path.stance.support for path in paths]), axis=0) for edge in (np.min, np.max))
         panels[0, 0].set(xlim=(low[0] - 0.1, high[0] + 0.1), ylim=(low[1] - 0.1, high[1] + 0.1))
@@ -124,7 +124,7 @@ def expectation_figure(expectation: "Expectation") -> "Figure":
                     share,
                     style,
                     color=colours[number % len(colours)],
-                    label=kind.replace("_", " "),
+                    label=spaced(kind),
                 )
             axes.set(title=title, xlabel="duration of the dance, s", ylim=(0, 105))
         left.set_ylabel("expected sd, % of the table's")

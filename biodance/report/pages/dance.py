@@ -1,14 +1,13 @@
 """The cards of a dance: a page to print, a picture and the instructions of every posture on a card of its own."""
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from biodance.body.body import Body
-from biodance.body.solids import box_solid, shape_parts
 from biodance.dance.cues import dance_instructions
 from biodance.dance.problem.stance import stance_words
-from biodance.motion.kinematics import poses
 from biodance.pipeline.dance_result import DanceResult, not_safe
+from biodance.pipeline.preview import held_postures
+from biodance.pipeline.still import silhouettes
 from biodance.records import Array
 from biodance.report.figures.style import SIDE_COLOURS
 from biodance.report.pages.template import render
@@ -24,23 +23,16 @@ def mannequin_svg(body: Body, q: Array, title: str) -> str:
     """Return the picture of the posture ``q`` (nq,): from the front (the person's right is on the left) and from the
     right; ``title`` is read to those who cannot see it.
     """
-    pose = poses(body, q)
-    solids = []
-    for segment, box in shape_parts(body):
-        points = np.asarray(box_solid(box).vertices) @ pose.rotation[0, segment].T + pose.position[0, segment]
-        solids.append((body.segments[segment], points))
-    height = max(float(points[:, 2].max()) for _, points in solids)
+    views = [(words, silhouettes(body, q, eye)) for words, eye in _VIEWS]
+    height = max(float(outline[:, 1].max()) for _, outline, _ in views[0][1])
     scale, drawn, left = _TALL / max(height, 1.2), list[str](), 0.0
-    for words, (x, y) in _VIEWS:
-        across = np.array([-y, x, 0.0])
-        flat = [(name, points @ across, points[:, 2], points @ np.array([x, y, 0.0])) for name, points in solids]
-        low = min(float(u.min()) for _, u, _, _ in flat)
-        wide = scale * max(float(u.max()) - low for _, u, _, _ in flat)
+    for words, parts in views:
+        across = np.concatenate([outline[:, 0] for _, outline, _ in parts])
+        wide = scale * float(np.ptp(across))
         room = max(wide, _LABEL)
-        for name, u, z, _ in sorted(flat, key=lambda one: float(one[3].mean())):
-            corners = np.column_stack([left + (room - wide) / 2 + scale * (u - low), _TALL - scale * z])
-            hull = corners[ConvexHull(corners).vertices]
-            path = " ".join(f"{a:.1f},{b:.1f}" for a, b in hull)
+        start = left + (room - wide) / 2 - scale * float(across.min())
+        for name, outline, _ in sorted(parts, key=lambda one: one[2]):
+            path = " ".join(f"{start + scale * u:.1f},{_TALL - scale * z:.1f}" for u, z in outline)
             drawn.append(f'<polygon points="{path}" fill="{_colour(name)}"/>')
         drawn.append(f'<text x="{left + room / 2:.0f}" y="{_TALL + 14:.0f}">{words}</text>')
         left += room + _GAP
@@ -61,13 +53,11 @@ def cards_page(result: DanceResult) -> str:
 
     dance = result.dance
     assert dance is not None
-    x = [dance.chain.plant(x[None], s.planted, s.ankle)[0] for x, s in zip(dance.postures, dance.stances, strict=True)]
-    motion = dance.chain.motion(np.arange(len(x), dtype=float), np.array(x), *np.zeros((2, *np.shape(x))))
-    cues = []
+    postures, cues = held_postures(dance).q, []
     for p, (said, stance) in enumerate(zip(dance_instructions(dance), dance.stances, strict=True)):
         name, feet = dance.names[p] if dance.names else "posture", stance_words(stance)
         title = f"{p + 1}. {name}, {feet}"
-        picture = Markup(mannequin_svg(dance.body, motion.q[p], str(Markup.escape(title))))
+        picture = Markup(mannequin_svg(dance.body, postures[p], str(Markup.escape(title))))
         cues.append(
             {"number": p + 1, "name": name[:1].upper() + name[1:], "feet": feet, "said": said, "picture": picture}
         )

@@ -1,5 +1,5 @@
-"""The page of a diagnosis for the analyst: what is wrong, how we know, how big, how sure, what else, what to do,
-what changes.
+"""The pages on causes for the analyst: of a diagnosis (what is wrong, how we know, how big, how sure, what else, what
+to do, what changes), and of what a planned movement will see.
 """
 
 from html import escape
@@ -9,29 +9,31 @@ import numpy as np
 
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.consequence import LIMIT, Adequacy, Unobservable
-from biodance.diagnosis.diagnosis import ABOUT, Diagnosis, Estimate, Finding
+from biodance.diagnosis.diagnosis import ABOUT, Estimate, Finding
 from biodance.diagnosis.reasons import DiagnosisStatus
 from biodance.diagnosis.witness_evidence import ObservedEvidence, cause_visibilities
-from biodance.display import BLACK, BLUE, GREY
+from biodance.display import BLACK, BLUE, GREY, cause_in_words, spaced
 from biodance.pipeline.diagnosis import SessionDiagnosis
-from biodance.pipeline.provenance import Provenance
+from biodance.pipeline.provenance import Provenance, now
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNEL_TITLES, CHANNELS
 from biodance.records.attention import told_together
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
 from biodance.report.pages.template import print_sheet, render, template_text
+from biodance.report.tables.diagnosis import CONFUSION_ROW, LIMIT_ROW, OBSERVED_ROW, VISIBILITY_ROW, observed_rows
+from biodance.report.tables.schema import Row, Schema
 from biodance.report.wording import (
     NEVER,
     causes_by_effect,
     format_number,
     moment,
-    named,
     share_of,
     size_seen,
     sized,
     trial_and_subject,
 )
+from biodance.version import __version__
 
 
 def left_figure(left: tuple[Residuals, Residuals]) -> str:
@@ -97,7 +99,7 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     order = sorted(kinds, key=lambda name: -np.median(kinds[name]))
     words = ((0.01, "1 %"), (0.1, "a tenth"), (1.0, "typical size"), (10.0, "ten times"))
     x = Axis(0.008, 30.0, "smallest size that this session would have seen, in typical sizes", words, log=True)
-    y = Axis(-0.6, len(order) - 0.4, "", tuple((float(i), name.replace("_", " ")) for i, name in enumerate(order)))
+    y = Axis(-0.6, len(order) - 0.4, "", tuple((float(i), spaced(name)) for i, name in enumerate(order)))
     marks = [rule(x, 1.0, upright=True, look=Stroke(BLACK, "", 0.9))]
     for i, name in enumerate(order):
         value = np.clip(np.array(kinds[name]), 0.01, 30.0)
@@ -123,13 +125,6 @@ def estimated(one: Estimate) -> str:
 
 _CERTAIN = 14.0
 """Natural logarithm of a million: above it odds are no longer printed."""
-
-
-def _short_answer(one: Diagnosis) -> str:
-    """Return what the section begins with below the verdict, which stands at the top of the page."""
-    if one.findings:
-        return "What was found, its size, and what to do:"
-    return "No cause is named; the verdict stands at the top of this page."
 
 
 def odds(log_bayes_factor: float) -> str:
@@ -170,14 +165,16 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
     from markupsafe import Markup
 
     one = found.diagnosis
+    nothing = "No cause is named; the verdict stands at the top of this page."
+    start = "What was found, its size, and what to do:" if one.findings else nothing
     failures = Markup("").join(
         Markup("<p class='look'><strong>Not solved, {}:</strong> {}</p>").format(what, cause)
         for what, cause in found.failures.items()
     )
     rows = Markup("").join(
         Markup("<tr><th scope='row'>{}</th><td>{}</td><td>{}</td></tr>").format(
-            named(f.effect, f.target),
-            "; ".join(f"{p.name.replace('_', ' ')} {estimated(p)}" for p in f.parameters),
+            cause_in_words(f.effect, f.target),
+            "; ".join(f"{spaced(p.name)} {estimated(p)}" for p in f.parameters),
             f.advice,
         )
         for f in one.findings
@@ -187,7 +184,7 @@ def diagnosis_section(found: SessionDiagnosis) -> str:
         '<section id="wrong"><h2>What the simulation gets wrong</h2><p>{}</p>{}{}'
         "<p class='small'>biodance diagnose says how we know, what else it could be and what accepting it "
         "changes.</p></section>"
-    ).format(_short_answer(one), failures, table)
+    ).format(start, failures, table)
 
 
 def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: Provenance) -> str:
@@ -197,15 +194,15 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
     one = found.diagnosis
     others = [said for said in told_together(one.attention) if said.about != ABOUT]
     witnesses = _witnesses(one.witnesses)
-    witnessed = {(row.effect, row.target) for row in witnesses["seen"]} if witnesses else set()
-    blind = [row for row in one.unobservable if (row.effect, row.target) not in witnessed]
-    unseen = [(row, size_seen(vars(row), "limit")) for row in blind]
-    masses, made = [], f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
+    witnessed = {(row["effect"], row["target"]) for row in witnesses["seen"]} if witnesses else set()
+    blind = LIMIT_ROW.rows(row for row in one.unobservable if (row.effect, row.target) not in witnessed)
+    never = [row for row in blind if size_seen(row["limit"], row["typical"], row["unit"]) == NEVER]
+    masses, made = list[Row](), f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
     if found.before and found.accepted:
         then, now = (
             dict(zip(one.sip.segments, one.sip.mass.tolist(), strict=True)) for one in (found.before, found.accepted)
         )
-        masses = [(name.replace("_", " "), then.get(name, float("nan")), mass) for name, mass in now.items()]
+        masses = [{"segment": name, "before": then.get(name), "after": mass} for name, mass in now.items()]
     return render(
         "diagnosis.html.j2",
         filters={
@@ -215,12 +212,14 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
             "probable": probable,
             "share": share_of,
             "first_upper": first_upper,
+            "spaced": spaced,
         },
         scripts=[template_text("curves.js")],
         sheet=Markup(print_sheet(f"Session {result.session.folder.name}", provenance.visit, made)),
-        named=named,
-        unseen=[(row, size) for row, size in unseen if size != NEVER],
-        never=causes_by_effect((row.effect, row.target) for row, size in unseen if size == NEVER),
+        named=cause_in_words,
+        schemas={"limit": LIMIT_ROW, "observed": OBSERVED_ROW, "visibility": VISIBILITY_ROW, "mass": _MASS},
+        unseen=[row for row in blind if row not in never],
+        never=causes_by_effect((row["effect"], row["target"]) for row in never),
         result=result,
         one=one,
         ending=_ENDINGS[one.status],
@@ -229,7 +228,7 @@ def diagnosis_page(result: SessionResult, found: SessionDiagnosis, provenance: P
         noted=[(trial_and_subject(said), said.text) for said in others if said.level == "note"],
         failures={**result.failures, **found.failures},
         provenance=provenance,
-        channels=list(zip(CHANNELS, ("N",) * 3 + ("N·m",) * 3, strict=True)),
+        channels=CHANNEL_TITLES,
         masses=masses,
         left=Markup(left_figure(found.left)) if found.left else "",
         adequacy=Markup(adequacy_table(one.adequacy)) if one.adequacy else "",
@@ -243,13 +242,34 @@ def _witnesses(evidence: ObservedEvidence | None) -> dict[str, Any] | None:
     """Return the causes with the observers that respond to them, the others in words, and all observations."""
     if evidence is None:
         return None
-    rows = cause_visibilities(evidence)
+    rows = VISIBILITY_ROW.rows(cause_visibilities(evidence))
     unseen: dict[str, list[str]] = {}
     for row in rows:
-        if not row.observers:
-            unseen.setdefault(" ".join(row.would), []).append(named(row.effect, row.target))
+        if not row["witnesses"]:
+            unseen.setdefault(" ".join(row["would_be_seen_by"]), []).append(
+                cause_in_words(row["effect"], row["target"])
+            )
     return {
-        "seen": [row for row in rows if row.observers],
+        "seen": [row for row in rows if row["witnesses"]],
         "unseen": [("; ".join(causes), would) for would, causes in unseen.items()],
-        "observations": sorted(evidence.observations, key=lambda one: -abs(one.z)),
+        "observations": [
+            row if row["counts"] else row | {"what": f"{row['what']} (shown only)"}
+            for row in sorted(observed_rows(evidence), key=lambda one: -abs(one["z"]))
+        ],
     }
+
+
+_MASS = Schema("", shown="segment: {segment:name} | as it is (kg): {before:2} | accepted (kg): {after:2}")
+
+
+def foresight_page(document: dict[str, Any], name: str) -> str:
+    """Return the page (HTML) of what `foresight_document` says of the movement ``name``."""
+    return render(
+        "foresight.html.j2",
+        found=document,
+        movement=name,
+        version=__version__,
+        created=now(),
+        schemas={"limit": LIMIT_ROW, "confusion": CONFUSION_ROW},
+        some=lambda causes: causes_by_effect(cause.partition(" ")[::2] for cause in causes),
+    )

@@ -1,19 +1,18 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from biodance.display import BLACK, BLUE, GREY, RED
+from biodance.display import BLACK, BLUE, GREY, RED, spaced
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, mass_interval
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
 from biodance.identification.torques import Impact, TorqueBands
 from biodance.pipeline.identification import SessionIdentification
-from biodance.records import CHANNELS, AngleState
-from biodance.report.documents.identification import information_share, segment_rows, torques_document
+from biodance.records import CHANNEL_TITLES, AngleState
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.session import bar_list
 from biodance.report.figures.vector import (
@@ -31,7 +30,16 @@ from biodance.report.figures.vector import (
     shade,
 )
 from biodance.report.pages.template import render
-from biodance.report.wording import changed, format_number, signed
+from biodance.report.tables.identification import (
+    DIFFERENCE_ROW,
+    SEGMENT_ROW,
+    SUSPECT_ROW,
+    TORQUE_ROW,
+    segments_document,
+    torques_document,
+)
+from biodance.report.tables.schema import Row
+from biodance.report.wording import changed, signed
 
 if TYPE_CHECKING:
     from biodance.dance.scoring import PerformanceScore
@@ -47,7 +55,7 @@ def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference
     where nothing is known.
     """
     names = list(dict.fromkeys(row.segment for row in changes))
-    ticks = tuple((len(names) - 1.0 - i, name.replace("_", " ")) for i, name in enumerate(names))
+    ticks = tuple((len(names) - 1.0 - i, spaced(name)) for i, name in enumerate(names))
     y, drawn = Axis(-0.6, len(names) - 0.4, "", ticks), []
     for quantity, factor, title in _PANELS:
         rows = [row for row in changes if row.quantity == quantity]
@@ -66,7 +74,7 @@ def changes_figure(changes: "tuple[Difference, ...]", certain: "tuple[Difference
 def excitation_figure(found: "PerformanceScore") -> str:
     """Return the share of the table's variance that a dance removes, planned (tick) and reached (bar), by segment."""
     rows = [
-        (row.segment.replace("_", " "), 100 * row.reached, 100 * row.planned, f"{100 * row.reached:.0f} %")
+        (spaced(row.segment), 100 * row.reached, 100 * row.planned, f"{100 * row.reached:.0f} %")
         for row in found.excitation
     ]
     return bar_list(rows, "Share of the table's variance removed, reached (bar) and planned (tick)")
@@ -90,7 +98,7 @@ def forest_figure(found: Identification) -> str:
         ends = np.array([value for row in rows for value in (*row.before, *row.after)])
         room = 0.04 * float(np.ptp(ends))
         x = Axis(max(0.0, float(ends.min()) - room), float(ends.max()) + room, "mass (kg), 95 % intervals")
-        ticks = tuple((len(rows) - 1.0 - i, row.name.replace("_", " ")) for i, row in enumerate(rows))
+        ticks = tuple((len(rows) - 1.0 - i, spaced(row.name)) for i, row in enumerate(rows))
         y = Axis(-0.6, len(rows) - 0.4, "", ticks)
         marks = []
         for (at, _), row in zip(ticks, rows, strict=True):
@@ -117,9 +125,7 @@ def impact_figure(found: Sequence[Impact]) -> str:
     deviation, right what that does to the moments of knee (blue) and hip (orange ring).
     """
     rows = list(found[:_RANKED])
-    ticks = tuple(
-        (len(rows) - 1.0 - i, f"{row.segment} {row.quantity}".replace("_", " ")) for i, row in enumerate(rows)
-    )
+    ticks = tuple((len(rows) - 1.0 - i, spaced(f"{row.segment} {row.quantity}")) for i, row in enumerate(rows))
     y = Axis(-0.6, len(rows) - 0.4, "", ticks)
     far = max(2.0, *(abs(row.pull) + row.left for row in rows))
     pulled = Axis(-1.05 * far, 1.05 * far, "pull from the prior (prior sd)")
@@ -161,7 +167,7 @@ def drawn_joints(bands: TorqueBands) -> list[tuple[str, list[tuple[int, str]]]]:
             if (name := f"{side}_{kind}".lstrip("_")) in bands.joints
         ]
         if named:
-            found.append((kind.replace("_", " "), named))
+            found.append((spaced(kind), named))
     return found
 
 
@@ -187,17 +193,14 @@ def torque_figure(bands: TorqueBands) -> str:
 MARKS = {"known": "●", "partly known": "◐", "cannot be known": "○"}
 LISTED = "Cannot be known"
 """Start of the note whose content the page shows as a table."""
-_UNITS = ("N",) * 3 + ("N·m",) * 3
 
 
-def spaced(name: str) -> str:
-    """Return a segment's name as words."""
-    return name.replace("_", " ")
+_SCHEMAS = {"segment": SEGMENT_ROW, "torque": TORQUE_ROW, "suspect": SUSPECT_ROW, "difference": DIFFERENCE_ROW}
 
 
-def small(value: float) -> str:
-    """Return a probability as text, however small."""
-    return format_number(value, 3) if value >= 0.001 else "below 0.001"
+def _mass_changes(changes: "Iterable[Difference]") -> list[Row]:
+    rows = DIFFERENCE_ROW.rows(row for row in changes if row.quantity == "mass")
+    return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
 
 
 def identification_section(found: SessionIdentification) -> str:
@@ -205,28 +208,30 @@ def identification_section(found: SessionIdentification) -> str:
     from markupsafe import Markup
 
     one, sure = found.identification, certain_changes(found.changes)
-    rows = [(name, segment_rows(one, name)) for name in one.sip.segments] if one.status == "solved" else []
+    rows = segments_document(one)
     return render(
         "identification.html.j2",
-        filters={"spaced": spaced, "small": small, "changed": changed, "signed": signed},
+        filters={"spaced": spaced, "changed": changed, "signed": signed},
+        schemas=_SCHEMAS,
         one=one,
         notes=[note for note in found.notes if not note.startswith(LISTED)],
         failures=found.failures,
         girths="; ".join(f"{spaced(name)}: {spaced(', '.join(said))}" for name, said in one.body.girths.items()),
         forest=Markup(forest_figure(one)) if rows else "",
-        segments=[(name, known, information_share(known)) for name, known in rows],
+        segments=rows,
         quantities=QUANTITIES,
         marks=MARKS,
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
-        channels=list(zip(CHANNELS, _UNITS, strict=True)),
+        channels=CHANNEL_TITLES,
         ranked=Markup(impact_figure(found.impacts)) if found.impacts else "",
         torques=found.torques,
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),
         torque_image=Markup(torque_figure(found.torques)) if found.torques and drawn_joints(found.torques) else "",
         search=found.search,
         load=say_load(found.search),
-        changes=[row for row in found.changes if row.quantity == "mass"],
+        suspects=SUSPECT_ROW.rows(found.search.suspects),
+        changes=_mass_changes(found.changes),
         comparison=Markup(changes_figure(found.changes, sure)) if found.changes else "",
         certain=sure,
         total=len(found.changes),

@@ -8,12 +8,14 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup, NormalCurve
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
-from biodance.display import GREY
+from biodance.display import GREY, spaced
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.movement import SessionMovement
 from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.vector import LEFT_SIDE, MIDDLE_SIDE, RIGHT_SIDE, Stroke
 from biodance.report.pages.template import render
+from biodance.report.tables.schema import Row, Schema
+from biodance.report.tables.session import FILE_ANGLE_ROW
 from biodance.report.wording import format_number
 
 _LOOKS = {"left": LEFT_SIDE, "right": RIGHT_SIDE, "middle": MIDDLE_SIDE}
@@ -67,7 +69,8 @@ def movement_figure(
         same = [group for group in groups if group.quantity == quantity]
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (kind, quantity, same[0].unit)]
-            curves = [*_normal(behind), *_curves(same)]
+            usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
+            curves = [*usual, *_curves(same)]
             cells.append([Strip(_title(same[0]), curves, least=_LEAST.get(same[0].unit, 0.0))])
     if not cells:
         return ""
@@ -79,12 +82,8 @@ def movement_figure(
     return CurveFigure(PERCENT, cells, about, label=_AXES[kind], band=band).html()
 
 
-def _normal(bands: Sequence[NormalCurve]) -> list[Curve]:
-    return [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in bands]
-
-
 def _title(group: CurveGroup) -> str:
-    name = group.quantity.replace("_", " ")
+    name = spaced(group.quantity)
     sense = (POSITIVE if group.kind == "gait" else {**POSITIVE, **_BOTH}).get(group.quantity)
     return f"{name} ({group.unit}{f', {sense}' if sense else ''})"
 
@@ -112,7 +111,7 @@ class MovementPart:
 
     moved: TrialMovement
     figures: Sequence[tuple[str, str, str]]
-    values: Sequence[tuple[str, str, str, str]]
+    values: Sequence[Row]
 
 
 def movement_section(moved: SessionMovement) -> str:
@@ -122,7 +121,16 @@ def movement_section(moved: SessionMovement) -> str:
     if not parts and not compared:
         return ""
     filters = {"milli": _milli, "beside": _beside}
-    return render("movement.html.j2", parts=parts, compared=compared, moved=moved, filters=filters)
+    angles = [row for one in compared for row in FILE_ANGLE_ROW.rows(one.file_angles, trial=one.trial)]
+    return render(
+        "movement.html.j2",
+        filters=filters,
+        schemas={"strides": _STRIDES, "file_angle": FILE_ANGLE_ROW},
+        parts=parts,
+        compared=compared,
+        file_angles=angles,
+        moved=moved,
+    )
 
 
 def _part(one: TrialMovement, normal: Sequence[NormalCurve]) -> MovementPart:
@@ -137,15 +145,18 @@ def _part(one: TrialMovement, normal: Sequence[NormalCurve]) -> MovementPart:
     ]
     both, left, right = (one.spatiotemporal(side) for side in ("both", "left", "right"))
     values = [
-        (
-            f"{name.replace('_', ' ')} ({STRIDE_UNITS[name]})",
-            _value(name, left),
-            _value(name, right),
-            _value(name, both),
-        )
+        {
+            "value": f"{spaced(name)} ({STRIDE_UNITS[name]})",
+            "left": _value(name, left),
+            "right": _value(name, right),
+            "both": _value(name, both),
+        }
         for name in both
     ]
     return MovementPart(one, figures, values)
+
+
+_STRIDES = Schema("", shown="value: {value} | left: {left} | right: {right} | both: {both}")
 
 
 def _value(name: str, found: dict[str, tuple[float, float, int]]) -> str:

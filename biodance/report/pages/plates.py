@@ -8,17 +8,16 @@ from numpy.typing import NDArray
 
 from biodance.diagnosis.archive.changes import ALL, History
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.judge import said
+from biodance.diagnosis.archive.judge import PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
 from biodance.display import BLACK, BLUE, GREY, RED
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
-from biodance.report.documents.plain import plain_values, to_text
-from biodance.report.documents.plates import plates_document
 from biodance.report.figures.style import figure, look, svg_address
-from biodance.report.files import write_files
+from biodance.report.files import for_spreadsheets, write_files
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables import for_spreadsheets
+from biodance.report.tables.laboratory import plates_document
+from biodance.report.tables.schema import Row, Schema, plain_values, to_text
 from biodance.report.wording import moment
 from biodance.version import __version__
 
@@ -37,6 +36,23 @@ QUANTITY_TITLES = {
     "offset_z": "offset Fz",
     "delay": "delay of the forces",
 }
+
+
+_LEVEL = Schema(
+    "",
+    shown="quantity: {quantity} | value: {value} | 95 % interval: {low} to {high} | between visits (sd): {between} | "
+    "visits: {visits}",
+)
+_PERSON = Schema("", shown="person: {person} | visits: {visits} | what stands out: {found}")
+
+
+def _level(one: PlateLevel) -> Row:
+    """Return a level in words."""
+    reach = 1.96 * one.sd
+    ends = {"value": one.value, "low": one.value - reach, "high": one.value + reach, "between": one.between}
+    words = {key: said(one.quantity, value) for key, value in ends.items()}
+    title = QUANTITY_TITLES[one.quantity] + (" (taken off by the reader)" if one.taken_off > 0.5 else "")
+    return {**words, "quantity": title, "between": words["between"].lstrip("+"), "visits": one.visits}
 
 
 def plate_figure(plate: str, histories: tuple[History, ...]) -> "Figure":
@@ -126,11 +142,14 @@ def plates_page(found: PlatesJudged, document: dict[str, Any]) -> str:
         answer=f"{count} finding{'s' if count != 1 else ''}" if count else "nothing wrong to be seen",
         judged=judged,
         dates=_dates(found),
-        persons=document["persons"],
+        persons=[
+            one | {"found": " ".join(found["text"] for found in one["findings"]) or "nothing"}
+            for one in document["persons"]
+        ],
         figures={card.plate: svg_address(plate_figure(card.plate, judged.histories)) for card in judged.plates},
         conditions=[(one, svg_address(condition_figure(one))) for one in judged.conditions],
-        said=said,
-        words=QUANTITY_TITLES.__getitem__,
+        levels={card.plate: list(map(_level, card.levels)) for card in judged.plates},
+        schemas={"level": _LEVEL, "person": _PERSON},
         notes=found.notes,
         refused=found.refused,
     )

@@ -9,6 +9,7 @@ from biodance.pipeline.session_frames import SessionReplay, TrialReplay
 from biodance.records import Array
 from biodance.report.figures.still import FORCE_SCALE, RESIDUAL_SCALE
 from biodance.report.pages.template import script_json, template_text, three_js
+from biodance.report.tables.schema import Schema
 
 _UNKNOWN = -32768
 """Whole number of a place that is not known."""
@@ -25,10 +26,10 @@ def replay_data(found: SessionReplay) -> str:
     """
     scene = {
         "boxes": [
-            {"on": on, "side": side, "low": low.round(4).tolist(), "high": high.round(4).tolist()}
+            {"on": on, "side": side, "low": low.round(4), "high": high.round(4)}
             for (low, high), on, side in zip(found.boxes, found.on, found.sides, strict=True)
         ],
-        "load": None if found.load is None else {"on": found.load[0], "place": found.load[1].round(4).tolist()},
+        "load": None if found.load is None else {"on": found.load[0], "place": found.load[1].round(4)},
         "force_scale": FORCE_SCALE,
         "residual_scale": RESIDUAL_SCALE,
         "trials": [_trial(one) for one in found.trials],
@@ -43,18 +44,14 @@ def _trial(one: TrialReplay) -> dict[str, Any]:
     origin = np.nanmean(one.com, axis=0)
     unit = max(1e-4, float(np.nanmax(np.abs(one.positions - origin))) / 30000)
     forces = np.stack([one.measured[:, 0], one.simulated[:, 0], one.residual], axis=1)
-    frames = one.time.size
     return {
-        "name": one.name,
-        "frames": frames,
+        **Schema("name parameters frames=#time worst_s=worst").row(one),
         "segments": one.positions.shape[1],
         "markers": one.markers.shape[1],
         "start_s": float(one.time[0]),
-        "step_s": float(one.time[-1] - one.time[0]) / max(frames - 1, 1),
-        "worst_s": float(one.worst) if np.isfinite(one.worst) else None,
-        "parameters": one.parameters,
-        "plates": one.plates.round(4).tolist(),
-        "origin": origin.round(4).tolist(),
+        "step_s": float(one.time[-1] - one.time[0]) / max(one.time.size - 1, 1),
+        "plates": one.plates.round(4),
+        "origin": origin.round(4),
         "unit": unit,
         "places": _packed((places - origin.round(4)) / unit),
         "turns": _packed(32767 * one.rotations),

@@ -12,7 +12,6 @@ from html import unescape
 
 from biodance.diagnosis.diagnosis import ABOUT
 from biodance.identification.validation import TrialValidation
-from biodance.lab.markers.gaps import MarkerGaps
 from biodance.pipeline.attention import session_attention
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
@@ -31,6 +30,8 @@ from biodance.report.figures.still import still_figure
 from biodance.report.pages.identification import identification_section
 from biodance.report.pages.replay import replay_data, replay_scripts
 from biodance.report.pages.template import print_sheet, render, template_text
+from biodance.report.tables.schema import Row
+from biodance.report.tables.session import GAP_ROW
 from biodance.report.wording import format_number, millimetres, moment, trial_and_subject
 
 STATUS_WORDS = {"ok": "done", "warning": "look here", "refused": "refused"}
@@ -94,9 +95,9 @@ class TrialPart:
     validation: TrialValidation | None = None
 
     @property
-    def gaps(self) -> list[MarkerGaps]:
+    def gaps(self) -> list[Row]:
         """The markers with a gap, the worst first."""
-        return sorted((gap for gap in self.result.gaps if gap.percent > 0), key=lambda gap: -gap.percent)
+        return GAP_ROW.rows(sorted((gap for gap in self.result.gaps if gap.percent > 0), key=lambda gap: -gap.percent))
 
     @property
     def said(self) -> list[str]:
@@ -176,6 +177,7 @@ def page(
     return render(
         "page.html.j2",
         filters={"place": place_words, "apart": _apart},
+        schemas={"gap": GAP_ROW},
         scripts=[template_text("curves.js"), *(replay_scripts() if replay else ())],
         replay=Markup(replay_data(replay)) if replay else "",
         loaded=bool(replay and replay.load),

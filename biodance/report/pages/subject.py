@@ -8,11 +8,10 @@ from html import escape
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.solids import box_solid, shape_parts
-from biodance.display import BLACK, BLUE, GREY
-from biodance.motion.kinematics import poses
+from biodance.display import BLACK, BLUE, GREY, spaced
 from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
+from biodance.pipeline.still import silhouettes
 from biodance.records import Array
 from biodance.report.pages.template import render, template_text
 
@@ -39,7 +38,8 @@ def subject_drawing(body: Body, labels: Mapping[str, str], measured: frozenset[s
     """Draw ``body`` from the front, its right side on the left, as SVG text; ``labels`` (segment -> lines of text)
     beside it, in the ``room`` they have; segments in ``measured`` are filled, the others white with a broken outline.
     """
-    outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline in _outlines(body)]
+    front = silhouettes(body, _spread(body), (1.0, 0.0))
+    outlines = [(segment, np.rint(1000 * outline * [1, -1])) for segment, outline, _ in front]
     marks = [_part(outline, known=segment in measured) for segment, outline in outlines]
     middles = {segment: outline.mean(axis=0) for segment, outline in reversed(outlines)}
     for right in (True, False):
@@ -62,19 +62,12 @@ def _part(outline: Array, *, known: bool) -> str:
 _BROKEN = 'fill="white" stroke-dasharray="18 10"'
 
 
-def _outlines(body: Body) -> list[tuple[str, Array]]:
-    """Return the outline (n, 2) m of every part from the front: to the person's left, and up; from back to front."""
-    from scipy.spatial import ConvexHull
-
+def _spread(body: Body) -> Array:
+    """Return the posture (nq,) with arms and legs a little away from the body."""
     q = np.array(body.neutral)
     for i, joint in enumerate(body.joints):
         q[body.nq - len(body.joints) + i] = _SPREAD.get(joint.name.split("_", 1)[1], 0.0)
-    pose, found = poses(body, q), []
-    for index, box in shape_parts(body):
-        points = box_solid(box).vertices @ pose.rotation[0, index].T + pose.position[0, index]
-        flat = points[:, 1:]
-        found.append((body.segments[index], flat[ConvexHull(flat).vertices]))
-    return found
+    return q
 
 
 def _labels(middles: Mapping[str, Array], labels: Mapping[str, str], room: _Room, *, right: bool) -> list[str]:
@@ -170,7 +163,7 @@ def _picture(account: SubjectAccount, room: _Room) -> str:
 
 
 def _name(part: PartMass) -> str:
-    *first, last = [PLAIN_NAMES.get(name, name.replace("_", " ")) for name in part.segments]
+    *first, last = [PLAIN_NAMES.get(name, spaced(name)) for name in part.segments]
     return f"{', '.join(first)} and {last}" if first else last
 
 

@@ -8,7 +8,7 @@ import os
 import re
 import zipfile
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biodance.errors import BiodanceError
+from biodance.report.tables.schema import Row, Schema, plain_values
 from biodance.report.wording import format_number, millimetres, moment
 
 if TYPE_CHECKING:
     from jinja2 import Template
+    from markupsafe import Markup
 
 
 _LIBRARY = re.compile(r"<script>(/\*\*\s*\* @license[^/]*\*/\n[^\n]{100000,})\n")
@@ -53,12 +55,41 @@ def three_js() -> str:
 
 def script_json(document: object) -> str:
     """Return a document as JSON that may stand in a ``<script>`` of a page: no text in it can end or open one."""
-    return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c")
+    return json.dumps(plain_values(document), separators=(",", ":")).replace("<", "\\u003c")
 
 
 def template_text(name: str) -> str:
     """Return a file of the templates' folder."""
     return (files("biodance.report") / "templates" / name).read_text(encoding="utf-8")
+
+
+def html_table(
+    schema: Schema, rows: Iterable[Row], caption: str = "", *, only: Iterable[str] | None = None, narrow: bool = True
+) -> "Markup":
+    """Return rows as an HTML table, as their schema shows them: ``only`` the columns of these headings where they are
+    given; ``narrow`` as wide as its text.
+    """
+    from markupsafe import Markup
+
+    headings = list(schema.columns if only is None else only)
+    head = "".join(Markup('<th scope="col">{}</th>').format(heading) for heading in headings)
+    body = []
+    for row in rows:
+        first, *others = schema.cells(row, headings)
+        cells = (
+            Markup('<td class="n">{}</td>' if _NUMBER.match(cell) else "<td>{}</td>").format(cell) for cell in others
+        )
+        body.append(Markup('<tr><th scope="row">{}</th>{}</tr>\n').format(first, Markup("").join(cells)))
+    told = Markup("<caption>{}</caption>\n").format(caption) if caption else ""
+    kind = ' class="narrow"' if narrow else ""
+    return Markup(
+        f'<div class="wide" tabindex="0"><table{kind}>\n{told}<thead><tr>{head}</tr></thead>\n<tbody>\n'
+        f"{Markup('').join(body)}</tbody>\n</table></div>"
+    )
+
+
+_NUMBER = re.compile(r"[±+−–<]? ?\d|–$")
+"""How a cell begins that is a number, or one that is not known."""
 
 
 def render(
@@ -67,8 +98,8 @@ def render(
     """Return a template filled with ``values`` as HTML text; the same arguments give the same characters.
 
     Every template knows ``style`` (of the analyst's page, unless another one is among the values), ``policy`` (what its
-    page may do: nothing of the network, and only ``scripts``), ``scripts``, and the filters ``number``, ``mm``
-    and ``moment``.
+    page may do: nothing of the network, and only ``scripts``), ``scripts``, the function ``table`` (`html_table`), and
+    the filters ``number``, ``mm`` and ``moment``.
     """
     from markupsafe import Markup
 
@@ -90,6 +121,7 @@ def _compiled(name: str, filters: tuple[tuple[str, Any], ...]) -> "Template":
         loader=FunctionLoader(template_text),
         bytecode_cache=FileSystemBytecodeCache(str(kept)) if os.access(kept, os.W_OK) else None,
     )
+    environment.globals["table"] = html_table
     environment.filters.update(number=format_number, mm=millimetres, moment=moment, **dict(filters))
     return environment.get_template(name)
 

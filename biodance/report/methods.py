@@ -3,14 +3,13 @@ and goes where that value is not.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from biodance.display import spaced
 from biodance.report.wording import format_number
 
 METHODS = "methods.md"
-_Path = tuple[str, ...]
-
 REFERENCES: Mapping[str, str] = {
     "Bonnet": "Bonnet V. et al. (2016). IEEE Transactions on Robotics. doi:10.1109/TRO.2016.2583062",
     "Baker": "Baker R. (2001). Gait & Posture 13:1. doi:10.1016/S0966-6362(00)00083-7",
@@ -28,13 +27,19 @@ REFERENCES: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class MethodClause:
-    """One clause: ``keys`` of results.json whose values it says, as paths; ``say`` makes the sentence of them ("" =
-    there is nothing to say); ``cites`` short names of `REFERENCES` by a word that must be in the sentence ("": always).
+    """One clause: ``places`` of results.json whose values it says (``"subject/mass_kg subject/height_m"``); ``say`` a
+    format of them, or a function that makes the sentence ("" = there is nothing to say); ``cites`` short names of
+    `REFERENCES` by a word that must be in the sentence ("": always).
     """
 
-    keys: tuple[_Path, ...]
-    say: Callable[..., str]
-    cites: Mapping[str, str]
+    places: str
+    say: str | Callable[..., str]
+    cites: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> tuple[tuple[str, ...], ...]:
+        """The paths of its values."""
+        return tuple(tuple(place.split("/")) for place in self.places.split())
 
 
 def methods_text(document: Mapping[str, Any]) -> str:
@@ -44,7 +49,7 @@ def methods_text(document: Mapping[str, Any]) -> str:
         values = [_value(document, path) for path in clause.keys]
         if any(value is None for value in values):
             continue
-        sentence = clause.say(*values)
+        sentence = clause.say.format(*values) if isinstance(clause.say, str) else clause.say(*values)
         if sentence:
             said.append(sentence)
             cited += [name for name, word in clause.cites.items() if word in sentence]
@@ -53,7 +58,7 @@ def methods_text(document: Mapping[str, Any]) -> str:
     return text + (f"\n## References\n\n{references}\n" if references else "")
 
 
-def _value(document: Mapping[str, Any], path: _Path) -> Any:
+def _value(document: Mapping[str, Any], path: tuple[str, ...]) -> Any:
     """Return the value at a path; None where there is none. What identification found stands at the top of its own
     results.json.
     """
@@ -71,10 +76,6 @@ def _count(some: Any, one: str, many: str | None = None) -> str:
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
-def _settings(key: str) -> _Path:
-    return ("provenance", "settings", key)
-
-
 def _trials(trials: list[dict[str, Any]]) -> str:
     used = [one for one in trials if isinstance(one, dict) and one["status"] != "refused"]
     rates = sorted({f"{one['rate_hz']:g}" for one in used if one["rate_hz"]})
@@ -85,7 +86,7 @@ def _trials(trials: list[dict[str, Any]]) -> str:
 
 def _filter(kind: str, order: float, cutoff: float, forces: Any) -> str:
     both = "" if forces == "same" else f" (forces: {forces:g} Hz)"
-    words = kind.replace("_", " ").replace("butterworth", "Butterworth")
+    words = spaced(kind).replace("butterworth", "Butterworth")
     return (
         f"Joint coordinates and forces were low-pass filtered forwards and backwards ({words}, order {order:g} in each "
         f"direction, {cutoff:g} Hz{both})."
@@ -134,74 +135,60 @@ def _movement(trials: list[dict[str, Any]]) -> str:
     )
 
 
+def _scaled(table: str, hip: str) -> str:
+    return (
+        f"A model of rigid segments was scaled on the static trial; segment masses and inertias were taken from the "
+        f"table {table}, hip joint centres from the regression of {hip.title()}."
+    )
+
+
+_MOVED = {
+    True: "Joint centres were then corrected by the movement where it showed them.",
+    False: "Joints were not moved.",
+}
 CLAUSES: tuple[MethodClause, ...] = (
     MethodClause(
-        (("provenance", "versions", "biodance"), ("provenance", "commit")),
-        lambda version, commit: f"Recordings were processed with biodance {version} (commit {commit[:12]}).",
-        {},
+        "provenance/versions/biodance provenance/commit",
+        "Recordings were processed with biodance {} (commit {:.12}).",
     ),
-    MethodClause((("trials",),), _trials, {}),
+    MethodClause("trials", _trials),
     MethodClause(
-        (("subject", "mass_kg"), ("subject", "height_m")),
-        lambda mass, height: f"The subject's mass was {mass:.1f} kg and the stature {height:.2f} m.",
-        {},
+        "subject/mass_kg subject/height_m",
+        "The subject's mass was {:.1f} kg and the stature {:.2f} m.",
     ),
     MethodClause(
-        (("mass_check", "mass_on_plates_kg"), ("mass_check", "difference_percent")),
-        lambda mass, off: f"In quiet standing the plates carried {mass:.1f} kg, {off:+.1f} % of the declared mass.",
-        {},
+        "mass_check/mass_on_plates_kg mass_check/difference_percent",
+        "In quiet standing the plates carried {:.1f} kg, {:+.1f} % of the declared mass.",
     ),
     MethodClause(
-        (_settings("table"), _settings("hip")),
-        lambda table, hip: (
-            f"A model of rigid segments was scaled on the static trial; segment masses and inertias were taken from "
-            f"the table {table}, hip joint centres from the regression of {hip.title()}."
-        ),
+        "provenance/settings/table provenance/settings/hip",
+        _scaled,
         {"de Leva": "de_leva", "Harrington": "Harrington", "Davis": "Davis"},
     ),
+    MethodClause("provenance/settings/joints", lambda joints: _MOVED[joints == "functional"]),
     MethodClause(
-        (_settings("joints"),),
-        lambda joints: (
-            "Joint centres were then corrected by the movement where it showed them."
-            if joints == "functional"
-            else "Joints were not moved."
-        ),
-        {},
-    ),
-    MethodClause(
-        tuple(_settings(f"filter.{key}") for key in ("kind", "order", "cutoff", "force_cutoff")),
+        " ".join(f"provenance/settings/filter.{key}" for key in ("kind", "order", "cutoff", "force_cutoff")),
         _filter,
         {"Robertson": "critically damped"},
     ),
     MethodClause(
-        (("provenance", "versions", "pin"),),
-        lambda version: f"Rigid-body dynamics were computed with Pinocchio {version} (Carpentier et al., 2019).",
+        "provenance/versions/pin",
+        "Rigid-body dynamics were computed with Pinocchio {} (Carpentier et al., 2019).",
         {"Carpentier": ""},
     ),
     MethodClause(
-        (
-            ("identification", "segments"),
-            ("identification", "trials"),
-            ("identification", "base_parameters", "rank"),
-            ("identification", "base_parameters", "count"),
-        ),
+        "identification/segments identification/trials identification/base_parameters/rank "
+        "identification/base_parameters/count",
         _segments,
         {"Bonnet": "", "Wensing": ""},
     ),
-    MethodClause((("identification", "validation"),), _validated, {}),
-    MethodClause((("movement", "trials"),), _movement, {"Wu": "", "Zeni": "Zeni", "Baker": "Baker"}),
+    MethodClause("identification/validation", _validated),
+    MethodClause("movement/trials", _movement, {"Wu": "", "Zeni": "Zeni", "Baker": "Baker"}),
     MethodClause(
-        (("movement", "parameters"), ("movement", "mass_kg")),
-        lambda which, mass: (
-            f"Joint moments (of the muscles) and powers were computed by inverse dynamics with the {which} parameters "
-            f"and divided by {mass:.1f} kg."
-        ),
-        {},
+        "movement/parameters movement/mass_kg",
+        "Joint moments (of the muscles) and powers were computed by inverse dynamics with the {} parameters and "
+        "divided by {:.1f} kg.",
     ),
-    MethodClause(
-        (("diagnosis", "verdict"),),
-        lambda verdict: f"The automatic diagnosis of the recording ended with the verdict “{verdict}”.",
-        {},
-    ),
+    MethodClause("diagnosis/verdict", "The automatic diagnosis of the recording ended with the verdict “{}”."),
 )
 """In the order in which they are said."""

@@ -1,0 +1,244 @@
+"""Findings and reasons in words, the same wherever they are told: the one room in which a `Reason` becomes a sentence.
+
+`in_words` names a finding with its places and sizes; `spoken` tells it in the words of its cause (`Checked.words`): the
+fact with its size, what to do, and a name for it where it is only one of several (`alternatives`).
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from biodance.diagnosis.consequence import LIMIT
+from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
+from biodance.diagnosis.reasons import Reason
+from biodance.display import cause_in_words, digits, listed, shown_unit, spaced
+from biodance.effects.added_mass import AddedMass
+from biodance.identification.knowledge import SIGMAS
+
+LOAD = AddedMass.name
+
+
+def in_words(finding: Finding) -> str:
+    """Return a cause with its place, or all places that it may be at, and its size: ``plate gain Fz (gain 6 ± 0.2 %)``;
+    a size that is hardly known is said to be (`Estimate.known`). A load is told by its mass; where its centre lies
+    is said beside its segment.
+    """
+    name = f"{cause_in_words(finding.effect, finding.target)}{_elsewhere(finding)}"
+    name += f" in {listed(finding.trials)}" if finding.trials else ""
+    told = finding.parameters[:1] if finding.effect == LOAD else finding.parameters
+    known = [p.known for p in finding.parameters if p.sd == p.sd]
+    if not known:
+        return name
+    signs = finding.cause.words.signs if finding.cause.words else ("", "")
+    sure = signs[told[0].value < 0] if any(known) else "its size is hardly known"
+    return f"{name} ({', '.join(map(_estimated, told))}{sure and f'; {sure}'})"
+
+
+def _elsewhere(finding: Finding) -> str:
+    """Return where else the same cause may be, to go on its place with."""
+    places = [cause_in_words("", alias.target) for alias in finding.set[1:] if alias.effect == finding.effect]
+    return f" or {listed(places)}" if any(places) else ""
+
+
+def _estimated(one: Estimate) -> str:
+    """Return a parameter with its standard deviation as people say it: ``gain 6 ± 0.2 %``."""
+    factor, unit = shown_unit(one.unit)
+    return f"{spaced(one.name)} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
+
+
+def cause_of(checked: str, findings: Sequence[Finding]) -> str:
+    """Return the first finding that may explain a check of that name; "" for none."""
+    found = next((one for one in findings if checked.startswith(one.cause.explains)), None)
+    return f"{cause_in_words(found.effect, found.target)}{_elsewhere(found)}" if found else ""
+
+
+def explained(cause: str) -> str:
+    """Return the sentence that points from a check or a doubt to a cause (`cause_of`) that was found."""
+    return f"{cause[:1].upper()}{cause[1:]}, which was found, may explain it."
+
+
+_SHORT = 8
+"""Words of advice that fit into a headline."""
+_LISTED = "See what stands below."
+
+
+@dataclass(frozen=True)
+class SpokenFinding:
+    """A finding as a person is told of it: the ``fact`` without its interval and with it, and what to ``do``."""
+
+    plain: str
+    fact: str
+    do: str
+
+
+def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
+    """Return a finding in words; ``others`` of the same effect without a size of their own are told together."""
+    words, size = finding.cause.words, _size(finding.parameters)
+    if words is None:
+        name = spaced(finding.effect)
+        at = f" at {place_in_words(finding.target)}" if finding.target else ""
+        do = finding.advice.split(". ")[0].rstrip(".")
+        fact = f"a {name} was found{at}{f', {size.value}' if size.value else ''}"
+        return SpokenFinding(fact, f"{fact}{size.between}", f"{do}." if 0 < len(do.split()) <= _SHORT else _LISTED)
+    whole, _, channel = finding.target.rpartition(":")
+    first, _, other = channel.partition("->")
+    of = listed(finding.trials) or place_in_words(finding.target)
+    pairs = listed([one.target.replace("/", " and ") or "something" for one in (finding, *others)])
+    shown = {
+        "it": place_in_words(finding.target.partition("->")[0]) or "something",
+        "plate": place_in_words(whole) if whole else "the plate",
+        "axis": first,
+        "other": other,
+        "forces": f"the forces of {of} are" if of else "the forces are",
+        "pairs": pairs,
+        "factor": f" by a factor of {digits(finding.parameters[0].value, 2)}" if finding.parameters else "",
+        "size": size.value or "somewhat",
+        "more": words.more[int(size.negative)],
+    }
+    where = f" in {listed(finding.trials)}" if finding.trials and "{forces}" not in words.fact else ""
+    plain, fact = (words.fact.format(**shown, between=between) + where for between in ("", size.between))
+    return SpokenFinding(plain, fact, words.do)
+
+
+def names_markers(finding: Finding) -> bool:
+    """Return whether findings of this effect are told by their markers, several together."""
+    return finding.cause.words is not None and "{pairs}" in finding.cause.words.fact
+
+
+def alternatives(finding: Finding) -> list[str]:
+    """Return what else a finding may be, each once, in plain words: another place of the same cause, or another
+    cause.
+    """
+    named = [_alternative(alias, alias.effect == finding.effect) for alias in finding.set[1:]]
+    return list(filter(None, dict.fromkeys(named)))
+
+
+def place_in_words(target: str) -> str:
+    """Return where a cause is, in words: ``Fz of plate 2``, ``left forearm``, ``RKNE``."""
+    plate, _, channel = target.rpartition(":")
+    if re.fullmatch(r"plate\d+", channel):
+        plate, channel = channel, ""
+    if plate:
+        name = re.sub(r"(\D)(\d)", r"\1 \2", plate, count=1)
+        return f"{channel} of {name}" if channel else name
+    return (
+        channel.replace("forearm_hand", "forearm")
+        .replace("trunk_head", "trunk")
+        .replace("_", " ")
+        .replace("/", " and ")
+    )
+
+
+class _Size(NamedTuple):
+    value: str = ""
+    between: str = ""
+    negative: bool = False
+
+
+def _size(parameters: Sequence[Estimate]) -> _Size:
+    """Return the size of a cause and its 95 % interval in words, without sign: that of its first parameter, or the
+    length of a vector.
+    """
+    if not parameters:
+        return _Size()
+    first = parameters[0]
+    factor, unit = shown_unit(first.unit)
+    if first.name.endswith("_x"):
+        values, sds = np.array([(p.value, p.sd) for p in parameters[:3]]).T
+        value = float(np.linalg.norm(values))
+        reach = SIGMAS * float(np.linalg.norm(values * sds)) / value if value else float("nan")
+        low, high = value - reach, value + reach
+    else:
+        (low, high), value = first.interval, first.value
+    if value < 0:
+        low, high = -high, -low
+    told = f"{digits(factor * abs(value), 2)} {unit}".strip()
+    if not np.isfinite([low, high]).all():
+        return _Size(told, "", value < 0)
+    return _Size(told, f" ({digits(factor * max(low, 0.0), 2)} to {digits(factor * high, 2)})", value < 0)
+
+
+def _alternative(alias: Alias, same: bool) -> str:
+    """Return a look-alike in words, by its place where it is the same cause elsewhere."""
+    if same:
+        whole, _, channel = alias.target.rpartition(":")
+        return place_in_words(whole if whole and channel in "xyz" else alias.target)
+    known = alias.cause.words
+    return known.alternative if known else f"a {spaced(alias.effect)}"
+
+
+_SENTENCES = {
+    Reason.UNUSUAL_BODY: (
+        "What the plates measured fits only a body that is more unlike the table than people are: the person may be, a "
+        "joint may lie elsewhere than the markers say, or a load that nobody noted, a gain or a wrong declared mass "
+        "hides in it."
+    ),
+    Reason.OUTSIDE_TOLERANCES: (
+        "What the plates measured fits only if something that is small in every laboratory is many times as large "
+        "here, and none of the causes looked for is it."
+    ),
+    Reason.OUTSIDE_EVERY_LABORATORY: (
+        "It is so large that it would be none of what is small even where all of that is twice as large."
+    ),
+    Reason.WITHOUT_RESEMBLED: "What is only resembled explains nothing: what is left is judged without it.",
+    Reason.SEVERAL_CROSSTALKS: (
+        "Several channels would have to disturb each other at once. That is what a plate looks like that lies or is "
+        "turned otherwise than the file says, or whose matrix is another one: none of these cross-talks is named."
+    ),
+    Reason.ONLY_STANDING: (
+        "Only quiet standing could be compared with the whole body: sway, soft tissue and a plate's zero look alike "
+        "there, so this comparison names no cause that has a size. A few squats on the plates tell them apart."
+    ),
+    Reason.LOUD_LABORATORY: (
+        "What no cause explains is {about} times as large as where tolerances were learned, in most bands and channels "
+        "alike: taken for how loud this laboratory is, so that a fault must be larger to be seen."
+    ),
+    Reason.MAY_NOT_MATTER: (
+        "{about} is only what this resembles: such a cause is known so poorly that what is there may be less than what "
+        "matters."
+    ),
+    Reason.SIZE_VARIES: (
+        "{about} is only what this resembles: a true cause has one size in every trial, band and channel, under every "
+        "load and at every place, and the size of this one hangs on {varies_with}."
+    ),
+    Reason.NOT_COMPARED: "No movement could be compared with a body.",
+    Reason.MOVEMENT_NOT_JUDGED: "None of the movement could be judged, and standing still tells little.",
+    Reason.PERSON_UNKNOWN: "Mass or stature is not known, so there is no body.",
+    Reason.BODY_NOT_SCALED: "No static trial scales the body, so its forces are too unsure to name a cause.",
+    Reason.BODY_DOUBTFUL: "The forces fit this body, but {about}.",
+    Reason.LIMIT_BROKEN: "No cause was found for what is outside its limit: {about}.",
+    Reason.UNDESCRIBED_JOINTS: "The body moves at joints ({about}) for which nobody has learned yet what is usual.",
+    Reason.UNSEEN_JOINTS: "No marker shows what moves at {about}, and the plates measure it all the same.",
+    Reason.TOLERANCES_DO_NOT_HOLD: "Its markers move more on the body than where tolerances were learned.",
+    Reason.EXCLUDED_BY_WITNESSES: (
+        "What the simulation would explain by a {about} is none, as feet, clocks and weights show."
+    ),
+}
+_EACH = (Reason.MAY_NOT_MATTER, Reason.SIZE_VARIES)
+"""Reasons that are said of each cause on its own."""
+
+
+def reason_notes(one: Diagnosis) -> tuple[str, ...]:
+    """Return why a diagnosis says no more, and what it only resembles, as sentences for the reader."""
+    notes, varies = [], {f"{spaced(f.effect)} {f.target}".strip(): f.varies_with for f in one.resembles}
+    for reason, about in one.why.items():
+        for name in about if reason in _EACH else (listed(about),):
+            sentence = _left(one) if reason is Reason.FORCES_LEFT else _SENTENCES[reason]
+            notes.append(sentence.format(about=name, varies_with=varies.get(name, "")))
+    if one.resembles:
+        notes.append(f"It resembles {' and '.join(map(in_words, one.resembles))}, which is not enough.")
+    return tuple(notes)
+
+
+def _left(one: Diagnosis) -> str:
+    """Return where what is left is largest, with its size."""
+    row = next((row for row in one.adequacy if row.matters and row.z > LIMIT), None)
+    if row is None:
+        return "What is left of the forces is unlike sessions without fault."
+    return (
+        f"{row.channel} at {row.band_hz[0]:g} to {row.band_hz[1]:g} Hz is {row.size:.2g} {row.unit} off "
+        f"({row.z:.1f} standard deviations of sessions without fault), most in {row.trial} around {row.second:.1f} s."
+    )

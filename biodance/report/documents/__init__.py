@@ -1,1 +1,0 @@
-"""JSON documents: keys whose unit is their suffix."""

@@ -1,0 +1,166 @@
+"""What was found in a session and in each of its trials, and what moved. NaN becomes null."""
+
+from typing import Any
+
+import numpy as np
+
+from biodance.cycles.curves import CurveGroup
+from biodance.cycles.cut import PERCENT, STRIDE_UNITS
+from biodance.cycles.movement import TrialMovement
+from biodance.pipeline.movement import SessionMovement
+from biodance.pipeline.provenance import Provenance
+from biodance.pipeline.results import SessionResult
+from biodance.pipeline.trial_result import TrialResult
+from biodance.records import CHANNELS
+from biodance.report.tables.identification import AGREEMENT_ROW, added_mass_document, identification_document
+from biodance.report.tables.schema import Row, Schema
+
+CHECK_ROW = Schema("what where value limit inside advice")
+STEP_ROW = Schema("step=name status reason=text")
+GAP_ROW = Schema(
+    "marker=label percent longest_s=longest",
+    shown="marker: {marker} | not seen (%): {percent:1} | longest gap (s): {longest_s:2}",
+)
+_WRENCH = Schema(
+    "notes",
+    {
+        "channels": lambda _: CHANNELS,
+        "frames_used": lambda one: int(one.used.sum()),
+        "frames": lambda one: one.used.size,
+        "table": Schema("rms cc=correlation").row,
+    },
+)
+
+
+def _markers(one: TrialResult) -> list[Row]:
+    fit = one.fit
+    seen = zip(fit.names, fit.rms, fit.max, strict=True) if fit else ()
+    return [{"name": name, "rms_m": rms, "max_m": largest} for name, rms, largest in seen]
+
+
+TRIAL_ROW = Schema(
+    "name role=trial.role status reason file=trial.source.path.name marker_set=trial.worn "
+    "rate_hz=trial.markers.rate gaps_percent marker_rms_m=fit.total_rms marker_rms_by_group_m=fit.by_group "
+    "marker_max_m=fit.total_max history=trial.history warnings=trial.warnings",
+    {
+        "frames": lambda one: one.trial.markers.time.size if one.trial.markers else 0,
+        "gaps": lambda one: GAP_ROW.rows(gap for gap in one.gaps if gap.percent > 0),
+        "markers": _markers,
+        "wrench": _WRENCH.at("comparison"),
+        "standing": Schema(
+            "trial start_s=start end_s=end mass_kg=mass mass_sd_kg=mass_sd com_ahead_of_cop_m=com_ahead "
+            "com_left_of_cop_m=com_left"
+        ),
+        "plates": Schema("name type corners_m=corners decisions").at("trial.plates"),
+        "steps": STEP_ROW,
+    },
+    "trial: {name} | role: {role} | state: {status} | markers RMS: {marker_rms_m:mm1 mm} | "
+    "frames: {wrench[frames_used]} | Fz RMS: {wrench[table][rms][2]:1 N} | Fz cc: {wrench[table][cc][2]:3}",
+)
+_JOINT = Schema(
+    "joint=name taken markers",
+    {
+        "fitted_mm": lambda gain: 1000 * gain.fitted,
+        "held_out_without_mm": lambda gain: 1000 * gain.without,
+        "held_out_with_mm": lambda gain: 1000 * gain.with_it,
+    },
+)
+_SESSION = Schema(
+    "session=session.folder.name subject trials refused=session.refused notes=session.notes steps",
+    {
+        "subject": Schema("name mass_kg=mass height_m=stature sex age guessed"),
+        "trials": lambda one: [_trial(trial, one) for trial in one.trials],
+        "steps": STEP_ROW,
+        "body": Schema(
+            "source=body_source notes=body.notes",
+            {
+                "optional_joints": _JOINT.at("shown_joints.gains"),
+                "optional_joints_force": Schema("trial rms_without_N=without rms_with_N=with_them").at(
+                    "shown_joints.forces"
+                ),
+            },
+        ).row,
+        "checks": CHECK_ROW.at("all_checks"),
+        "mass_check": Schema(
+            "trial=weighed.trials.0 mass_on_plates_kg=weighed.mass mass_on_plates_sd_kg=weighed.sd "
+            "weighed_by=weighed.by.value trials=weighed.trials declared_mass_kg=declared_mass "
+            "difference_percent=mass_difference"
+        ).row,
+        "identification": lambda one: one.identification and identification_document(one.identification),
+        "added_mass": lambda one: one.identification and added_mass_document(one.identification.search),
+        "diagnosis": lambda _: None,
+    },
+)
+PROVENANCE_ROW = Schema("created_utc=created commit versions blas inputs_sha256=inputs settings visit")
+"""Which software made a result, from which files, with which settings."""
+
+
+def _trial(one: TrialResult, result: SessionResult) -> Row:
+    row, found = TRIAL_ROW.row(one), result.identification
+    if row["wrench"]:
+        row["wrench"]["identified"] = AGREEMENT_ROW.told(found.agreements.get(one.name) if found else None)
+    return row
+
+
+def results_document(result: SessionResult, provenance: Provenance) -> Row:
+    """Return all of ``result``; null where a step was refused or does not exist in this version."""
+    return {**_SESSION.row(result), "provenance": PROVENANCE_ROW.row(provenance)}
+
+
+def _spatiotemporal(one: TrialMovement) -> list[Row]:
+    keys = ("quantity", "unit", "side", "mean", "sd", "count")
+    return [
+        dict(zip(keys, (name, STRIDE_UNITS[name], side, *values), strict=True))
+        for side in ("both", "left", "right")
+        for name, values in one.spatiotemporal(side).items()
+    ]
+
+
+def _curve(group: CurveGroup) -> Row:
+    about = Schema("kind quantity side unit count=#values").row(group)
+    if not np.isfinite(group.mean).any():
+        return about
+    low, high = int(np.nanargmin(group.mean)), int(np.nanargmax(group.mean))
+    return about | {
+        "min": group.mean[low],
+        "min_at_percent": PERCENT[low],
+        "max": group.mean[high],
+        "max_at_percent": PERCENT[high],
+        "sd_mean": _average(group.sd),
+        "parameters_sd_mean": _average(group.parameters_sd),
+    }
+
+
+def _average(values: Any) -> float | None:
+    return float(np.nanmean(values)) if np.isfinite(values).any() else None
+
+
+EVENT_ROW = Schema("time_s=time side down source")
+FILE_ANGLE_ROW = Schema(
+    "joint label offset_deg=offset sd_deg=sd cc=correlation",
+    shown="trial: {trial} | joint: {joint:name} | offset (deg): {offset_deg:1} | sd (deg): {sd_deg:1} | "
+    "correlation: {cc:2}",
+)
+_MOVED = Schema(
+    "trial notes",
+    {
+        "events": EVENT_ROW,
+        "markers_after_forces_s": lambda one: dict(zip(("strikes", "leavings"), one.late, strict=True)),
+        "cycles": Schema("kind side start_s=start end_s=end off_s=off"),
+        "spatiotemporal": _spatiotemporal,
+        "curves": lambda one: [_curve(group) for group in one.groups],
+        "file_angles": FILE_ANGLE_ROW,
+        "file_events": Schema("down late_s=late sd_s=sd count missed"),
+    },
+)
+_MOVEMENT = Schema("parameters mass_kg=mass left_out", {"trials": _MOVED})
+
+
+def movement_document(moved: SessionMovement | None) -> Row | None:
+    """Return events, cycles, extremes of all mean curves and spatio-temporal values of every trial.
+
+    ``parameters`` whose inertial parameters moments and powers are computed with, per ``mass_kg``; ``curves`` per
+    quantity and side: extremes of the mean over ``count`` repetitions and where in the cycle; ``sd_mean`` between
+    repetitions, ``parameters_sd_mean`` what the inertial parameters leave uncertain, both averaged over the cycle.
+    """
+    return _MOVEMENT.told(moved)
