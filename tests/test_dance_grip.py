@@ -11,8 +11,6 @@ from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip
-from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import fit_to_person, read_person
@@ -20,6 +18,8 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import holding, stance, under
 from biodance.dance.problem.state import State
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses

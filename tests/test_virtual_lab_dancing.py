@@ -15,11 +15,11 @@ from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
-from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import KEPT, distance_from, initial_guess, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import seat, under
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.posture import KEPT, distance_from, initial_guess, solve
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
