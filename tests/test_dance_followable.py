@@ -13,7 +13,7 @@ from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.imprecision import Imprecision, PlannedDance
 from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import PerformersMargin, Rehearsed, perform_with, rehearse_imprecisely
+from biodance.dance.performers import PerformersMargin, Rehearsed, rehearse_imprecisely
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
@@ -59,12 +59,12 @@ def test_a_dance_asks_little_at_once_and_keeps_all_limits(searched) -> None:
 def test_where_a_performer_has_too_little_room_another_posture_is_danced(searched, monkeypatch) -> None:
     (search, course), steps = searched, searched[1].steps
 
-    def performed(_workers, dance, _limits, *, who=range(200), only=()):
+    def performed(dance, _limits, *, who=range(200), only=(), workers):
         bad = bool((dance.postures == steps[2].x).all(axis=1).any()) and (not only or 2 in only)
         room = PerformersMargin("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
         return Rehearsed(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
 
-    monkeypatch.setattr(repair, "perform_with", performed)
+    monkeypatch.setattr(repair, "rehearse_imprecisely", performed)
     repaired, found = repair.repaired_course(search, course, search.work.workers)
     dance = repaired.dance(search.work)
     assert found.safe
@@ -172,7 +172,7 @@ def test_an_exact_performer_does_the_dance_itself() -> None:
 
 def test_performers_are_the_same_in_groups() -> None:
     with ThreadPoolExecutor(2) as pool:
-        together = perform_with(pool, small_dance(), PLAN.limits, who=range(4))
+        together = rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4), workers=pool)
     assert together == rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4))
 
 

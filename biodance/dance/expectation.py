@@ -35,7 +35,7 @@ from biodance.uncertainty.bands import BANDS, Bands
 from biodance.uncertainty.caution import widened_prior
 from biodance.uncertainty.noise import Noise
 
-RATE = 12.5
+JUDGED_RATE = 12.5
 """Hz at which a plan is judged: moves of 2 s from rest to rest have nothing to say above 6 Hz."""
 _STILL = 1.5
 """s of every hold that count: the noise is so slow that longer standing tells next to nothing
@@ -117,7 +117,7 @@ def movement_evidence(
     body: Body, motion: Motion, use: NDArray[np.bool_] | None = None, *, noise: Noise
 ) -> MovementEvidence:
     """Return what a ``motion`` of ``body`` tells at its frames ``use`` (T,), judged at 12.5 Hz under ``noise``."""
-    step = max(1, round(motion.rate / RATE))
+    step = max(1, round(motion.rate / JUDGED_RATE))
     few = Motion(motion.time[::step], motion.q[::step], motion.v[::step], motion.a[::step])
     used = np.ones(few.time.size, dtype=bool) if use is None else use[::step]
     fit = Fit("movement", few, predict_wrench(body, few), used)
@@ -130,7 +130,7 @@ def expect(dance: Dance, *, steps: int = 10) -> Expectation:
     """Return what is expected after ``steps`` durations of ``dance``, evenly spread over its postures."""
     brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
     chosen = evenly_spread(brief, steps)
-    found = expected_spread(brief.body, brief.motion(RATE), np.array([brief.phases[k].end for k in chosen]))
+    found = expected_spread(brief.body, brief.motion(JUDGED_RATE), np.array([brief.phases[k].end for k in chosen]))
     return replace(found, duration=np.array([0.0, *(dance.phases[k].end for k in chosen)]))
 
 
@@ -141,7 +141,7 @@ def evenly_spread(dance: Dance, steps: int) -> list[int]:
 
 
 def expected_spread(body: Body, motion: Motion, ends: Array) -> Expectation:
-    """Return what is expected when a ``motion`` at a multiple of ``RATE`` stops at each instant ``ends`` (D,) s."""
+    """Return what is expected when a ``motion`` at (a multiple of) 12.5 Hz stops at each instant ``ends`` (D,) s."""
     noise, size = typical_noise(predict_wrench(body, motion)), 10 * len(body.segments)
     told = [MovementEvidence(body, np.zeros((size, size)), Mismatch(*np.zeros((2, size, 1))))]
     for start, end in pairwise([motion.time[0], *ends]):
@@ -154,8 +154,8 @@ def typical_noise(wrench: Wrench) -> Noise:
     """Return the noise of a typical session about the mean centre of pressure of the planned ``wrench``; the variance
     of a coefficient grows with the rate.
     """
-    covariance = RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
-    return Noise(covariance, np.asarray(wrench.cop().mean(axis=0)), Bands(BANDS.edges, RATE))
+    covariance = JUDGED_RATE / BANDS.rate * np.array([np.diag(np.square(row)) for row in _danced()["noise"]])
+    return Noise(covariance, np.asarray(wrench.cop().mean(axis=0)), Bands(BANDS.edges, JUDGED_RATE))
 
 
 def typical_sizes() -> Sizes:
@@ -198,9 +198,11 @@ class MovementInformation:
 
 def movement_information(dance: Dance) -> MovementInformation:
     """Return by what the parts of ``dance`` are judged."""
-    plan = dance.motion(RATE)
+    plan = dance.motion(JUDGED_RATE)
     noise = typical_noise(predict_wrench(dance.body, plan))
     weights = _TRUST / np.diagonal(noise.covariance, axis1=1, axis2=2)
     value, vector = np.linalg.eigh(widened_prior(dance.body.sip).covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))
-    return MovementInformation(RATE, root, weights, noise.bands.edges, _FELT * RATE * weights[0, _AT_REST], noise.about)
+    return MovementInformation(
+        JUDGED_RATE, root, weights, noise.bands.edges, _FELT * JUDGED_RATE * weights[0, _AT_REST], noise.about
+    )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import RATE, MovementEvidence, movement_evidence, removed_shares, typical_noise
+from biodance.dance.expectation import JUDGED_RATE, MovementEvidence, movement_evidence, removed_shares, typical_noise
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion
@@ -109,7 +109,7 @@ def score_performance(
     if not any(use.any() for _, use in recorded):
         raise BiodanceError("No trial with role fit has motion and plates, so nobody knows how the dance was danced.")
     brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
-    plan = _in_joints_of(body, dance, brief.motion(RATE))
+    plan = _in_joints_of(body, dance, brief.motion(JUDGED_RATE))
     noise = typical_noise(predict_wrench(body, plan))
     planned = removed_shares(movement_evidence(body, plan, noise=noise).posterior())
     parts = [movement_evidence(body, motion, use, noise=noise) for motion, use in recorded if use.any()]
@@ -153,7 +153,7 @@ def _repetitions(dance: Dance, body: Body, known: MovementEvidence, noise: Noise
 
 def _once(dance: Dance, body: Body, start: float, end: float, noise: Noise) -> MovementEvidence:
     """Return what the planned movement between two instants tells, at the rate of the judgement."""
-    time = np.arange(max(2, round((end - start) * RATE)) + 1) / RATE
+    time = np.arange(max(2, round((end - start) * JUDGED_RATE)) + 1) / JUDGED_RATE
     phase = next(phase for phase in dance.phases if phase.start == start)
     state = dance.state(phase, np.minimum(start + time, end))
     motion = dance.chain.motion(time, state.x, state.v, state.a)

@@ -6,6 +6,7 @@ limit and, weakly, part of the objective. The start is the smoothest straight mo
 kept on a coarse grid with a reserve and judged on a fine one.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,7 +45,7 @@ _THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 _ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
 """Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
-of the rounds: after each the worst instants are added and the reserve grows by a quarter.
+of the rounds.
 """
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
@@ -201,41 +202,36 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     """Return the best feasible move after ``history`` (N, 6, 6); if there is none, the one that violates least."""
     best = None
     for spread, share, rounds in _ATTEMPTS:
-        via, time, objective = task.straight(), task.grid(GRID), MoveObjective(task, history, share)
+        via = task.straight()
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
-        for k, iterations in enumerate(rounds):
-            reserve = RESERVE * (1 + k / 4)
-            via, violation = improved_via(task, via, time, objective, iterations, reserve)
-            found, instants = evaluate_move(task, via)
+        for found, beyond in improving_moves(task, via, MoveObjective(task, history, share), rounds):
             if best is None or found.violation < best.violation:
                 best = found
             if best.violation == 0:
                 return best
-            if violation > reserve or found.violation > HOPELESS:
+            if beyond > 0 or found.violation > HOPELESS:
                 break
-            time = np.union1d(time, instants)
     assert best is not None
     return best
 
 
-def improved_via(
-    task: Task,
-    via: Array,
-    time: Array,
-    objective: MoveObjective,
-    iterations: int,
-    reserve: float,
-    *,
-    free: list[int] | None = None,
-) -> tuple[Array, float]:
-    """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve``
-    at ``time`` s; only the coordinates ``free`` move, by default all that can.
+def improving_moves(
+    task: Task, via: Array, objective: MoveObjective, rounds: tuple[int, ...], *, free: list[int] | None = None
+) -> Iterator[tuple[Move, float]]:
+    """Yield the move found from ``via`` (2, n) after each of the ``rounds``, of so many iterations, and by how much it
+    violates the limits on the grid without their reserve; only the coordinates ``free`` move, by default all that can.
+    After a round the worst instants are added and the reserve grows by a quarter.
     """
     free = free_coordinates(task.chain, task.stance) if free is None else free
-    problem = task.problem(via, free, time, reserve=reserve, objective=objective)
-    found, out = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations), via.copy()
-    out[:, free] = found.y.reshape(2, -1)
-    return out, found.violation
+    via, time = via.copy(), task.grid(GRID)
+    for k, iterations in enumerate(rounds):
+        reserve = RESERVE * (1 + k / 4)
+        problem = task.problem(via, free, time, reserve=reserve, objective=objective)
+        solution = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations)
+        via[:, free] = solution.y.reshape(2, -1)
+        found, instants = evaluate_move(task, via.copy())
+        yield found, solution.violation - reserve
+        time = np.union1d(time, instants)
 
 
 def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:

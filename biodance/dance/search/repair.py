@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import islice
 
-from biodance.dance.performers import PERFORMER_COUNT, Rehearsed, perform_with
+from biodance.dance.performers import PERFORMER_COUNT, Rehearsed, rehearse_imprecisely
 from biodance.dance.search.course import Course
 from biodance.dance.search.reachability import WordStep
 from biodance.dance.search.straight_moves import other_moves
@@ -36,7 +36,7 @@ def repaired_course(
     for number in range(_ROUNDS):
         search.work.tell("performers", number, 0)
         danced = course
-        found = perform_with(workers, danced.dance(search.work), search.work.plan.limits)
+        found = rehearse_imprecisely(danced.dance(search.work), search.work.plan.limits, workers=workers)
         for p in sorted({p for p, _ in found.bad}, reverse=True):  # what is left out moves no earlier place
             course = _repaired_at(search, course, p, found, workers)
         if found.safe or course is danced:
@@ -68,7 +68,7 @@ def _room(
     scale = {limit.name: limit.scale for limit in limits}
     others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
     for who in (first, others[:_FEW], others[_FEW:]):
-        found = perform_with(workers, dance, limits, who=who, only=only)
+        found = rehearse_imprecisely(dance, limits, who=who, only=only, workers=workers)
         room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.least_margins))
         if room < 0:
             break

@@ -10,7 +10,7 @@ import numpy as np
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.stance import Stance
-from biodance.dance.search.move import GRID, RESERVE, Move, MoveObjective, Task, evaluate_move, improved_via
+from biodance.dance.search.move import Move, MoveObjective, Task, evaluate_move, improving_moves
 from biodance.records import Array
 
 _SLOWER = (1.0, 1.4, 1.8)
@@ -96,13 +96,8 @@ def _round_about(task: Task, best: Move) -> Move:
     """Return a move in which the pelvis and a lifted leg avoid what the straight one breaks."""
     up = [c for side in (0, 1) if side not in task.stance.planted for c in task.chain.leg_columns[side]]
     objective = MoveObjective(task, np.zeros((len(task.chain.body.segments), 6, 6)), 0.0)
-    via, time = best.via[0], task.grid(GRID)
-    for k, iterations in enumerate(_ITERATIONS):
-        reserve = RESERVE * (1 + k / 4)
-        via, _ = improved_via(task, via, time, objective, iterations, reserve, free=[*range(ROOT), *up])
-        found, worst = evaluate_move(task, via)
+    for found, _ in improving_moves(task, best.via[0], objective, _ITERATIONS, free=[*range(ROOT), *up]):
         best = min(best, found, key=lambda move: move.violation)
         if best.violation == 0:
             break
-        time = np.union1d(time, worst)
     return best
