@@ -123,16 +123,11 @@ class PlannedDance:
 
     def _coordinates(self, rows: NDArray[np.intp], when: Array) -> Array:
         """Return the coordinates (T, n) of the dance, planted legs holding their feet."""
-        dance = self.dance
-        parts = [path_in(dance.phases[p], dance.postures, dance.via, when[rows == p]) for p in np.unique(rows)]
-        x = np.concatenate([part[0] for part in parts])
-        turn = self.chain.root_rotation(x)
-        for side, columns in enumerate(self.chain.leg_columns):
-            down = np.flatnonzero(np.array([side in stance.planted for stance in self.stances])[rows])
-            ankle = np.array([stance.ankle[side] for stance in self.stances])[rows[down]]
-            flat = np.broadcast_to(UPRIGHT, (down.size, 3, 3))
-            x[down[:, None], columns] = self.chain.legs[side].solve(turn[down], x[down, :3], flat, ankle)
-        return x
+        dance, parts = self.dance, list[Array]()
+        for p in np.unique(rows):
+            x = path_in(dance.phases[p], dance.postures, dance.via, when[rows == p])[0]
+            parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))
+        return np.concatenate(parts)
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
