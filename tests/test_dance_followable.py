@@ -13,7 +13,7 @@ from biodance.dance.cues import MIRROR_CALL, dance_instructions
 from biodance.dance.imprecision import Imprecision, PlannedDance
 from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import PerformersMargin, Rehearsed, rehearse_imprecisely
+from biodance.dance.performers import PerformersMargin, PerformersResult, try_performers
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
@@ -62,9 +62,9 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(searche
     def performed(dance, _limits, *, who=range(200), only=(), workers):
         bad = bool((dance.postures == steps[2].x).all(axis=1).any()) and (not only or 2 in only)
         room = PerformersMargin("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
-        return Rehearsed(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
+        return PerformersResult(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
 
-    monkeypatch.setattr(repair, "rehearse_imprecisely", performed)
+    monkeypatch.setattr(repair, "try_performers", performed)
     repaired, found = repair.repaired_course(search, course, search.work.workers)
     dance = repaired.dance(search.work)
     assert found.safe
@@ -162,24 +162,24 @@ def test_all_postures_of_the_words_stand_balanced_on_its_feet() -> None:
 
 def test_an_exact_performer_does_the_dance_itself() -> None:
     exact = Imprecision(tracking=0.0, timing=0.0, sway=0.0, pace=1.0)
-    found = rehearse_imprecisely(small_dance(), PLAN.limits, who=(0,), how=exact)
+    found = try_performers(small_dance(), PLAN.limits, who=(0,), how=exact)
     motion = small_dance().motion(5.0)
     gap, _ = solid_distances(BODY, poses(BODY, motion.q))
     assert found["self_collision"].worst == pytest.approx(gap.min(), abs=2e-3)
-    bad = rehearse_imprecisely(small_dance(), PLAN.limits, who=range(3))
+    bad = try_performers(small_dance(), PLAN.limits, who=range(3))
     assert all(bad[name].worst < found[name].worst for name in ("self_collision", "balance"))
 
 
 def test_performers_are_the_same_in_groups() -> None:
     with ThreadPoolExecutor(2) as pool:
-        together = rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4), workers=pool)
-    assert together == rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4))
+        together = try_performers(small_dance(), PLAN.limits, who=range(4), workers=pool)
+    assert together == try_performers(small_dance(), PLAN.limits, who=range(4))
 
 
 def test_performers_looked_at_together_are_those_looked_at_alone() -> None:
     dance = small_dance()
-    alone = [rehearse_imprecisely(dance, PLAN.limits, who=(k,), only=(1, 2)) for k in range(3)]
-    together = rehearse_imprecisely(dance, PLAN.limits, who=range(3), only=(1, 2))
+    alone = [try_performers(dance, PLAN.limits, who=(k,), only=(1, 2)) for k in range(3)]
+    together = try_performers(dance, PLAN.limits, who=range(3), only=(1, 2))
     assert set(together.bad) == {bad for one in alone for bad in one.bad}
     assert together.failed == tuple(k for one in alone for k in one.failed)
     for room in together.least_margins:

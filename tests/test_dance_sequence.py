@@ -7,7 +7,7 @@ import pytest
 
 from biodance.body.human.human import human
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import stance, under
+from biodance.dance.problem.stance import feet_in_move, stance
 from biodance.dance.problem.support import support_sequence
 from biodance.dance.search.optimised_course import nearest_neighbours
 from biodance.errors import BiodanceError
@@ -23,7 +23,7 @@ def test_no_foot_moves_unless_the_other_bears_the_weight(names):
     assert [s.name for s in stances if s.over is None] == [name for name in names for _ in range(2)]
     assert stances[-1].planted == (0, 1)
     for before, after in pairwise(stances):
-        bearing = under(before, after).planted
+        bearing = feet_in_move(before, after).planted
         for one in (before, after):
             assert set(bearing) <= set(one.planted)
             if len(bearing) == 1 and len(one.planted) == 2:

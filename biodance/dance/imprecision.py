@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
-from biodance.dance.limits import Copied
+from biodance.dance.limits import ImpreciseCopy
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at
@@ -144,7 +144,7 @@ class PlannedDance:
 
     def performed_by(
         self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
-    ) -> Copied:
+    ) -> ImpreciseCopy:
         """Return the performances of several people, one behind the other: of each the random numbers, instants s (T,)
         and those s (T,) of the plan that belong to them, and which of them count. The first and the last two frames of
         each have differences to somebody else's.
@@ -157,7 +157,7 @@ class PlannedDance:
         times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
         return self._copied(times, places, errors, sways, how)
 
-    def held_by(self, count: int, when: Array) -> Copied:
+    def held_by(self, count: int, when: Array) -> ImpreciseCopy:
         """Return what ``count`` people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the
         plan, instant by instant.
         """
@@ -166,12 +166,12 @@ class PlannedDance:
         sway = how.sway * rng.normal(size=(when.size, 2))
         return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
 
-    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> Copied:
+    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
         """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
         centre of mass off by its ``sway`` m (T, 2).
         """
         x, rows = self._off(when, error, sway, how)
-        return Copied(self.chain.body, time, self.chain.positions(x), self.stances, rows)
+        return ImpreciseCopy(self.chain.body, time, self.chain.positions(x), self.stances, rows)
 
     def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
         chain, rows = self.chain, self.phase_at(when)

@@ -47,7 +47,7 @@ class PerformersMargin:
 
 
 @dataclass(frozen=True)
-class Rehearsed:
+class PerformersResult:
     """What ``count`` imprecise performers leave of every limit that they must keep: ``least_margins``; ``bad`` postures
     (indices) at which somebody had too little, with the limit; ``failed`` the numbers of those people.
     """
@@ -80,7 +80,7 @@ def for_imprecise(limits: Iterable[Limit]) -> dict[Limit, ForImprecise]:
     return {limit: asked for limit, asked in found if asked is not None}
 
 
-def rehearse_imprecisely(
+def try_performers(
     dance: Dance,
     limits: tuple[Limit, ...],
     *,
@@ -88,7 +88,7 @@ def rehearse_imprecisely(
     only: tuple[int, ...] = (),
     how: Imprecision = USUAL_IMPRECISION,
     workers: Executor | None = None,
-) -> Rehearsed:
+) -> PerformersResult:
     """Return what performers leave of the ``limits`` in ``dance``; ``who`` are their numbers, and each is the same
     whoever else dances. ``only``: neighbouring postures (indices) to or in which they are looked at. ``workers``: two
     of them look at half of the performers each.
@@ -110,7 +110,7 @@ def rehearse_imprecisely(
         margins.append(PerformersMargin(limit.name, limit.unit, asked.least, float(room[k, p]), int(p), what[k], share))
         bad |= {(int(posture), limit.name) for posture in np.flatnonzero(short.any(axis=0))}
         failed |= {who[int(one)] for one in np.flatnonzero(short.any(axis=1))}
-    return Rehearsed(len(who), tuple(margins), tuple(sorted(bad)), tuple(sorted(failed)))
+    return PerformersResult(len(who), tuple(margins), tuple(sorted(bad)), tuple(sorted(failed)))
 
 
 @one_thread()

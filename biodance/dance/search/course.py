@@ -7,7 +7,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.problem.stance import Stance, under
+from biodance.dance.problem.stance import Stance, feet_in_move
 from biodance.dance.search.context import DesignContext
 from biodance.dance.search.move import Move, Task
 from biodance.records import Array
@@ -85,7 +85,7 @@ class Course(Generic[S]):
         via, seconds = [np.empty((0, 2, start.x.size))], [np.empty(0)]
         for (before, after), move in zip(pairwise(self.steps), self.moves, strict=True):
             assert move is not None
-            ground, stops = under(before.stance, after.stance), len(move.stops)
+            ground, stops = feet_in_move(before.stance, after.stance), len(move.stops)
             rows += [*move.stops, after.x]
             stances += [*[ground] * stops, after.stance]
             hold += [*[0.0] * stops, plan.hold_on(after.stance)]
@@ -111,5 +111,5 @@ class Course(Generic[S]):
 
 def move_task(work: DesignContext, before: DanceStep, after: DanceStep, *, slower: float = 1.0) -> Task:
     """Return what the move between two steps must do, ``slower`` times as long as the plan's."""
-    feet, ends = under(before.stance, after.stance), np.array([before.x, after.x])
+    feet, ends = feet_in_move(before.stance, after.stance), np.array([before.x, after.x])
     return Task(work.chain, work.blocks, feet, ends, slower * work.plan.move, work.plan.limits)

@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import islice
 
-from biodance.dance.performers import PERFORMER_COUNT, Rehearsed, rehearse_imprecisely
+from biodance.dance.performers import PERFORMER_COUNT, PerformersResult, try_performers
 from biodance.dance.search.course import Course
 from biodance.dance.search.reachability import WordStep
 from biodance.dance.search.straight_moves import other_moves
@@ -29,14 +29,14 @@ _Other = tuple[Course[WordStep], tuple[int, ...]]
 
 def repaired_course(
     search: WordSearch, course: Course[WordStep], workers: Executor
-) -> tuple[Course[WordStep], Rehearsed]:
+) -> tuple[Course[WordStep], PerformersResult]:
     """Return the course as all performers can dance it, and what they leave of the limits; if it could not be repaired,
     as well as it could be.
     """
     for number in range(_ROUNDS):
         search.work.tell("performers", number, 0)
         danced = course
-        found = rehearse_imprecisely(danced.dance(search.work), search.work.plan.limits, workers=workers)
+        found = try_performers(danced.dance(search.work), search.work.plan.limits, workers=workers)
         for p in sorted({p for p, _ in found.bad}, reverse=True):  # what is left out moves no earlier place
             course = _repaired_at(search, course, p, found, workers)
         if found.safe or course is danced:
@@ -45,7 +45,7 @@ def repaired_course(
 
 
 def _repaired_at(
-    search: WordSearch, course: Course[WordStep], p: int, found: Rehearsed, workers: Executor
+    search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult, workers: Executor
 ) -> Course[WordStep]:
     """Return the course with another move to posture ``p`` or another posture there that is safe or nearest to it."""
     best, most = course, _room(search, course, (p,), found.failed, workers)
@@ -68,14 +68,14 @@ def _room(
     scale = {limit.name: limit.scale for limit in limits}
     others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
     for who in (first, others[:_FEW], others[_FEW:]):
-        found = rehearse_imprecisely(dance, limits, who=who, only=only, workers=workers)
+        found = try_performers(dance, limits, who=who, only=only, workers=workers)
         room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.least_margins))
         if room < 0:
             break
     return room
 
 
-def _others(search: WordSearch, course: Course[WordStep], p: int, found: Rehearsed) -> Iterator[_Other]:
+def _others(search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult) -> Iterator[_Other]:
     """Yield what else may be done at posture ``p`` or just before, what changes least first: another move of the same
     time, another posture, a slower move, another posture before, none at all.
     """
@@ -119,7 +119,7 @@ def _exchanged(search: WordSearch, course: Course[WordStep], q: int) -> Iterator
             yield course.spliced(q, q + 2, (step, on), (*to, way, *course.moves[q + 1 : q + 2]))
 
 
-def _without(search: WordSearch, course: Course[WordStep], p: int, found: Rehearsed) -> Course[WordStep] | None:
+def _without(search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult) -> Course[WordStep] | None:
     """Return the course without posture ``p``, None where its neighbours need it."""
     steps = course.steps
     if not 0 < p < len(steps) - 1 or steps[p].stance.over is not None:

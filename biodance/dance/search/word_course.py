@@ -18,7 +18,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import Stance, stance_words, under
+from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
 from biodance.dance.problem.support import support_sequence
 from biodance.dance.search.context import DesignContext
 from biodance.dance.search.course import Course, move_task
@@ -285,4 +285,5 @@ def freer_dance(body: Body, plan: Plan, *, seed: int = 0) -> Dance:
     steps = WordSearch(DesignContext.alone(body, free, seed)).postures(stances)
     x, hold = np.array([step.x for step in steps]), np.full(len(steps), plan.hold)
     via, move = straight_via(x[:-1], x[1:]), np.full(len(x) - 1, plan.move)
-    return Dance(plan.name, body, x, stances, hold, via, move, tuple(under(*pair) for pair in pairwise(stances)), seed)
+    feet = tuple(feet_in_move(*pair) for pair in pairwise(stances))
+    return Dance(plan.name, body, x, stances, hold, via, move, feet, seed)
