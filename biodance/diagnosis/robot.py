@@ -13,7 +13,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, cause_columns, motion_changes, without
 from biodance.identification.learning import WORTH
-from biodance.identification.mismatch import SHORTEST
+from biodance.identification.mismatch import long_runs
 from biodance.identification.posterior import prior_factor
 from biodance.identification.robot import RobotMotion, robot_start
 from biodance.identification.robot_errors import THINNED, place_changes, slow_wrench
@@ -67,8 +67,7 @@ def robot_causes(
         first, *rest = _gathered(body, trials, len(fitted), columns)
         noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), robot_start(body))
         fit = _equations(first, noise)
-        more = _equations(rest[0], noise) if rest else (0.0, 0.0)
-        every = fit[0] + more[0], fit[1] + more[1]
+        every = _equations(sum(rest, first), noise)
         found, trials = _refined(body, found, trials, columns, every, here)
         gain, both = (_gains(A, b, here, columns.wide)[size:] for A, b in (fit, every))
         best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
@@ -132,9 +131,7 @@ def _products(body: Body, one: RobotMotion, columns: Columns, trial: int) -> Sta
     first, some = columns.places[trial]
     first -= changes.shape[2] + len(plates.delay)
     total = empty(count, layout)
-    for pick in layout.bands.runs(fit.use, fit.motion.rate):
-        if pick.size < SHORTEST:
-            continue
+    for _, pick in long_runs((fit,), layout.bands):
         motion = fit.motion.at(pick)
         W = regressor(body, motion)
         places = np.zeros((pick.size, 6, len(columns.causes) - changes.shape[2] - len(plates.delay)))

@@ -14,7 +14,7 @@ from biodance.body.body import Body
 from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
 from biodance.identification.identification import Identification, conclude
 from biodance.identification.learning import START, learn_noise
-from biodance.identification.mismatch import SHORTEST, Mismatch
+from biodance.identification.mismatch import Mismatch, long_runs
 from biodance.identification.robot_errors import THINNED, place_changes, places_of, zero_changes
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.motion.grounded import Grounded
@@ -114,9 +114,7 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
         place = np.zeros((size, places_of(one.grounded)))
         changes = zero_changes(body, one.grounded, one.angle)
         white = noise.at(fit.motion.rate)
-        for pick in noise.bands.runs(fit.use, fit.motion.rate):
-            if pick.size < SHORTEST:
-                continue
+        for _, pick in long_runs((fit,), noise.bands):
             motion = fit.motion.at(pick)
             W = regressor(body, motion)
             weight, wrench = white.weighted(W), W @ body.sip.phi
