@@ -164,15 +164,15 @@ def feasible_course(work: DesignContext, course: Course[PlainStep]) -> Course[Pl
     for attempt in range(1, len(_ENDS) + _FEWER + 1):
         limits = {k: move.limit for k, move in enumerate(course.moves) if move is not None and move.limit}
         if not limits:
-            return course
-        k = min(limits)
-        places = sorted({k + _ENDS[attempt - 1] for k in limits} if attempt <= len(_ENDS) else _spare(course, k, first))
+            break
+        exchange = attempt <= len(_ENDS)
+        places = sorted({k + _ENDS[attempt - 1] for k in limits} if exchange else _spare(course, min(limits), first))
         if not places:
             break
-        what = "exchanged for another one" if attempt <= len(_ENDS) else "left out"
+        what = "exchanged for another one" if exchange else "left out"
         notes = tuple(_changed(course, place, what, limits) for place in places)
         for place in places:
-            other = (_other_step(work, course, place, attempt),) if attempt <= len(_ENDS) else ()
+            other = (_other_step(work, course, place, attempt),) if exchange else ()
             course = course.spliced(place, place + 1, other)
         known = tuple(None if move is None or move.limit else move for move in course.moves)
         course = with_exciting_moves(work, replace(course, moves=known, notes=(*course.notes, *notes)), attempt)
