@@ -10,11 +10,11 @@ import numpy as np
 
 from biodance.body.human.human import human
 from biodance.dance.limits import CheckedMotion
-from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import Stance, holding, seat, stance
 from biodance.dance.problem.state import State, close_legs
+from biodance.dance.search.posture import initial_guess
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))

@@ -8,15 +8,15 @@ import numpy as np
 
 from biodance.body.human.human import human
 from biodance.dance.dance import Dance
-from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import under
+from biodance.dance.problem.stance import feet_in_move
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.posture import initial_guess
 from biodance.records import Subject
 
 SHORT_SEARCH = {"SWEEPS": ((4, 8),), "FRESH": ((8, 8),), "POLISH": ((8, 4),)}
-"""Numbers of `biodance.dance.postures.search` that find allowed postures quickly, not the best ones."""
+"""Numbers of `biodance.dance.search.posture_set` that find allowed postures quickly, not the best ones."""
 BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))
 
 
@@ -34,4 +34,4 @@ def small_dance() -> Dance:
     raised[6 + BODY.joint_index("left_shoulder_adduction")] = -1.0
     x = np.array([stand, raised])
     via = x[:1, None] + np.array([[0.21], [0.79]]) * np.diff(x, axis=0)[:, None]
-    return Dance("one_segment", BODY, x, stances, np.ones(2), via, np.array([2.0]), (under(*stances),), 0)
+    return Dance("one_segment", BODY, x, stances, np.ones(2), via, np.array([2.0]), (feet_in_move(*stances),), 0)

@@ -8,15 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biodance.body.inertia import TENSOR
 from biodance.cli import run
 from biodance.dance.dance import Dance
-from biodance.dance.metrics import criterion_of, dance_metrics
+from biodance.dance.metrics import dance_metrics
+from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file
 from biodance.lab.read import read_trial
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import poses, segment_motion
 from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer
 from biodance.records import Subject
 
@@ -154,5 +156,14 @@ def test_folders_that_hold_other_things_are_left_alone(tmp_path: Path) -> None:
 def test_the_criterion_of_a_motion_is_that_of_the_dance(made: tuple[Path, Path, int]) -> None:
     folder, protocol, _ = made
     dance = Dance.load(folder / "dance.npz")
-    _, dynamic = criterion_of(dance.body, dance.motion(50.0))
+    parts, motion = excitation_blocks(dance.body), dance.motion(50.0)
+    seen = segment_motion(dance.body, motion)
+    w, dw = (np.einsum("tnji,tnj->tni", seen.rotation, x) for x in (seen.angular_velocity, seen.angular_acceleration))
+    units = np.zeros((6, 3, 3))
+    for k, (i, j) in enumerate(TENSOR):
+        units[k, i, j] = units[k, j, i] = 1.0
+    K = np.stack([dw @ unit + np.cross(w, w @ unit) for unit in units], axis=-1)
+    grams = np.einsum("tnik,tnil->nkl", K, K) / motion.rate + 0.01 * np.eye(6)
+    picked = zip(parts.weight, parts.second, grams, strict=True)
+    dynamic = sum(m * np.sqrt(np.linalg.cond(gram[np.ix_(pick, pick)])) for m, pick, gram in picked if pick)
     assert dynamic == pytest.approx(dance_metrics(dance, read_plan(protocol)).dynamic[-1], rel=2e-3)

@@ -7,9 +7,9 @@ from small_dances import BODY
 
 from biodance.dance.cues import dance_instructions
 from biodance.dance.expectation import Expectation
-from biodance.dance.followable.walk import freer_dance
 from biodance.dance.metrics import DanceMetrics
 from biodance.dance.problem.plan import Plan
+from biodance.dance.search.word_course import freer_dance
 from biodance.pipeline.dance_result import DanceResult
 from biodance.report.tables.dance import dance_document
 

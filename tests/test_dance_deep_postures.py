@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from small_dances import BODY, small_dance
 
-from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.vocabulary import read_vocabulary, words_for
 from biodance.dance.metrics import longest_alone
-from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.posture_table import PostureTable
+from biodance.dance.search.vocabulary import read_vocabulary, words_for
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES
 
@@ -24,7 +24,7 @@ _ON_BOTH, _ON_ONE, _CLOSED = 70.0, 45.0, 0.5
 def _deepest(plan: Plan, stance: Stance) -> tuple[float, float]:
     """Return how far the trunk leans at most, and a knee that bears bends, degrees, over all words on these feet."""
     words = words_for(BODY, plan, stance, read_vocabulary(), np.random.default_rng(0))
-    found = Catalogue.of(CHAIN, stance, {p: g[:1] if p.endswith("_arm") else g for p, g in words.items()})
+    found = PostureTable.of(CHAIN, stance, {p: g[:1] if p.endswith("_arm") else g for p, g in words.items()})
     q = CHAIN.motion(np.arange(len(found.x), dtype=float), found.x, *np.zeros((2, *found.x.shape))).q
     up = np.asarray(poses(BODY, q).rotation)[:, BODY.segments.index("trunk_head")][:, 2, 1]
     knees = [ROOT + BODY.joint_index(f"{SIDES[side]}_knee_flexion") for side in stance.planted]

@@ -10,14 +10,14 @@ import pytest
 from small_dances import SHORT_SEARCH
 
 from biodance.body.human.human import human
-from biodance.dance import design as design_module
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.limits.balance import Balance
-from biodance.dance.postures import search
-from biodance.dance.postures.exchange import alike
 from biodance.dance.problem.plan import Plan
 from biodance.dance.rehearsal import bearing, rehearse
+from biodance.dance.search import posture_set
+from biodance.dance.search.course import Course
+from biodance.dance.search.posture_set import alike
 from biodance.dance.verify import broken, verify, verify_with
 from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.kinematics import poses
@@ -32,7 +32,7 @@ PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)
 def quick():
     with pytest.MonkeyPatch.context() as patch:
         for name, sweeps in SHORT_SEARCH.items():
-            patch.setattr(search, name, sweeps)
+            patch.setattr(posture_set, name, sweeps)
         yield
 
 
@@ -164,7 +164,7 @@ def test_what_breaks_a_limit_is_seen(dance, limit, change):
 
 def test_a_dance_that_fails_the_check_is_not_returned(dance, folder, monkeypatch):
     wrong = shifted(dance, "postures", 0, 0.1)
-    monkeypatch.setattr(design_module, "_joined", lambda *parts: wrong)
+    monkeypatch.setattr(Course, "dance", lambda *_: wrong)
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match=r"balance by .* m at "):
         design(BODY, PLAN, seed=1, resume=folder, workers=workers)
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from biodance.body.human.human import human
 from biodance.dance.limits import family
-from biodance.dance.postures.exchange import exchange
-from biodance.dance.postures.posture import KEPT, Exciting, Posture, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import effort, excitation_blocks, static_grams
 from biodance.dance.problem.stance import stance
 from biodance.dance.problem.state import State
+from biodance.dance.search.posture import KEPT, Exciting, Posture, initial_guess, posture_at, solve
+from biodance.dance.search.posture_set import exchange
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.expectation import _RATE, expected_spread, typical_noise, typical_sizes
+from biodance.dance.expectation import JUDGED_RATE, expected_spread, typical_noise, typical_sizes
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.identification.knowledge import segment_quantities
@@ -26,12 +26,12 @@ def motion() -> Motion:
     x = np.zeros((4, CHAIN.size))
     x[:, ROOT:] = rng.uniform(BODY.limits.lower, BODY.limits.upper, (4, 23)) * 0.7
     x[:, 2] = 0.9
-    basis = rest_to_rest(2.0, via=0, rate=_RATE)
+    basis = rest_to_rest(2.0, via=0, rate=JUDGED_RATE)
     parts = [
         np.concatenate([m[:-1] @ x[k : k + 2] for k in range(3)])
         for m in (basis.position, basis.velocity, basis.acceleration)
     ]
-    return CHAIN.motion(np.arange(75) / _RATE, *parts)
+    return CHAIN.motion(np.arange(75) / JUDGED_RATE, *parts)
 
 
 def test_before_the_dance_stands_the_table_and_more_dance_is_never_worse(motion: Motion) -> None:

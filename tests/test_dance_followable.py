@@ -10,21 +10,21 @@ from scipy.spatial.transform import Rotation
 from small_dances import BODY, small_dance
 
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
-from biodance.dance.followable import mending
-from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.reach import Reach
-from biodance.dance.followable.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
-from biodance.dance.followable.walk import NoWay, Walk, walked_dance
 from biodance.dance.imprecision import Imprecision, PlannedDance
 from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import PerformersMargin, Rehearsed, perform_with, rehearse_imprecisely
-from biodance.dance.postures.ordering import support_sequence
+from biodance.dance.performers import PerformersMargin, PerformersResult, try_performers
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan, read_plan
-from biodance.dance.transitions.context import Checkpoint, DesignContext
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search import repair
+from biodance.dance.search.context import Checkpoint, DesignContext
+from biodance.dance.search.posture_table import PostureTable
+from biodance.dance.search.reachability import Reachability
+from biodance.dance.search.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
+from biodance.dance.search.word_course import NoNextPosture, WordSearch
 from biodance.dance.verify import broken, verify
 from biodance.motion.kinematics import poses
 from biodance.report.pages.dance import mannequin_svg
@@ -34,19 +34,18 @@ CHAIN = Chain(BODY)
 
 
 @pytest.fixture(scope="module")
-def walked():
+def searched():
     with ThreadPoolExecutor(1) as pool:
         work = DesignContext(
             CHAIN, excitation_blocks(BODY), PLAN, 0, Checkpoint(None, BODY, PLAN, 0), pool, lambda *_: None
         )
-        walk = Walk(work)
-        steps, moves = walk.take(support_sequence(BODY, PLAN))
-        return walk, steps, moves
+        search = WordSearch(work)
+        return search, search.course(support_sequence(BODY, PLAN))
 
 
-def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
-    walk, steps, moves = walked
-    dance = walked_dance(walk.work, steps, moves)
+def test_a_dance_asks_little_at_once_and_keeps_all_limits(searched) -> None:
+    search, course = searched
+    dance, steps = course.dance(search.work), course.steps
     for before, after in pairwise(steps):
         changed = [part for part, word in after.words.items() if word.key != before.words[part].key]
         assert after.mirror or 1 <= len(changed) <= 2
@@ -57,16 +56,17 @@ def test_a_walk_asks_little_at_once_and_keeps_all_limits(walked) -> None:
     assert len({step.s for step in steps}) == len(steps)
 
 
-def test_where_a_performer_has_too_little_room_another_posture_is_danced(walked, monkeypatch) -> None:
-    walk, steps, moves = walked
+def test_where_a_performer_has_too_little_room_another_posture_is_danced(searched, monkeypatch) -> None:
+    (search, course), steps = searched, searched[1].steps
 
-    def performed(_workers, dance, _limits, *, who=range(200), only=()):
+    def performed(dance, _limits, *, who=range(200), only=(), workers):
         bad = bool((dance.postures == steps[2].x).all(axis=1).any()) and (not only or 2 in only)
         room = PerformersMargin("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
-        return Rehearsed(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
+        return PerformersResult(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
 
-    monkeypatch.setattr(mending, "perform_with", performed)
-    dance, found = mending.mended_dance(walk, steps, moves, walk.work.workers)
+    monkeypatch.setattr(repair, "try_performers", performed)
+    repaired, found = repair.repaired_course(search, course, search.work.workers)
+    dance = repaired.dance(search.work)
     assert found.safe
     assert not dance.notes
     changed = np.flatnonzero((dance.postures != np.array([step.x for step in steps])).any(axis=1))
@@ -75,17 +75,17 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(walked,
     assert not broken(verify(BODY, dance, PLAN.limits))
 
 
-def test_whoever_must_shift_weight_next_can_undo_what_was_called(walked) -> None:
-    walk, *_ = walked
+def test_whoever_must_shift_weight_next_can_undo_what_was_called(searched) -> None:
+    search, _ = searched
     both, over, *_ = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1))))
-    stand, shift = (walk.reach.catalogue(feet) for feet in (both, over))
-    work = replace(walk.work, plan=replace(PLAN, instructions=2.0))
-    reach, all_ = Reach(work, lambda *_: True), range(len(stand.index))
+    stand, shift = (search.reachability.table(feet) for feet in (both, over))
+    work = replace(search.work, plan=replace(PLAN, instructions=2.0))
+    reach, all_ = Reachability(work, lambda *_: True), range(len(stand.index))
     left = [next(n for n in (1, 2, 3) if reach.leads(stand, s, shift, n)) for s in all_]
-    words = [stand.chosen(s) for s in all_]
+    words = [stand.words_of(s) for s in all_]
     assert {n for n, word in zip(left, words, strict=True) if word["trunk"].rest and word["legs"].rest} == {1}
     assert {n for n, word in zip(left, words, strict=True) if not word["trunk"].rest and not word["legs"].rest} == {2}
-    barred = Reach(work, lambda *_: False)
+    barred = Reachability(work, lambda *_: False)
     assert not any(barred.leads(stand, s, shift, n) for s in all_ for n in (1, 3))
 
 
@@ -93,9 +93,9 @@ def test_feet_that_cannot_be_reached_are_named() -> None:
     stances = support_sequence(BODY, replace(PLAN, blocks=(("parallel", 1), ("single_right", 1), ("single_left", 1))))
     on = [(one.name, one.over) for one in stances]
     lift, down = on.index(("single_right", None)), on.index(("single_right", None)) + 1
-    assert NoWay("", stances, lift - 1).stance == NoWay("", stances, lift).stance == "single_right"
-    assert NoWay("", stances, down).stance == "single_right"
-    assert NoWay("", stances, down + 1).stance == NoWay("", stances, down + 2).stance == "single_left"
+    assert NoNextPosture("", stances, lift - 1).stance == NoNextPosture("", stances, lift).stance == "single_right"
+    assert NoNextPosture("", stances, down).stance == "single_right"
+    assert NoNextPosture("", stances, down + 1).stance == NoNextPosture("", stances, down + 2).stance == "single_left"
 
 
 def test_who_cannot_bend_the_hip_to_sit_is_told_so() -> None:
@@ -141,14 +141,14 @@ def test_an_arm_that_only_goes_forward_hangs_all_the_same() -> None:
         pytest.approx(1.5),
     ]
     rest = {part: group[:1] for part, group in words.items()}
-    room, limit = Catalogue.of(Chain(body), stance, rest).keeps(0, PLAN.limits)
+    room, limit = PostureTable.of(Chain(body), stance, rest).keeps(0, PLAN.limits)
     assert room > 3.2, limit
 
 
-def test_a_catalogue_stands_balanced_on_its_feet() -> None:
+def test_all_postures_of_the_words_stand_balanced_on_its_feet() -> None:
     (stance, *_) = support_sequence(BODY, PLAN)
     words = words_for(BODY, PLAN, stance, read_vocabulary(), np.random.default_rng(0))
-    found = Catalogue.of(
+    found = PostureTable.of(
         CHAIN, stance, {part: group if part == "trunk" else group[:2] for part, group in words.items()}
     )
     middle = CHAIN.mass_centre(found.x)[:, :2] - stance.centre
@@ -162,24 +162,24 @@ def test_a_catalogue_stands_balanced_on_its_feet() -> None:
 
 def test_an_exact_performer_does_the_dance_itself() -> None:
     exact = Imprecision(tracking=0.0, timing=0.0, sway=0.0, pace=1.0)
-    found = rehearse_imprecisely(small_dance(), PLAN.limits, who=(0,), how=exact)
+    found = try_performers(small_dance(), PLAN.limits, who=(0,), how=exact)
     motion = small_dance().motion(5.0)
     gap, _ = solid_distances(BODY, poses(BODY, motion.q))
     assert found["self_collision"].worst == pytest.approx(gap.min(), abs=2e-3)
-    bad = rehearse_imprecisely(small_dance(), PLAN.limits, who=range(3))
+    bad = try_performers(small_dance(), PLAN.limits, who=range(3))
     assert all(bad[name].worst < found[name].worst for name in ("self_collision", "balance"))
 
 
 def test_performers_are_the_same_in_groups() -> None:
     with ThreadPoolExecutor(2) as pool:
-        together = perform_with(pool, small_dance(), PLAN.limits, who=range(4))
-    assert together == rehearse_imprecisely(small_dance(), PLAN.limits, who=range(4))
+        together = try_performers(small_dance(), PLAN.limits, who=range(4), workers=pool)
+    assert together == try_performers(small_dance(), PLAN.limits, who=range(4))
 
 
 def test_performers_looked_at_together_are_those_looked_at_alone() -> None:
     dance = small_dance()
-    alone = [rehearse_imprecisely(dance, PLAN.limits, who=(k,), only=(1, 2)) for k in range(3)]
-    together = rehearse_imprecisely(dance, PLAN.limits, who=range(3), only=(1, 2))
+    alone = [try_performers(dance, PLAN.limits, who=(k,), only=(1, 2)) for k in range(3)]
+    together = try_performers(dance, PLAN.limits, who=range(3), only=(1, 2))
     assert set(together.bad) == {bad for one in alone for bad in one.bad}
     assert together.failed == tuple(k for one in alone for k in one.failed)
     for room in together.least_margins:

@@ -11,15 +11,15 @@ from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip
-from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import fit_to_person, read_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import palm
-from biodance.dance.problem.stance import holding, stance, under
+from biodance.dance.problem.stance import feet_in_move, holding, stance
 from biodance.dance.problem.state import State
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
@@ -72,7 +72,15 @@ def test_verification_sees_a_hand_that_lets_go() -> None:
     ).x
     for rows, kept in ((x, True), (np.array([x[0], away]), False)):
         dance = Dance(
-            "t", BODY, rows, (FRAME, FRAME), np.ones(2), rows[None, [0, 1]], np.array([2.0]), (under(FRAME, FRAME),), 0
+            "t",
+            BODY,
+            rows,
+            (FRAME, FRAME),
+            np.ones(2),
+            rows[None, [0, 1]],
+            np.array([2.0]),
+            (feet_in_move(FRAME, FRAME),),
+            0,
         )
         margin = next(m for m in verify(BODY, dance, family()) if m.limit == "grip")
         assert (margin.worst >= 0) == kept

@@ -9,11 +9,11 @@ import pytest
 from limit_cases import BODY, CHAIN, feet, movements
 
 from biodance.dance.limits import FAR, CheckedMotion, Limit, family
-from biodance.dance.postures.posture import Exciting, initial_guess
 from biodance.dance.problem.excitation import dynamic_grams, dynamic_slopes, excitation_blocks, static_grams
 from biodance.dance.problem.nlp import NonlinearProgramme, free_coordinates
 from biodance.dance.problem.stance import Stance, stance
 from biodance.dance.problem.state import State
+from biodance.dance.search.posture import Exciting, initial_guess
 from biodance.motion.regressor import predict_wrench
 
 BLOCKS = excitation_blocks(BODY)

@@ -20,8 +20,8 @@ from biodance.dance.design import design
 from biodance.dance.limits import NOTHING, Limit, family, limits_with, unconcerned
 from biodance.dance.limits.friction import Friction
 from biodance.dance.limits.ground_clearance import GroundClearance
-from biodance.dance.postures import search
 from biodance.dance.problem.plan import Plan, read_plan
+from biodance.dance.search import posture_set
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError, UnknownName
 from biodance.pipeline.front_dance import verify_dance
@@ -82,7 +82,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, sweeps in {**SHORT_SEARCH, "ATTEMPTS": 3}.items():
-        monkeypatch.setattr(search, name, sweeps)
+        monkeypatch.setattr(posture_set, name, sweeps)
 
 
 def danced(tmp_path: Path, height: float) -> tuple[int, dict[str, object], Path]:

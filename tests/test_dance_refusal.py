@@ -11,11 +11,11 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.dance.limits import family
-from biodance.dance.postures.posture import KEPT, initial_guess, refuse, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, PersonLimits, limit_body
 from biodance.dance.problem.stance import Stance, stance
+from biodance.dance.search.posture import KEPT, initial_guess, refuse, solve
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 

@@ -27,7 +27,7 @@ from biodance.dance.problem.shapes import capsule_pairs, pairs_of
 from biodance.dance.problem.stance import _WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.problem.state import Closure, close_legs
 from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, person_sized_plan, robot_plan, robot_rows
-from biodance.dance.transitions.move import Task, evaluate_move
+from biodance.dance.search.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.identification.base_parameters import estimate_base, structural_base

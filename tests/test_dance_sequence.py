@@ -1,4 +1,4 @@
-"""From postures to one walk: weight is shifted before a foot is lifted, near postures follow each other."""
+"""Postures in order: weight is shifted before a foot is lifted, near postures follow each other."""
 
 from itertools import pairwise, permutations
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.dance.postures.ordering import order_postures, support_sequence
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import stance, under
+from biodance.dance.problem.stance import feet_in_move, stance
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.optimised_course import nearest_neighbours
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
@@ -22,7 +23,7 @@ def test_no_foot_moves_unless_the_other_bears_the_weight(names):
     assert [s.name for s in stances if s.over is None] == [name for name in names for _ in range(2)]
     assert stances[-1].planted == (0, 1)
     for before, after in pairwise(stances):
-        bearing = under(before, after).planted
+        bearing = feet_in_move(before, after).planted
         for one in (before, after):
             assert set(bearing) <= set(one.planted)
             if len(bearing) == 1 and len(one.planted) == 2:
@@ -50,15 +51,15 @@ def test_weight_over_one_foot_is_inside_both_bases():
         assert (inner @ feet.centre + offset).min() > 0
 
 
-def test_a_walk_is_shorter_than_any_single_exchange():
+def test_the_order_is_shorter_than_any_single_exchange():
     x = np.random.default_rng(0).normal(size=(9, 29))
-    order = order_postures(x, [[0, 1, 2, 3], [4, 5, 6, 7, 8]])
+    order = nearest_neighbours(x, [[0, 1, 2, 3], [4, 5, 6, 7, 8]])
     assert sorted(order[:4]) == [0, 1, 2, 3]
     assert sorted(order) == list(range(9))
     line = np.zeros((6, 29))
     line[:, 10] = [0.3, 0.1, 0.5, 0.0, 0.4, 0.2]
-    assert list(np.diff(line[order_postures(line, [list(range(6))]), 10])) == pytest.approx([0.1] * 5) or list(
-        np.diff(line[order_postures(line, [list(range(6))]), 10])
+    assert list(np.diff(line[nearest_neighbours(line, [list(range(6))]), 10])) == pytest.approx([0.1] * 5) or list(
+        np.diff(line[nearest_neighbours(line, [list(range(6))]), 10])
     ) == pytest.approx([-0.1] * 5)
 
 

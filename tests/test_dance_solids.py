@@ -8,10 +8,10 @@ import pytest
 from biodance.body.human.human import human
 from biodance.dance.limits import self_collision
 from biodance.dance.limits.self_collision import _ENOUGH, deepest, outside, solid_distances
-from biodance.dance.postures.posture import initial_guess
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.stance import stance
 from biodance.dance.problem.state import close_legs
+from biodance.dance.search.posture import initial_guess
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
 

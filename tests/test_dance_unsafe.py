@@ -14,7 +14,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.expectation import expect
 from biodance.dance.margin import Margin
 from biodance.dance.metrics import dance_metrics
-from biodance.dance.performers import PerformersMargin, Rehearsed
+from biodance.dance.performers import PerformersMargin, PerformersResult
 from biodance.dance.problem.plan import Plan
 from biodance.pipeline.dance_result import DanceResult, not_safe
 from biodance.report.dance_write import write_dance
@@ -86,5 +86,5 @@ def test_what_performers_lack_becomes_what_is_not_safe() -> None:
         PerformersMargin("balance", "m", 0.015, 0.003, 1, "parallel", 0.01),
         PerformersMargin("self_collision", "m", 0.02, 0.021, 1, "arm - head", 0.0),
     )
-    margins = Rehearsed(200, rooms, ((1, "balance"),)).margins(small_dance())
+    margins = PerformersResult(200, rooms, ((1, "balance"),)).margins(small_dance())
     assert [round(margin.worst, 6) for margin in margins] == [-0.012, 0.001]

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from small_dances import BODY
 
-from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.vocabulary import Vocabulary, read_vocabulary, words_for
-from biodance.dance.postures.ordering import support_sequence
 from biodance.dance.problem.chain import ROOT, Chain
-from biodance.dance.problem.information import CENTRES, rows_of_centres
 from biodance.dance.problem.plan import Plan, read_plan
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.information import CENTRES, rows_of_centres
+from biodance.dance.search.posture_table import PostureTable
+from biodance.dance.search.vocabulary import Vocabulary, read_vocabulary, words_for
 from biodance.motion.kinematics import poses
 
 CHAIN = Chain(BODY)
@@ -33,7 +33,7 @@ def test_wider_words_are_asked_of_lively_people_only() -> None:
 
 def test_on_one_leg_the_trunk_stays_within_45_degrees() -> None:
     words = {part: group[:1] if part.endswith("_arm") else group for part, group in _words(PLAN).items()}
-    found = Catalogue.of(CHAIN, STANCE, words)
+    found = PostureTable.of(CHAIN, STANCE, words)
     q = CHAIN.motion(np.arange(len(found.x), dtype=float), found.x, *np.zeros((2, *found.x.shape))).q
     up = np.asarray(poses(BODY, q).rotation)[:, BODY.segments.index("trunk_head")][:, 2, 1]
     assert len(up) == len(found.index) > 50

@@ -10,11 +10,16 @@ from browser import BROWSER, Page
 from PIL import Image
 from small_dances import small_dance
 
+from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import MovementInformation, expect, movement_information
+from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion
 from biodance.report.feedback import write
 from biodance.report.feedback.write import follow_scene
+from biodance.spatial import wrench_shift
+from biodance.uncertainty.bands import Bands
+from biodance.uncertainty.noise import Noise
 
 BUILT = write.bundle() is not None
 SEEN = pytest.mark.skipif(not (BUILT and BROWSER), reason="no Chromium, or `make bundle` could not reach npm")
@@ -31,8 +36,27 @@ def planned_shares(dance: Dance, told: MovementInformation) -> Array:
     plan, total = dance.motion(told.rate), np.zeros_like(told.root)
     for phase in dance.phases:
         inside = (plan.time >= phase.start - 1e-9) & (plan.time <= phase.end + 1e-9)
-        total += told.information(dance.body, plan.at(inside), held=phase.kind == "hold")
-    return told.shares(total)
+        total += gathered(dance.body, plan.at(inside), told, held=phase.kind == "hold")
+    return removed(total, told)
+
+
+def gathered(body: Body, motion: Motion, told: MovementInformation, *, held: bool = False) -> Array:
+    """Return the information (p, p) of a ``motion``, or of the posture in which it ends."""
+    W = regressor(body, motion)
+    if held:
+        rows = (wrench_shift(told.about) @ W[-1])[2:5]
+        return rows.T @ (told.still[:, None] * rows)
+    noise = Noise(np.array([np.diag(1.0 / row) for row in told.weights]), told.about, Bands(told.edges, told.rate))
+    white = noise.whiten(W).reshape(-1, W.shape[2])
+    return white.T @ white
+
+
+def removed(H: Array, told: MovementInformation) -> Array:
+    """Return the share (N,) of the table's variance that an information (p, p) removes, mean over ten parameters."""
+    after = told.root @ np.linalg.solve(np.eye(len(H)) + told.root.T @ H @ told.root, told.root.T)
+    before = np.sum(told.root**2, axis=1)
+    share = np.where(before > 0, 1.0 - np.diag(after) / np.where(before > 0, before, 1.0), 0.0)
+    return share.reshape(-1, 10).mean(axis=1)
 
 
 def test_what_the_parts_tell_adds_up_to_what_is_expected_of_the_dance(dance: Dance) -> None:
@@ -46,14 +70,14 @@ def test_more_movement_tells_more_and_no_movement_nothing_new(dance: Dance) -> N
     move = next(phase for phase in dance.phases if phase.kind == "move")
     inside = (plan.time >= move.start) & (plan.time <= move.end)
     motion = Motion(*(each[inside] for each in (plan.time, plan.q, plan.v, plan.a)))
-    H = told.information(dance.body, motion, held=False)
+    H = gathered(dance.body, motion, told)
     arm, other = (dance.body.segment_index(f"{side}_forearm_hand") for side in ("left", "right"))
-    assert told.shares(np.zeros_like(H)) == pytest.approx(0.0, abs=1e-9)
-    once, twice = told.shares(H), told.shares(4 * H)
+    assert removed(np.zeros_like(H), told) == pytest.approx(0.0, abs=1e-9)
+    once, twice = removed(H, told), removed(4 * H, told)
     assert np.all(twice >= once)
     assert once[arm] > once[other], "the left arm moves, the right one hangs"
     rest = Motion(motion.time, np.tile(motion.q[0], (len(motion.q), 1)), 0 * motion.v, 0 * motion.a)
-    gain = once - told.shares(told.information(dance.body, rest, held=False))
+    gain = once - removed(gathered(dance.body, rest, told), told)
     assert dance.body.segments[int(np.argmax(gain))] in ("left_upper_arm", "left_forearm_hand")
 
 

@@ -15,11 +15,11 @@ from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
-from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.postures.posture import KEPT, distance_from, initial_guess, solve
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import seat, under
+from biodance.dance.problem.stance import feet_in_move, seat
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.posture import KEPT, distance_from, initial_guess, solve
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
@@ -49,7 +49,7 @@ def dance() -> Dance:
             if found.violation <= KEPT:
                 break
         rows.append(found.x)
-    x, feet = np.array(rows), tuple(under(a, b) for a, b in pairwise(stances))
+    x, feet = np.array(rows), tuple(feet_in_move(a, b) for a, b in pairwise(stances))
     via = x[:-1, None] + np.array([[0.21], [0.79]]) * np.diff(x, axis=0)[:, None]
     return Dance("test", BODY, x, stances, np.full(len(x), 1.0), via, np.full(len(x) - 1, 2.0), feet, 0)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.body.body_file import body_text, parse_body
-from biodance.dance.dance_words import LARGEST, possible_array, read_words
+from biodance.dance.file_entries import LARGEST, possible_array, read_words
 from biodance.dance.margin import Margin
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import path_in

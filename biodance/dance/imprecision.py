@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
-from biodance.dance.limits import Copied
+from biodance.dance.limits import ImpreciseCopy
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at
@@ -123,16 +123,11 @@ class PlannedDance:
 
     def _coordinates(self, rows: NDArray[np.intp], when: Array) -> Array:
         """Return the coordinates (T, n) of the dance, planted legs holding their feet."""
-        dance = self.dance
-        parts = [path_in(dance.phases[p], dance.postures, dance.via, when[rows == p]) for p in np.unique(rows)]
-        x = np.concatenate([part[0] for part in parts])
-        turn = self.chain.root_rotation(x)
-        for side, columns in enumerate(self.chain.leg_columns):
-            down = np.flatnonzero(np.array([side in stance.planted for stance in self.stances])[rows])
-            ankle = np.array([stance.ankle[side] for stance in self.stances])[rows[down]]
-            flat = np.broadcast_to(UPRIGHT, (down.size, 3, 3))
-            x[down[:, None], columns] = self.chain.legs[side].solve(turn[down], x[down, :3], flat, ankle)
-        return x
+        dance, parts = self.dance, list[Array]()
+        for p in np.unique(rows):
+            x = path_in(dance.phases[p], dance.postures, dance.via, when[rows == p])[0]
+            parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))
+        return np.concatenate(parts)
 
     def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
         """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
@@ -149,7 +144,7 @@ class PlannedDance:
 
     def performed_by(
         self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
-    ) -> Copied:
+    ) -> ImpreciseCopy:
         """Return the performances of several people, one behind the other: of each the random numbers, instants s (T,)
         and those s (T,) of the plan that belong to them, and which of them count. The first and the last two frames of
         each have differences to somebody else's.
@@ -162,7 +157,7 @@ class PlannedDance:
         times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
         return self._copied(times, places, errors, sways, how)
 
-    def held_by(self, count: int, when: Array) -> Copied:
+    def held_by(self, count: int, when: Array) -> ImpreciseCopy:
         """Return what ``count`` people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the
         plan, instant by instant.
         """
@@ -171,12 +166,12 @@ class PlannedDance:
         sway = how.sway * rng.normal(size=(when.size, 2))
         return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
 
-    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> Copied:
+    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
         """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
         centre of mass off by its ``sway`` m (T, 2).
         """
         x, rows = self._off(when, error, sway, how)
-        return Copied(self.chain.body, time, self.chain.positions(x), self.stances, rows)
+        return ImpreciseCopy(self.chain.body, time, self.chain.positions(x), self.stances, rows)
 
     def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
         chain, rows = self.chain, self.phase_at(when)

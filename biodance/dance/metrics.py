@@ -9,22 +9,19 @@ from itertools import groupby
 
 import numpy as np
 
-from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.excitation import (
     condition,
     dynamic_grams,
     excitation_blocks,
-    moments,
     static_grams,
     total,
     uprights,
 )
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance
-from biodance.dance.transitions.move import straight_way
-from biodance.motion.kinematics import segment_motion
-from biodance.records import Array, Motion
+from biodance.dance.search.move import straight_via
+from biodance.records import Array
 
 _RATE = 50.0
 """Hz, of the paper's transitions."""
@@ -80,7 +77,7 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     blocks = {i: grams[i][np.ix_(parts.first[i], parts.first[i])] for i in every if parts.first[i] and weight[i] > 0}
     poor = [i for i, block in blocks.items() if condition(block)[0] > POOR]
     gram = np.tile(_LITTLE * np.eye(6), (len(every), 1, 1))
-    straight = replace(dance, via=straight_way(dance.postures[:-1], dance.postures[1:]))
+    straight = replace(dance, via=straight_via(dance.postures[:-1], dance.postures[1:]))
     dynamic, paths = [], []
     for phase in (phase for phase in dance.phases if phase.kind == "move"):
         time = np.linspace(phase.start, phase.end, round((phase.end - phase.start) * _RATE) + 1)
@@ -92,19 +89,3 @@ def dance_metrics(dance: Dance, plan: Plan) -> DanceMetrics:
     first, second = (float(sum(w for w, pick in pair if pick)) for pair in pairs)
     hardly = tuple(dance.body.segments[i] for i in poor)
     return DanceMetrics(static, first, np.array(dynamic), second, hardly, tuple(paths))
-
-
-def criterion_of(body: Body, motion: Motion) -> tuple[float, float]:
-    """Return the paper's criterion (eq. 12), static and dynamic, kg, of any motion: of the directions of gravity in the
-    segments at every instant, and of their angular velocities and accelerations. The bound of both is the mass of
-    the segments that have such parameters.
-    """
-    parts, segments = excitation_blocks(body), segment_motion(body, motion)
-    turned = np.swapaxes(segments.rotation, -1, -2)
-    w, dw = (
-        np.einsum("tnij,tnj->tni", turned, value)
-        for value in (segments.angular_velocity, segments.angular_acceleration)
-    )
-    K = moments(w, dw)
-    gram = np.einsum("tnik,tnil->nkl", K, K) / motion.rate + _LITTLE * np.eye(6)
-    return total(parts.weight, static_grams(turned[..., 2]), parts.first)[0], total(parts.weight, gram, parts.second)[0]

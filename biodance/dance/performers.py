@@ -4,12 +4,11 @@ place is everybody's own and not judged.
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biodance.dance.dance import Dance
 from biodance.dance.imprecision import USUAL_IMPRECISION, Imprecision, PlannedDance, draw_clock
@@ -48,7 +47,7 @@ class PerformersMargin:
 
 
 @dataclass(frozen=True)
-class Rehearsed:
+class PerformersResult:
     """What ``count`` imprecise performers leave of every limit that they must keep: ``least_margins``; ``bad`` postures
     (indices) at which somebody had too little, with the limit; ``failed`` the numbers of those people.
     """
@@ -81,43 +80,62 @@ def for_imprecise(limits: Iterable[Limit]) -> dict[Limit, ForImprecise]:
     return {limit: asked for limit, asked in found if asked is not None}
 
 
-@one_thread()
-def rehearse_imprecisely(
+def try_performers(
     dance: Dance,
     limits: tuple[Limit, ...],
     *,
     who: Sequence[int] = range(PERFORMER_COUNT),
     only: tuple[int, ...] = (),
     how: Imprecision = USUAL_IMPRECISION,
-) -> Rehearsed:
+    workers: Executor | None = None,
+) -> PerformersResult:
     """Return what performers leave of the ``limits`` in ``dance``; ``who`` are their numbers, and each is the same
-    whoever else dances. ``only``: neighbouring postures (indices) to or in which they are looked at.
+    whoever else dances. ``only``: neighbouring postures (indices) to or in which they are looked at. ``workers``: two
+    of them look at half of the performers each.
     """
-    people = [_person(dance, k, only, how) for k in who]
+    if workers is None:
+        parts = [_rooms(dance, limits, who, only, how)]
+    else:
+        half = (len(who) + 1) // 2
+        halves = [some for some in (who[:half], who[half:]) if some]
+        tasks = [workers.submit(_rooms, dance, limits, some, only, how) for some in halves]
+        parts = [task.result() for task in tasks]
+    margins, bad, failed = list[PerformersMargin](), set[tuple[int, str]](), set[int]()
+    for limit, asked in for_imprecise(limits).items():
+        room = np.concatenate([part[limit.name][0] for part in parts])
+        what = [name for part in parts for name in part[limit.name][1]]
+        short = room < asked.least
+        k, p = np.unravel_index(int(room.argmin()), room.shape)
+        share = float(short.any(axis=1).mean())
+        margins.append(PerformersMargin(limit.name, limit.unit, asked.least, float(room[k, p]), int(p), what[k], share))
+        bad |= {(int(posture), limit.name) for posture in np.flatnonzero(short.any(axis=0))}
+        failed |= {who[int(one)] for one in np.flatnonzero(short.any(axis=1))}
+    return PerformersResult(len(who), tuple(margins), tuple(sorted(bad)), tuple(sorted(failed)))
+
+
+@one_thread()
+def _rooms(
+    dance: Dance, limits: tuple[Limit, ...], who: Sequence[int], only: tuple[int, ...], how: Imprecision
+) -> dict[str, tuple[Array, list[str]]]:
+    """Return for every limit the least that each performer leaves on the way to and in every posture (K, P), infinite
+    where nobody looked, and where in the body that is least (K).
+    """
+    people, asked = [_person(dance, k, only, how) for k in who], for_imprecise(limits)
     when = np.concatenate([when[part] for _, _, when, part in people])
-    plan, postures = PlannedDance(dance, (when.min(), when.max())), len(dance.postures)
-    asked = for_imprecise(limits)
-    found: dict[Limit, list[_Least]] = {limit: [] for limit in asked}
+    plan, room = PlannedDance(dance, (when.min(), when.max())), {limit.name: list[Array]() for limit in asked}
+    what = {limit.name: list[str]() for limit in asked}
     for some in _groups(people):
         copy, end = plan.performed_by(some, how), np.cumsum([when[part].size for _, _, when, part in some])
-        posture, inside = plan.posture[copy.on], [slice(a + 2, b - 2) for a, b in pairwise([0, *end])]
+        posture = plan.posture[copy.on]
         for limit, one in asked.items():
             left = one.left(copy)
             value = np.where(plan.stepping[copy.on][:, None], np.inf, left.value)
-            for own in inside:
-                what = left.of[int(value[own].min(axis=0).argmin())]
-                found[limit].append(_Least.of(value[own].min(axis=1), posture[own], postures, what))
-    least_margins = tuple(_joined(limit, asked[limit].least, least) for limit, least in found.items())
-    bad = {
-        (int(p), limit.name)
-        for limit, parts in found.items()
-        for one in parts
-        for p in np.flatnonzero(one.each < asked[limit].least)
-    }
-    failed = {
-        k for limit, parts in found.items() for k, one in zip(who, parts, strict=True) if one.room < asked[limit].least
-    }
-    return Rehearsed(len(who), least_margins, tuple(sorted(bad)), tuple(sorted(failed)))
+            for first, last in pairwise([0, *end]):
+                own, each = slice(first + 2, last - 2), np.full(len(dance.postures), np.inf)
+                np.minimum.at(each, posture[own], value[own].min(axis=1))
+                room[limit.name].append(each)
+                what[limit.name].append(left.of[int(value[own].min(axis=0).argmin())])
+    return {name: (np.array(rows), what[name]) for name, rows in room.items()}
 
 
 _Person = tuple[np.random.Generator, Array, Array, slice]
@@ -161,54 +179,3 @@ def deviations_of_copies(dance: Dance, limits: tuple[Limit, ...], when: Array) -
         below = np.sqrt(2 * np.mean(np.minimum(left - usual[:, None], 0.0) ** 2, axis=1))
         found.append((float(((usual - one.least) / np.maximum(below, _STILL)).min(initial=np.inf)), limit.name))
     return min(found)
-
-
-def perform_with(
-    workers: Executor,
-    dance: Dance,
-    limits: tuple[Limit, ...],
-    *,
-    who: Sequence[int] = range(PERFORMER_COUNT),
-    only: tuple[int, ...] = (),
-) -> Rehearsed:
-    """Return what `rehearse_imprecisely` does, found by two ``workers`` side by side."""
-    half = (len(who) + 1) // 2
-    tasks = [
-        workers.submit(rehearse_imprecisely, dance, limits, who=part, only=only)
-        for part in (who[:half], who[half:])
-        if part
-    ]
-    parts = [task.result() for task in tasks]
-    count = sum(part.count for part in parts)
-
-    def together(least_margins: tuple[PerformersMargin, ...]) -> PerformersMargin:
-        failing = sum(part.count * room.failing for part, room in zip(parts, least_margins, strict=True)) / count
-        return replace(min(least_margins, key=lambda room: room.worst), failing=failing)
-
-    least_margins = tuple(together(some) for some in zip(*(part.least_margins for part in parts), strict=True))
-    bad = tuple(sorted({bad for part in parts for bad in part.bad}))
-    return Rehearsed(count, least_margins, bad, tuple(k for part in parts for k in part.failed))
-
-
-def _joined(limit: Limit, least: float, found: list["_Least"]) -> PerformersMargin:
-    """Return the worst of all performers."""
-    worst = min(found, key=lambda one: one.room)
-    failing = float(np.mean([one.room < least for one in found]))
-    return PerformersMargin(limit.name, limit.unit, least, worst.room, worst.posture, worst.what, failing)
-
-
-@dataclass(frozen=True, eq=False)
-class _Least:
-    """The least ``room`` of one performer, at which ``posture``, of ``what``; ``each`` (P,) that of every posture."""
-
-    room: float
-    posture: int
-    what: str
-    each: Array
-
-    @classmethod
-    def of(cls, left: Array, posture: NDArray[np.intp], count: int, what: str) -> "_Least":
-        """Return the least of ``left`` (T,), on the way to and in each ``posture`` (T,) of ``count``."""
-        each, worst = np.full(count, np.inf), int(left.argmin())
-        np.minimum.at(each, posture, left)
-        return cls(float(left[worst]), int(posture[worst]), what, each)

@@ -8,6 +8,7 @@ is checked on the robot as it is.
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +18,15 @@ from biodance.body.body import Body
 from biodance.body.robot.similarity import SimilarityScale, similar_body
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
-from biodance.dance.expectation import Expectation, parameter_deviations
+from biodance.dance.expectation import Expectation, evenly_spread
 from biodance.dance.limits import Limit
 from biodance.dance.limits.balance import Balance
-from biodance.dance.postures.posture import intermediate_posture
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import FOLLOWABLE_SHARE, Plan
 from biodance.dance.problem.stance import Stance
-from biodance.dance.transitions.move import Task
-from biodance.dance.transitions.schedule import find_way
+from biodance.dance.search.move import Task, exciting_move
+from biodance.dance.search.posture import intermediate_posture
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
@@ -57,19 +57,19 @@ def reposition(dance: Dance, plan: Plan) -> Dance:
         rest = rest_posture(dance, plan)
         ends, feet = np.array([rest, dance.postures[0]]), replace(dance.stances[0], over=None)
         task = Task(dance.chain, excitation_blocks(dance.body), feet, ends, plan.move, plan.limits)
-        way = find_way(task, np.zeros((len(dance.body.segments), 6, 6)), [dance.seed, _WHERE])
+        move = exciting_move(task, np.zeros((len(dance.body.segments), 6, 6)), [dance.seed, _WHERE])
     except BiodanceError as why:
         return _without(dance, str(why))
-    if way.limit:
-        return _without(dance, f"the limit {way.limit.replace('_', ' ')} forbids it")
-    more = 1 + len(way.stops)
+    if move.limit:
+        return _without(dance, f"the limit {move.limit.replace('_', ' ')} forbids it")
+    more = 1 + len(move.stops)
     return replace(
         dance,
-        postures=np.concatenate([rest[None], way.stops, dance.postures]),
+        postures=np.concatenate([rest[None], move.stops, dance.postures]),
         stances=(*(feet,) * more, *dance.stances),
         hold=np.concatenate([np.zeros(more), dance.hold]),
-        via=np.concatenate([way.via, dance.via]),
-        move=np.concatenate([way.duration, dance.move]),
+        via=np.concatenate([move.via, dance.via]),
+        move=np.concatenate([move.duration, dance.move]),
         under=(*(feet,) * more, *dance.under),
     )
 
@@ -209,15 +209,11 @@ def expect_robot(dance: Dance) -> Expectation:
     """Return what is expected after ten durations of ``dance``, evenly spread, if it is danced exactly."""
     body, motion = dance.body, dance.motion(_RATE)
     rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
-    ends = [phase.end for phase in dance.phases if phase.kind == "hold"]
-    chosen = [ends[k] for k in sorted({int(k) for k in np.linspace(0, len(ends) - 1, _STEPS + 1).round()[1:]})]
-    triangle, start = np.zeros((rows.shape[1], rows.shape[1])), 0
-    posteriors = [find_posterior(Information(triangle, 1), body.sip)]
-    for end in chosen:
-        stop = int(np.searchsorted(motion.time, end)) * 6
-        triangle, start = fold(rows[start:stop], triangle), stop
-        posteriors.append(find_posterior(Information(triangle, stop), body.sip))
-    sd = np.array([parameter_deviations(posterior) for posterior in posteriors])
-    share = np.array([posterior.information.reshape(-1, 10).mean(axis=1) for posterior in posteriors])
-    mass, com, inertia = np.moveaxis(sd, 2, 0)
-    return Expectation(body.segments, np.array([0.0, *chosen]), mass, com, inertia, share)
+    ends = [dance.phases[k].end for k in evenly_spread(dance, _STEPS)]
+    stops = [0, *(6 * int(np.searchsorted(motion.time, end)) for end in ends)]
+    triangles = [np.zeros((rows.shape[1], rows.shape[1]))]
+    for start, stop in pairwise(stops):
+        triangles.append(fold(rows[start:stop], triangles[-1]))
+    known = zip(triangles, (1, *stops[1:]), strict=True)
+    posteriors = [find_posterior(Information(triangle, count), body.sip) for triangle, count in known]
+    return Expectation.of(body, np.array([0.0, *ends]), posteriors)

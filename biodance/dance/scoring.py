@@ -14,16 +14,12 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.expectation import gram_of, posterior_after, shares, typical_noise
+from biodance.dance.expectation import JUDGED_RATE, MovementEvidence, movement_evidence, removed_shares, typical_noise
 from biodance.errors import BiodanceError
-from biodance.identification.mismatch import Mismatch, mismatch
-from biodance.identification.statistics import Fit, statistics
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Motion
+from biodance.records import Motion
 from biodance.uncertainty.noise import Noise
 
-_RATE = 12.5
-"""Hz at which movements are judged, as in `dance.expectation`."""
 _STILL = 1.0
 """s: a hold says nothing more after this time."""
 PROPOSED = 3
@@ -96,28 +92,6 @@ class PerformanceScore:
         return tuple(one.transition for one in self.repetitions)
 
 
-@dataclass(frozen=True, eq=False)
-class Worth:
-    """What movements tell of a body: information ``H`` (p, p) and the scores of what disturbs it; adds up."""
-
-    H: Array
-    disturbed: Mismatch
-
-    def __add__(self, other: "Worth") -> "Worth":
-        """Return the worth of both."""
-        a, b = self.disturbed, other.disturbed
-        return Worth(self.H + other.H, Mismatch(a.kinematics + b.kinematics, a.plates + b.plates))
-
-
-def worth_of(body: Body, motion: Motion, use: NDArray[np.bool_] | None = None, *, noise: Noise) -> Worth:
-    """Return what a ``motion`` of ``body`` tells at its frames ``use`` (T,), judged at 12.5 Hz under ``noise``."""
-    step = max(1, round(motion.rate / _RATE))
-    few = Motion(motion.time[::step], motion.q[::step], motion.v[::step], motion.a[::step])
-    used = np.ones(few.time.size, dtype=bool) if use is None else use[::step]
-    fit = Fit("movement", few, predict_wrench(body, few), used)
-    return Worth(gram_of(statistics(body, fit, noise).information(noise)), mismatch(body, (fit,), noise))
-
-
 def score_performance(
     dance: Dance, body: Body, recorded: tuple[tuple[Motion, NDArray[np.bool_]], ...]
 ) -> PerformanceScore:
@@ -135,17 +109,15 @@ def score_performance(
     if not any(use.any() for _, use in recorded):
         raise BiodanceError("No trial with role fit has motion and plates, so nobody knows how the dance was danced.")
     brief = replace(dance, hold=np.minimum(dance.hold, _STILL))
-    plan = _in_joints_of(body, dance, brief.motion(_RATE))
+    plan = _in_joints_of(body, dance, brief.motion(JUDGED_RATE))
     noise = typical_noise(predict_wrench(body, plan))
-    planned = _shares(body, worth_of(body, plan, noise=noise))
-    parts = [worth_of(body, motion, use, noise=noise) for motion, use in recorded if use.any()]
-    reached = sum(parts[1:], parts[0])
-    rows = tuple(
-        SegmentExcitation(*row)
-        for row in zip(body.segments, planned.tolist(), _shares(body, reached).tolist(), strict=True)
-    )
+    planned = removed_shares(movement_evidence(body, plan, noise=noise).posterior())
+    parts = [movement_evidence(body, motion, use, noise=noise) for motion, use in recorded if use.any()]
+    total = sum(parts[1:], parts[0])
+    reached = removed_shares(total.posterior())
+    rows = tuple(SegmentExcitation(*row) for row in zip(body.segments, planned.tolist(), reached.tolist(), strict=True))
     seconds = sum(float(use.sum()) / motion.rate for motion, use in recorded)
-    return PerformanceScore(dance.protocol, rows, _repetitions(dance, body, reached, noise), seconds)
+    return PerformanceScore(dance.protocol, rows, _repetitions(dance, body, total, noise), seconds)
 
 
 def _same_joints(dance: Dance, body: Body) -> None:
@@ -158,11 +130,7 @@ def _same_joints(dance: Dance, body: Body) -> None:
         )
 
 
-def _shares(body: Body, known: Worth) -> Array:
-    return shares(posterior_after(body, known.H, known.disturbed))
-
-
-def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise) -> tuple[Repetition, ...]:
+def _repetitions(dance: Dance, body: Body, known: MovementEvidence, noise: Noise) -> tuple[Repetition, ...]:
     """Return the transitions that gain most beside what is ``known``, best first; steps to another place, which the
     feet cannot simply repeat, are left out.
     """
@@ -174,8 +142,8 @@ def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise) -> tuple[
     }
     out: list[Repetition] = []
     while some and len(out) < PROPOSED:
-        before = _shares(body, known)
-        gains = {phase: _shares(body, known + worth) - before for phase, worth in some.items()}
+        before = removed_shares(known.posterior())
+        gains = {phase: removed_shares((known + one).posterior()) - before for phase, one in some.items()}
         best = max(gains, key=lambda phase: float(gains[phase].mean()))
         segment = body.segments[int(np.argmax(gains[best]))]
         out.append(Repetition(best.posture, best.start, best.end, float(gains[best].mean()), segment))
@@ -183,13 +151,13 @@ def _repetitions(dance: Dance, body: Body, known: Worth, noise: Noise) -> tuple[
     return tuple(out)
 
 
-def _once(dance: Dance, body: Body, start: float, end: float, noise: Noise) -> Worth:
+def _once(dance: Dance, body: Body, start: float, end: float, noise: Noise) -> MovementEvidence:
     """Return what the planned movement between two instants tells, at the rate of the judgement."""
-    time = np.arange(max(2, round((end - start) * _RATE)) + 1) / _RATE
+    time = np.arange(max(2, round((end - start) * JUDGED_RATE)) + 1) / JUDGED_RATE
     phase = next(phase for phase in dance.phases if phase.start == start)
     state = dance.state(phase, np.minimum(start + time, end))
     motion = dance.chain.motion(time, state.x, state.v, state.a)
-    return worth_of(body, _in_joints_of(body, dance, motion), noise=noise)
+    return movement_evidence(body, _in_joints_of(body, dance, motion), noise=noise)
 
 
 def _in_joints_of(body: Body, dance: Dance, motion: Motion) -> Motion:

@@ -12,19 +12,18 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, cause_columns, motion_changes, without
-from biodance.identification.learning import START, WORTH
-from biodance.identification.mismatch import SHORTEST
+from biodance.identification.learning import WORTH
+from biodance.identification.mismatch import long_runs
 from biodance.identification.posterior import prior_factor
-from biodance.identification.robot import RobotMotion
-from biodance.identification.robot_errors import THINNED, place_changes, slow_wrench, some_frames
+from biodance.identification.robot import RobotMotion, robot_start
+from biodance.identification.robot_errors import THINNED, place_changes, slow_wrench
 from biodance.identification.statistics import Statistics, empty
 from biodance.motion.regressor import regressor
 from biodance.records import Array
 from biodance.threads import one_thread
-from biodance.uncertainty.learning import Moments, maximise, noise_of
+from biodance.uncertainty.learning import maximise, noise_of
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import plate_errors, plate_sources
-from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
 _CLEAR, _LIKE = 8.0, 3.0
 """Nats: least evidence of a cause; causes within so many of the best are not told apart from it."""
@@ -51,34 +50,6 @@ class RobotFinding:
     rivals: tuple[RobotCause, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class _Products:
-    """Second moments as `Statistics`, in the order in which they are summed: ``gram`` (B 36, (c + 1)²)."""
-
-    gram: Array
-    count: Array
-
-    @classmethod
-    def of(cls, parts: list[Statistics]) -> "_Products":
-        """Return the sum of some trials."""
-        gram = np.sum([part.gram for part in parts], axis=0)
-        flat = gram.transpose(0, 1, 3, 2, 4).reshape(36 * len(gram), -1)
-        return cls(flat, np.sum([part.count for part in parts], axis=0, dtype=float))
-
-    def equations(self, noise: Noise) -> tuple[Array, Array]:
-        """Return X' S^-1 X (c, c) and X' S^-1 y (c,)."""
-        flat = np.linalg.inv(noise.covariance).ravel() @ self.gram
-        H = flat.reshape(2 * (round(np.sqrt(flat.size)),))
-        return H[:-1, :-1], H[:-1, -1]
-
-    def moments(self, mean: Array, covariance: Array) -> Moments:
-        """Return what unknowns of this ``mean`` (c,) and ``covariance`` (c, c) leave."""
-        z = np.append(-mean, 1.0)
-        square = np.outer(z, z)
-        square[:-1, :-1] += covariance
-        return Moments((self.gram @ square.ravel()).reshape(-1, 6, 6), self.count)
-
-
 @one_thread()
 def robot_causes(
     body: Body, fitted: tuple[RobotMotion, ...], kept: tuple[RobotMotion, ...] = ()
@@ -91,13 +62,12 @@ def robot_causes(
     trials, found = (*fitted, *kept), list[RobotFinding]()
     columns = cause_columns(body, fitted, trials)
     size, here = prior_factor(body.sip).shape[1], np.array(columns.usual)
-    noise = replace(columns.layout, covariance=np.tile(_start(body), (len(columns.layout.bands), 1, 1)))
+    noise = replace(columns.layout, covariance=np.tile(robot_start(body), (len(columns.layout.bands), 1, 1)))
     while True:
         first, *rest = _gathered(body, trials, len(fitted), columns)
-        noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), _start(body))
-        fit = first.equations(noise)
-        more = rest[0].equations(noise) if rest else (0.0, 0.0)
-        every = fit[0] + more[0], fit[1] + more[1]
+        noise = _learned(first, noise, np.append(np.ones(size), np.maximum(columns.wide, here)), robot_start(body))
+        fit = _equations(first, noise)
+        every = _equations(sum(rest, first), noise)
         found, trials = _refined(body, found, trials, columns, every, here)
         gain, both = (_gains(A, b, here, columns.wide)[size:] for A, b in (fit, every))
         best, rivals = _chosen(columns, both, both - gain, [one.cause for one in found])
@@ -146,10 +116,10 @@ def _refined(
     return out, trials
 
 
-def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: Columns) -> list[_Products]:
-    """Return the products of the ``fitted`` first trials, and of the others where there are some."""
+def _gathered(body: Body, trials: tuple[RobotMotion, ...], fitted: int, columns: Columns) -> list[Statistics]:
+    """Return the second moments of the ``fitted`` first trials, and of the others where there are some."""
     parts = [_products(body, one, columns, k) for k, one in enumerate(trials)]
-    return [_Products.of(some) for some in (parts[:fitted], parts[fitted:]) if some]
+    return [sum(some[1:], some[0]) for some in (parts[:fitted], parts[fitted:]) if some]
 
 
 def _products(body: Body, one: RobotMotion, columns: Columns, trial: int) -> Statistics:
@@ -161,36 +131,29 @@ def _products(body: Body, one: RobotMotion, columns: Columns, trial: int) -> Sta
     first, some = columns.places[trial]
     first -= changes.shape[2] + len(plates.delay)
     total = empty(count, layout)
-    gram, frames = total.gram.copy(), total.count.copy()
-    for pick in layout.bands.runs(fit.use, fit.motion.rate):
-        if pick.size < SHORTEST:
-            continue
-        motion = some_frames(fit.motion, pick)
+    for _, pick in long_runs((fit,), layout.bands):
+        motion = fit.motion.at(pick)
         W = regressor(body, motion)
         places = np.zeros((pick.size, 6, len(columns.causes) - changes.shape[2] - len(plates.delay)))
         places[:, :, first : first + some] = place_changes(slow[pick], one.grounded, pick)
         near = np.minimum(pick // THINNED, len(changes) - 1)
         faults = plate_errors(slow[pick], motion.rate, layout, plates)
         left = (fit.wrench.value[pick] - W @ body.sip.phi)[:, :, None]
-        rows = np.concatenate([W @ S, changes[near], faults, places, left], axis=2)
-        X = layout.bands.coefficients(layout.shift @ rows)
-        band = layout.bands.at(fit.motion.rate).of(len(X))
-        for b in np.unique(band[band >= 0]):
-            flat = X[band == b].reshape(-1, 6 * (count + 1))
-            gram[b] += (flat.T @ flat).reshape(6, count + 1, 6, count + 1)
-            frames[b] += len(flat)
-    return Statistics(gram, frames, layout)
+        total.add(np.concatenate([W @ S, changes[near], faults, places, left], axis=2), fit.motion.rate)
+    return total
 
 
-def _start(body: Body) -> Array:
-    return np.asarray(START * (float(body.sip.mass.sum()) / REFERENCE_PERSON) ** 2)
+def _equations(total: Statistics, noise: Noise) -> tuple[Array, Array]:
+    """Return X' S^-1 X (c, c) and X' S^-1 y (c,)."""
+    H = total.normal_matrix(noise)
+    return H[:-1, :-1], H[:-1, -1]
 
 
-def _learned(total: _Products, noise: Noise, sd: Array, start: Array) -> Noise:
+def _learned(total: Statistics, noise: Noise, sd: Array, start: Array) -> Noise:
     """Return the noise that is left where every cause may be there, from ``noise`` on."""
 
     def improved(before: Noise) -> Noise:
-        A, b = total.equations(before)
+        A, b = _equations(total, before)
         covariance = _posterior(A, sd)
         left = noise_of(total.moments(covariance @ b, covariance), start=start, worth=WORTH)
         return replace(before, covariance=left)

@@ -66,7 +66,7 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float |
     whole, found = parts_as_segments(body), nothing(body)
     sources = of_markers(whole)
     scores, plate_scores = np.array(found.kinematics), np.array(found.plates)
-    for fit, pick in _runs(fits, noise.bands):
+    for fit, pick in long_runs(fits, noise.bands):
         motion = fit.motion.at(pick)
         weight, wrong = _weighed(body, motion, noise.at(fit.motion.rate))
         plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
@@ -93,8 +93,8 @@ def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
     whole = parts_as_segments(body)
     sources = of_markers(whole)
     variance, predicted, observed = deviations(whole, sources) ** 2, 0.0, 0.0
-    every = max(EVERY, sum(pick.size for _, pick in _runs(fits, bands)) // PREDICTING)
-    for fit, pick in _runs(fits, bands):
+    every = max(EVERY, sum(pick.size for _, pick in long_runs(fits, bands)) // PREDICTING)
+    for fit, pick in long_runs(fits, bands):
         residual = fit.motion.residual[pick]
         if residual.shape[1] and np.isfinite(residual).any():
             few = pick[:: min(every, max(1, pick.size // 2))]
@@ -104,7 +104,7 @@ def softness(body: Body, fits: tuple[Fit, ...], bands: Bands) -> float:
     return float(np.sqrt(max(1.0, observed / predicted))) if predicted > 0 else 1.0
 
 
-def _runs(fits: tuple[Fit, ...], bands: Bands) -> Iterator[tuple[Fit, Index]]:
+def long_runs(fits: tuple[Fit, ...], bands: Bands) -> Iterator[tuple[Fit, Index]]:
     """Yield every run of used frames that is long enough, with its trial."""
     for fit in fits:
         for pick in bands.runs(fit.use, fit.motion.rate):

@@ -14,8 +14,8 @@ from biodance.body.body import Body
 from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
 from biodance.identification.identification import Identification, conclude
 from biodance.identification.learning import START, learn_noise
-from biodance.identification.mismatch import SHORTEST, Mismatch
-from biodance.identification.robot_errors import THINNED, place_changes, places_of, some_frames, zero_changes
+from biodance.identification.mismatch import Mismatch, long_runs
+from biodance.identification.robot_errors import THINNED, place_changes, places_of, zero_changes
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.motion.grounded import Grounded
 from biodance.motion.regressor import regressor
@@ -58,10 +58,10 @@ def innovation(body: Body, one: RobotMotion) -> float:
     Channels count in units of their allowance, to which the start of the noise is added; 1 is usual.
     """
     pick = np.flatnonzero(one.fit.use)[:: 4 * THINNED]
-    motion = some_frames(one.fit.motion, pick)
+    motion = one.fit.motion.at(pick)
     W = regressor(body, motion)
     left = one.fit.wrench.value[pick] - W @ body.sip.phi
-    allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(_start(body))
+    allowed = np.einsum("tci,ij,tcj->tc", W, body.sip.covariance, W, optimize=True) + np.diag(robot_start(body))
     return float(np.sqrt(np.mean(left**2 / allowed)))
 
 
@@ -78,7 +78,7 @@ def identify_links(body: Body, trials: tuple[RobotMotion, ...]) -> tuple[Identif
     fits, about, notes = usable(body, tuple(one.fit for one in trials))
     layout = layout_for(about, _BANDS)
     total = statistics_together(body, fits, layout)
-    noise, _ = learn_noise(total, body.sip, start=_start(body))
+    noise, _ = learn_noise(total, body.sip, start=robot_start(body))
     by_name = {fit.name: fit for fit in fits}
     found = _errors(body, tuple((by_name[one.fit.name], one) for one in trials if one.fit.name in by_name), noise)
     done = conclude(body, total, tuple(by_name), noise=noise, found=found, prior=body.sip, machine=True)
@@ -91,7 +91,7 @@ def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BasePar
     """
     layout = layout_for(about, WHITE)
     total = statistics_together(body, fits, layout)
-    noise, phi = replace(layout, covariance=_start(body)[None]), np.zeros(10 * len(body.segments))
+    noise, phi = replace(layout, covariance=robot_start(body)[None]), np.zeros(10 * len(body.segments))
     for _ in range(_ROUNDS):
         found = estimate_base(total.information(noise), base)
         phi[list(base.columns)] = found.value
@@ -100,7 +100,7 @@ def _as_the_paper(body: Body, fits: tuple[Fit, ...], about: Array, base: BasePar
     return found
 
 
-def _start(body: Body) -> Array:
+def robot_start(body: Body) -> Array:
     """Return the noise (6, 6) that learning starts with: that of a person, as much smaller as the robot is lighter."""
     return np.asarray(START * (float(body.sip.mass.sum()) / REFERENCE_PERSON) ** 2)
 
@@ -114,10 +114,8 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
         place = np.zeros((size, places_of(one.grounded)))
         changes = zero_changes(body, one.grounded, one.angle)
         white = noise.at(fit.motion.rate)
-        for pick in noise.bands.runs(fit.use, fit.motion.rate):
-            if pick.size < SHORTEST:
-                continue
-            motion = some_frames(fit.motion, pick)
+        for _, pick in long_runs((fit,), noise.bands):
+            motion = fit.motion.at(pick)
             W = regressor(body, motion)
             weight, wrench = white.weighted(W), W @ body.sip.phi
             encoders += np.tensordot(weight, changes[pick // THINNED], axes=((0, 1), (0, 1)))

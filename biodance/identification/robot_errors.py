@@ -42,11 +42,6 @@ THINNED = 4
 """Every so many frames are enough to see what an encoder's zero does."""
 
 
-def some_frames(motion: Motion, pick: "slice | np.ndarray") -> Motion:
-    """Return the chosen frames of a motion."""
-    return motion.at(pick)
-
-
 def zero_changes(body: Body, one: Grounded, angle: Array) -> Array:
     """Return the change (T / `THINNED`, 6, n) of the needed wrench by `ZERO` rad at every joint's encoder, of a motion
     with joint ``angle`` (T, n) rad.

@@ -79,16 +79,33 @@ class Statistics:
             )
         return Statistics(self.gram + other.gram, self.count + other.count, self.layout)
 
+    def add(self, rows: Array, rate: float, bands: int | None = None) -> None:
+        """Add the second moments of ``rows`` (T, 6, p + 1) of [W y] at ``rate`` Hz in the first ``bands``, by default
+        all, to the arrays.
+        """
+        X, size = self.layout.bands.coefficients(self.layout.shift @ rows), self.gram.shape[2]
+        band = self.layout.bands.at(rate).of(len(X))
+        for b in np.unique(band[(band >= 0) & (band < (len(self.gram) if bands is None else bands))]):
+            flat = X[band == b].reshape(-1, 6 * size)
+            self.gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
+            self.count[b] += len(flat)
+
     def slower(self) -> "Statistics":
         """Return the statistics without their fastest band."""
         bands = replace(self.layout.bands, edges=self.layout.bands.edges[:-1])
         return Statistics(self.gram[:-1], self.count[:-1], layout_for(self.layout.about, bands))
 
-    def information(self, noise: Noise) -> Information:
-        """Return the R factor of the data whitened by ``noise`` (same bands)."""
+    def normal_matrix(self, noise: Noise) -> Array:
+        """Return the sum over bands of X' S^-1 X (p + 1, p + 1), X = [W y], S the covariance of ``noise`` (same
+        bands).
+        """
         weight = np.linalg.inv(noise.covariance)
         half = np.tensordot(weight[:, *_PAIRS] * np.where(_PAIRS[0] == _PAIRS[1], 0.5, 1.0), self._pairs, axes=2)
-        H = half + half.T
+        return np.asarray(half + half.T)
+
+    def information(self, noise: Noise) -> Information:
+        """Return the R factor of the data whitened by ``noise`` (same bands)."""
+        H = self.normal_matrix(noise)
         scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
         value, vector = np.linalg.eigh(H / np.outer(scale, scale))
         rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
@@ -148,21 +165,12 @@ def _add(body: Body, fit: Fit, total: Statistics) -> None:
         raise TrialRefused(
             f"Trial {fit.name}: no frame may be used (ground contact not measured, or markers hidden in all frames)."
         )
-    gram, count, layout = total.gram, total.count, total.layout
-    size = gram.shape[2]
-    for pick in layout.bands.runs(fit.use, fit.motion.rate):
-        part = fit.motion.at(pick)
-        moved = segment_motion(body, part)
+    for pick in total.layout.bands.runs(fit.use, fit.motion.rate):
+        moved = segment_motion(body, fit.motion.at(pick))
         rows = regressor_of(moved, gravity=body.gravity, sharing=body.sharing)
         rows = np.concatenate([rows, fit.wrench.value[pick][:, :, None]], axis=2)
-        rows = layout.shift @ rows
-        X = layout.bands.coefficients(rows)
-        band = layout.bands.at(fit.motion.rate).of(len(X))
-        last = POSTURE_BANDS if _is_standing(moved.position) and not layout.bands.white else len(gram)
-        for b in np.unique(band[(band >= 0) & (band < last)]):
-            flat = X[band == b].reshape(-1, 6 * size)
-            gram[b] += (flat.T @ flat).reshape(6, size, 6, size)
-            count[b] += len(flat)
+        still = _is_standing(moved.position) and not total.layout.bands.white
+        total.add(rows, fit.motion.rate, POSTURE_BANDS if still else None)
 
 
 def _is_standing(position: Array) -> bool:

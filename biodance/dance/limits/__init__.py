@@ -18,8 +18,8 @@ import numpy as np
 
 from biodance.dance.limits._checked import NOTHING as NOTHING
 from biodance.dance.limits._checked import CheckedMotion as CheckedMotion
-from biodance.dance.limits._checked import Copied as Copied
 from biodance.dance.limits._checked import ForImprecise as ForImprecise
+from biodance.dance.limits._checked import ImpreciseCopy as ImpreciseCopy
 from biodance.dance.limits._checked import Remaining as Remaining
 from biodance.dance.problem.nlp import FAR as FAR
 from biodance.dance.problem.nlp import Margins as Margins

@@ -79,7 +79,7 @@ class CheckedMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class Copied:
+class ImpreciseCopy:
     """A dance as somebody copied it: coordinates ``q`` (T, nq) of ``body`` at ``time`` (T,) s, at equal intervals; on
     the feet ``stances[on[t]]``. ``still`` True where the frames are held postures, and not one after the other.
     """
@@ -139,7 +139,7 @@ class ForImprecise:
     in results.json, ``words`` say what it is, after a number of cm.
     """
 
-    left: Callable[[Copied], Remaining]
+    left: Callable[[ImpreciseCopy], Remaining]
     least: float
     key: str
     words: str

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.dance.limits import CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
+from biodance.dance.limits import CheckedMotion, ForImprecise, ImpreciseCopy, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.records import Array
@@ -53,7 +53,7 @@ class Balance(Limit):
 LIMIT = Balance
 
 
-def _left(copy: Copied) -> Remaining:
+def _left(copy: ImpreciseCopy) -> Remaining:
     """Return the distance (T, kinds of stance) m inside the whole support, infinite where another stance is taken."""
     names = tuple(dict.fromkeys(copy.stances[k].name for k in np.unique(copy.on)))
     taken = np.array([stance.name for stance in copy.stances])[copy.on]

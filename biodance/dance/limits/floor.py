@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.dance.limits import CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
+from biodance.dance.limits import CheckedMotion, ForImprecise, ImpreciseCopy, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.shapes import Solids
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import Poses, poses
@@ -107,7 +107,7 @@ def _lowest(body: Body, pose: Poses) -> Array:
     return np.stack(out, axis=1)
 
 
-def _left(copy: Copied) -> Remaining:
+def _left(copy: ImpreciseCopy) -> Remaining:
     """Return the height (T, parts) m of the lowest point of every part."""
     segments = np.unique(LowParts.of(copy.body).segment)
     return Remaining(_lowest(copy.body, copy.pose), tuple(copy.body.segments[segment] for segment in segments))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.limits import FAR, CheckedMotion, Copied, ForImprecise, Limit, Margins, Remaining, bounded
+from biodance.dance.limits import FAR, CheckedMotion, ForImprecise, ImpreciseCopy, Limit, Margins, Remaining, bounded
 from biodance.dance.problem.shapes import Solids, points_apart, points_off_box, points_on_axis
 from biodance.dance.problem.state import State
 from biodance.motion.kinematics import Poses
@@ -54,7 +54,7 @@ class SelfCollision(Limit):
 LIMIT = SelfCollision
 
 
-def _left(copy: Copied) -> Remaining:
+def _left(copy: ImpreciseCopy) -> Remaining:
     """Return the distances (T, pairs) m between surfaces, in closed form; large ones of moving people: lower bounds."""
     return Remaining(*surface_distances(copy.body, copy.pose, near=np.inf if copy.still else _CLOSE))
 

@@ -197,7 +197,7 @@ def stature_of(body: Body) -> float:
     return max(tops) - float(pose.points([foot.segment], foot.outline[:1])[0, 0, 2])
 
 
-def under(first: Stance, second: Stance) -> Stance:
+def feet_in_move(first: Stance, second: Stance) -> Stance:
     """Return the feet on the ground during the move from one stance to the next."""
     for one in (first, second):
         if len(one.planted) < 2:

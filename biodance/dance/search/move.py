@@ -6,10 +6,12 @@ limit and, weakly, part of the objective. The start is the smoothest straight mo
 kept on a coarse grid with a reserve and judged on a fine one.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance.dance.dance import Dance
 from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, condition, dynamic_grams, dynamic_slopes, effort, total
@@ -24,6 +26,9 @@ from biodance.dance.problem.nlp import (
 from biodance.dance.problem.splines import basis_at
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
+from biodance.dance.search.posture import intermediate_posture
+from biodance.dance.verify import verify
+from biodance.errors import BiodanceError
 from biodance.records import Array
 
 GRID = 10.0
@@ -40,7 +45,7 @@ _THIRDS = np.array([0.20987654, 0.79012346])
 """Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 _ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
 """Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
-of the rounds: after each the worst instants are added and the reserve grows by a quarter.
+of the rounds.
 """
 CENTRE = 0.1
 """Worth of 1 dm² of mean squared distance of the zero-moment point from the middle, beside log cond."""
@@ -52,8 +57,18 @@ without the reserve on the coarse grid.
 """
 
 
-def straight_way(start: Array, end: Array) -> Array:
-    """Return the via points (..., 2, n) of the smoothest moves from ``start`` to ``end`` (..., n)."""
+SLOWER = (1.0, 1.4)
+"""Factors on the duration of a move, one after the other."""
+DETOURS = 2
+"""Postures in between that are tried."""
+_SPARE = 0.5
+"""Fraction of what a limit's check forgives (`Limit.rounding`) that a move may use: the check of the whole dance
+samples other instants of it.
+"""
+
+
+def straight_via(start: Array, end: Array) -> Array:
+    """Return the via points (..., 2, n) of the moves of least jerk from ``start`` to ``end`` (..., n)."""
     return np.asarray(start[..., None, :] + _THIRDS[:, None] * (end - start)[..., None, :])
 
 
@@ -83,7 +98,7 @@ class Task:
 
     def straight(self) -> Array:
         """Return the via points (2, n) of the smoothest move."""
-        return straight_way(*self.ends)
+        return straight_via(*self.ends)
 
     def problem(
         self, via: Array, free: list[int], time: Array, *, reserve: float, objective: Objective
@@ -116,15 +131,29 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """``via`` (2, n) of a move of ``duration`` s; ``gram`` (N, 6, 6) its own information on the inertias, integrated
-    over time; ``violation`` of the limits in their scales (feasible: 0) and of which.
+    """A move through S >= 1 splines, by way of the ``stops`` (S - 1, n) where it rests for no time.
+
+    ``via`` (S, 2, n) points, ``duration`` (S,) s; ``gram`` (N, 6, 6) its own information on the inertias, integrated
+    over time; ``violation`` of the limits in their scales (feasible: 0) and of which ``limit``, "" if none.
     """
 
     via: Array
-    duration: float
+    duration: Array
     gram: Array
     violation: float
     limit: str
+    stops: Array
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the whole move, s."""
+        return float(self.duration.sum())
+
+    def dance(self, task: Task, stances: tuple[Stance, ...], hold: Array) -> Dance:
+        """Return the move alone as a dance, its ends and stops held for ``hold`` (S + 1,) s on the ``stances``."""
+        rows = np.array([task.ends[0], *self.stops, task.ends[1]])
+        under = (task.stance,) * len(self.via)
+        return Dance("move", task.chain.body, rows, stances, hold, self.via, self.duration, under, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,41 +202,36 @@ def find_move(task: Task, history: Array, *, rng: np.random.Generator) -> Move:
     """Return the best feasible move after ``history`` (N, 6, 6); if there is none, the one that violates least."""
     best = None
     for spread, share, rounds in _ATTEMPTS:
-        via, time, objective = task.straight(), task.grid(GRID), MoveObjective(task, history, share)
+        via = task.straight()
         via[:, task.excited] += rng.normal(0, spread, (2, len(task.excited)))
-        for k, iterations in enumerate(rounds):
-            reserve = RESERVE * (1 + k / 4)
-            via, violation = improved_way(task, via, time, objective, iterations, reserve)
-            found, instants = evaluate_move(task, via)
+        for found, beyond in improving_moves(task, via, MoveObjective(task, history, share), rounds):
             if best is None or found.violation < best.violation:
                 best = found
             if best.violation == 0:
                 return best
-            if violation > reserve or found.violation > HOPELESS:
+            if beyond > 0 or found.violation > HOPELESS:
                 break
-            time = np.union1d(time, instants)
     assert best is not None
     return best
 
 
-def improved_way(
-    task: Task,
-    via: Array,
-    time: Array,
-    objective: MoveObjective,
-    iterations: int,
-    reserve: float,
-    *,
-    free: list[int] | None = None,
-) -> tuple[Array, float]:
-    """Return the via points found from ``via`` (2, n), and by how much they violate the limits with their ``reserve``
-    at ``time`` s; only the coordinates ``free`` move, by default all that can.
+def improving_moves(
+    task: Task, via: Array, objective: MoveObjective, rounds: tuple[int, ...], *, free: list[int] | None = None
+) -> Iterator[tuple[Move, float]]:
+    """Yield the move found from ``via`` (2, n) after each of the ``rounds``, of so many iterations, and by how much it
+    violates the limits on the grid without their reserve; only the coordinates ``free`` move, by default all that can.
+    After a round the worst instants are added and the reserve grows by a quarter.
     """
     free = free_coordinates(task.chain, task.stance) if free is None else free
-    problem = task.problem(via, free, time, reserve=reserve, objective=objective)
-    found, out = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations), via.copy()
-    out[:, free] = found.y.reshape(2, -1)
-    return out, found.violation
+    via, time = via.copy(), task.grid(GRID)
+    for k, iterations in enumerate(rounds):
+        reserve = RESERVE * (1 + k / 4)
+        problem = task.problem(via, free, time, reserve=reserve, objective=objective)
+        solution = minimise(problem.evaluate, via[:, free].ravel(), iterations=iterations)
+        via[:, free] = solution.y.reshape(2, -1)
+        found, instants = evaluate_move(task, via.copy())
+        yield found, solution.violation - reserve
+        time = np.union1d(time, instants)
 
 
 def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
@@ -219,4 +243,48 @@ def evaluate_move(task: Task, via: Array) -> tuple[Move, Array]:
     left = np.pad(found.least, 1, constant_values=np.inf)
     dips = (left[1:-1] < 0) & (left[1:-1] <= left[:-2]) & (left[1:-1] <= left[2:])
     gram = dynamic_grams(found.state, list(range(len(task.chain.body.segments)))) * task.stretch / CHECK
-    return Move(via, task.duration, gram, max(0.0, worst), limit if worst > 0 else ""), time[dips]
+    no_stop, broken = np.empty((0, via.shape[1])), limit if worst > 0 else ""
+    return Move(via[None], np.array([task.duration]), gram, max(0.0, worst), broken, no_stop), time[dips]
+
+
+def exciting_move(task: Task, history: Array, seed: list[int]) -> Move:
+    """Return a move that keeps all limits, by the design's own judgement and by `verify`: at once, slower, or by way of
+    a posture in between; if there is none, the direct one that was tried last, with the limit it breaks.
+    """
+    for factor in SLOWER:
+        direct = find_move(replace(task, duration=task.duration * factor), history, rng=np.random.default_rng(seed))
+        broken = direct.limit or _broken_limit(task, direct)
+        if not broken:
+            return direct
+    for attempt in range(DETOURS):
+        try:
+            stop = intermediate_posture(task.chain, task.stance, task.ends, task.limits, seed=[*seed, attempt]).x
+        except BiodanceError:
+            continue
+        detour = _through(task, history, stop, [*seed, attempt])
+        if detour is not None and not _broken_limit(task, detour):
+            return detour
+    return replace(direct, limit=broken)
+
+
+def _broken_limit(task: Task, move: Move) -> str:
+    """Return the limit that a move breaks by the independent check, "" if it breaks none."""
+    count = len(move.via) + 1
+    margins = verify(task.chain.body, move.dance(task, (task.stance,) * count, np.zeros(count)), task.limits)
+    spare = {limit.name: _SPARE * limit.rounding for limit in task.limits}
+    return next((one.limit for one in margins if not one.worst >= spare.get(one.limit, 0.0)), "")
+
+
+def _through(task: Task, history: Array, stop: Array, seed: list[int]) -> Move | None:
+    """Return the slow move by way of ``stop`` (n,), None where one of its halves is impossible."""
+    parts: list[Move] = []
+    for ends in ((task.ends[0], stop), (stop, task.ends[1])):
+        slow = replace(task, ends=np.array(ends), duration=task.duration * SLOWER[-1])
+        part = find_move(slow, history, rng=np.random.default_rng(seed))
+        if part.violation > 0:
+            return None
+        parts.append(part)
+        history = history + part.gram
+    first, second = parts
+    via, duration = (np.concatenate([getattr(part, name) for part in parts]) for name in ("via", "duration"))
+    return Move(via, duration, first.gram + second.gram, 0.0, "", stop[None])

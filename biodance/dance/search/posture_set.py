@@ -2,22 +2,24 @@
 all that were found.
 
 cond has a kink where a segment is isotropic, at which one posture after the other stands still; sweeps therefore use a
-smooth condition number of growing sharpness, and after two independent runs postures are exchanged for better ones
-among all that came by.
+smooth condition number of growing sharpness, and after two independent runs postures are exchanged, one for one until
+nothing helps and no two alike, for better ones among all that came by and their mirror images.
 """
 
+from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.dance.limits import Limit
-from biodance.dance.postures.exchange import criterion, exchange, image_feet, mirror_posture, mirror_vectors, symmetric
-from biodance.dance.postures.posture import ATTEMPTS, KEPT, Exciting, Posture, initial_guess, posture_at, refuse, solve
 from biodance.dance.problem.chain import Chain
-from biodance.dance.problem.excitation import Blocks, static_grams
+from biodance.dance.problem.excitation import Blocks, static_grams, total
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.stance import Stance
+from biodance.dance.search.mirror import image_feet, mirror_posture, mirror_vectors, symmetric
+from biodance.dance.search.posture import ATTEMPTS, KEPT, Exciting, Posture, initial_guess, posture_at, refuse, solve
 from biodance.records import Array
 
 RUNS = 2
@@ -27,15 +29,8 @@ SWEEPS = ((4, 20), (4, 10))
 FRESH, POLISH = ((8, 20),), ((8, 10), (8, 10), (16, 10), (16, 10), (32, 8))
 """The same for the sweeps after the exchange, first one from fresh starts, then from where the postures are."""
 
-
-@dataclass(frozen=True, eq=False)
-class Postures:
-    """``x`` (P, n) coordinates, ``stances`` (P), ``criterion`` sum of M_i cond(W_bi^S), kg, and its ``bound``."""
-
-    x: Array
-    stances: tuple[Stance, ...]
-    criterion: float
-    bound: float
+APART = np.radians(10.0)
+"""rad: two postures on the same feet differ by this much in one joint at least; less nobody would see."""
 
 
 def find_postures(
@@ -46,15 +41,21 @@ def find_postures(
     *,
     seed: int,
     workers: Executor,
-) -> Postures:
-    """Return one posture per entry of ``stances`` that keeps the ``limits``, together the most exciting for all first
-    moments.
+) -> Array:
+    """Return the coordinates (P, n) of one posture for each of ``stances`` that keeps the ``limits``, together the most
+    exciting for all first moments.
 
     Raises
     ------
     BiodanceError
         On some feet there is no posture within the limits; the message names the limit.
     """
+
+    def price(chosen: list[Posture]) -> float:
+        """Criterion and, where simplicity counts, how hard the postures are to take, kg."""
+        hard = float(blocks.weight.sum() * np.mean([p.hard for p in chosen]))
+        return criterion(blocks, chosen) + blocks.simplicity * hard
+
     search, named = _Search(chain, blocks, stances, limits, seed), {stance.name: k for k, stance in enumerate(stances)}
     checked = {name: workers.submit(search.possible, k) for name, k in named.items()}
     possible = {name: task.result() for name, task in checked.items()}
@@ -75,17 +76,8 @@ def find_postures(
         kept = [[new, *rest] if new.violation <= KEPT else rest for new, rest in zip(found, kept, strict=True)]
         kept = search.with_images(kept, [[new] for new in found])
         before = [[old, *(p for p in rest if p is not old)] for old, rest in zip(chosen, kept, strict=True)]
-        chosen = min(
-            (exchange(blocks, stances, pool) for pool in (kept, before)), key=lambda some: _price(blocks, some)
-        )
-    return Postures(np.array([p.x for p in chosen]), stances, criterion(blocks, chosen), float(blocks.weight.sum()))
-
-
-def _price(blocks: Blocks, chosen: list[Posture]) -> float:
-    """Return the criterion and, where simplicity counts, how hard the postures are to take, kg."""
-    return criterion(blocks, chosen) + blocks.simplicity * float(
-        blocks.weight.sum() * np.mean([p.hard for p in chosen])
-    )
+        chosen = min((exchange(blocks, stances, pool) for pool in (kept, before)), key=price)
+    return np.array([p.x for p in chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,3 +141,85 @@ class _Search:
                     break
                 x, steps = self.anywhere(p, 3 + attempt), max(iterations, 20)
         return [now[p] for p in sorted(order)]
+
+
+def exchange(blocks: Blocks, stances: tuple[Stance, ...], pool: list[list[Posture]]) -> list[Posture]:
+    """Return one posture for each place, no two of a stance alike (`APART`) where the pool allows: those that come
+    first, exchanged for better ones of the same stance as long as any helps.
+    """
+    kinds = [stance.name for stance in stances]
+    every: dict[str, list[Posture]] = {kind: [] for kind in kinds}
+    for kind, found in zip(kinds, pool, strict=True):
+        every[kind] += [posture for posture in found if posture not in every[kind]]
+    grams = {
+        kind: np.eye(3) - np.einsum("pni,pnj->pnij", *[np.array([p.up for p in found])] * 2)
+        for kind, found in every.items()
+    }
+    like = {kind: alike(np.array([p.x for p in found])) for kind, found in every.items()}
+    taken: dict[str, list[int]] = {kind: [] for kind in every}
+    for kind, found in zip(kinds, pool, strict=True):
+        order = [every[kind].index(found[0]), *range(len(every[kind]))]
+        taken[kind].append(next((i for i in order if not like[kind][i, taken[kind]].any()), order[0]))
+    worth = blocks.simplicity * float(blocks.weight.sum()) / len(stances)
+    hard = {kind: worth * np.array([p.hard for p in found]) for kind, found in every.items()}
+    whole = sum(grams[kind][picks].sum(axis=0) for kind, picks in taken.items())
+    effort = sum(hard[kind][picks].sum() for kind, picks in taken.items())
+    value = _values(blocks, whole[None])[0] + effort
+    for kind, place in _places(taken):
+        now, rest = taken[kind][place], taken[kind][:place] + taken[kind][place + 1 :]
+        spare = np.flatnonzero(~like[kind][:, rest].any(axis=1))
+        if spare.size:
+            trial, efforts = whole - grams[kind][now] + grams[kind][spare], effort - hard[kind][now] + hard[kind][spare]
+            values = _values(blocks, trial) + efforts
+            if values.min() < value - 1e-6:
+                value, best = values.min(), int(values.argmin())
+                whole, effort, taken[kind][place] = trial[best], efforts[best], int(spare[best])
+    picks = {kind: iter(chosen) for kind, chosen in taken.items()}
+    return [every[kind][next(picks[kind])] for kind in kinds]
+
+
+def alike(x: Array) -> NDArray[np.bool_]:
+    """Return (P, P) True where two postures x (P, n) differ by less than `APART` in every coordinate."""
+    return np.asarray(np.abs(x[:, None] - x[None]).max(axis=2) < APART)
+
+
+def _places(taken: dict[str, list[int]]) -> Iterator[tuple[str, int]]:
+    """Yield all places in turn, again and again, until a round has changed nothing."""
+    before: dict[str, list[int]] = {}
+    while before != taken:
+        before = {kind: list(picks) for kind, picks in taken.items()}
+        for kind, picks in taken.items():
+            for place in range(len(picks)):
+                yield kind, place
+
+
+def _values(blocks: Blocks, grams: Array) -> Array:
+    """Return the criterion (K,) kg of K sets of Gram matrices (K, N, 3, 3)."""
+    out = np.zeros(len(grams))
+    whole = [i for i, pick in enumerate(blocks.first) if len(pick) == 3 and blocks.weight[i] > 0]
+    if whole:
+        least, most = extremes(grams[:, whole])
+        out += np.sqrt(most / np.maximum(least, 1e-12)) @ blocks.weight[whole]
+    for i, pick in enumerate(blocks.first):
+        if 0 < len(pick) < 3 and blocks.weight[i] > 0:
+            value = np.linalg.eigvalsh(grams[:, i][np.ix_(range(len(grams)), pick, pick)])
+            out += blocks.weight[i] * np.sqrt(value[:, -1] / np.maximum(value[:, 0], 1e-12))
+    return out
+
+
+def extremes(A: Array) -> tuple[Array, Array]:
+    """Return the smallest and the largest eigenvalue of symmetric matrices (..., 3, 3) in closed form
+    (doi:10.1145/355578.366316): an exchange asks for a million of them.
+    """
+    mean = (A[..., 0, 0] + A[..., 1, 1] + A[..., 2, 2]) / 3
+    a, b, c = (A[..., i, i] - mean for i in range(3))
+    d, e, f = A[..., 0, 1], A[..., 1, 2], A[..., 0, 2]
+    radius = np.sqrt((a * a + b * b + c * c + 2 * (d * d + e * e + f * f)) / 6)
+    half = (a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)) / 2
+    angle = np.arccos(np.clip(half / np.maximum(radius**3, 1e-300), -1.0, 1.0)) / 3
+    return mean + 2 * radius * np.cos(angle + 2 * np.pi / 3), mean + 2 * radius * np.cos(angle)
+
+
+def criterion(blocks: Blocks, chosen: list[Posture]) -> float:
+    """Return the sum of M_i cond(W_bi^S), kg, of postures."""
+    return total(blocks.weight, static_grams(np.array([p.up for p in chosen])), blocks.first)[0]

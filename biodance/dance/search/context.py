@@ -16,7 +16,6 @@ from biodance.body.body_file import body_text
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, excitation_blocks
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import Stance
 from biodance.records import Array
 
 ROOMS = ("body", "dance", "identification", "motion", "uncertainty", "spatial.py")
@@ -85,11 +84,3 @@ class DesignContext:
         return cls(
             Chain(body), parts, plan, seed, Checkpoint(None, body, plan, seed), ThreadPoolExecutor(1), lambda *_: None
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """Postures ``x`` (P, n), those in between included, in the order of the dance, on the feet ``stances`` (P,)."""
-
-    x: Array
-    stances: tuple[Stance, ...]

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.dance.dance import Dance
-from biodance.dance.followable.vocabulary import Vocabulary, Word, own_joint
 from biodance.dance.limits import Limit
 from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.exchange import counterpart
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
+from biodance.dance.search.mirror import counterpart
+from biodance.dance.search.vocabulary import Vocabulary, Word, own_joint
 from biodance.records import Array
 
 _ROUNDS = 5
@@ -30,7 +30,7 @@ _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 
 
 @dataclass(frozen=True, eq=False)
-class Catalogue:
+class PostureTable:
     """``words`` of every part of the body on the feet of ``stance``; posture s has the words ``index[s]`` (S, parts)
     and the coordinates ``x`` (S, n).
     """
@@ -42,7 +42,7 @@ class Catalogue:
     x: Array
 
     @classmethod
-    def of(cls, chain: Chain, stance: Stance, words: Vocabulary) -> "Catalogue":
+    def of(cls, chain: Chain, stance: Stance, words: Vocabulary) -> "PostureTable":
         """Return all combinations of ``words`` on the feet ``stance``."""
         index = np.array(list(product(*(range(len(group)) for group in words.values()))), dtype=np.intp)
         return cls(chain, stance, words, index, posed(chain, stance, words, index))
@@ -73,7 +73,7 @@ class Catalogue:
         still = np.where([part.endswith("_arm") for part in self.parts], 0, self.index)
         return np.ravel_multi_index(tuple(still.T), tuple(len(group) for group in self.words.values()))
 
-    def chosen(self, s: int) -> dict[str, Word]:
+    def words_of(self, s: int) -> dict[str, Word]:
         """Return the word of every part of posture ``s``."""
         return {part: self.words[part][k] for part, k in zip(self.parts, self.index[s], strict=True)}
 

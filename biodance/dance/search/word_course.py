@@ -1,9 +1,11 @@
-"""A dance that people can follow: a walk from posture to posture in which one or two parts of the body change.
+"""A dance that people can follow: from posture to posture of which they know the words, one or two parts of the body at
+a time.
 
 Every step takes, of all postures within reach of the last one - at most so many instructions away, or its mirror image
-- the one that tells most per second (`problem.information`), where an instruction costs time, too: the price of
-`simplicity`. Where the feet must change, only postures count from which they can in time (`reach`). What a posture must
-keep it keeps also for people who copy it imprecisely (`catalogue`).
+- the one that tells most per second (`PostureInformation`), where an instruction costs time, too: the price of
+``simplicity``. Where the feet must change, only postures count from which they can in time (`reachability`). What a
+posture must keep it keeps also for people who copy it imprecisely (`PostureTable.keeps`). From where no step leads on
+the search goes back.
 """
 
 from collections import Counter
@@ -15,39 +17,35 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
-from biodance.dance.followable.catalogue import Catalogue
-from biodance.dance.followable.plain import AMPLE, ENOUGH, plain_move
-from biodance.dance.followable.reach import DanceStep, Reach, feet_key, name_of
-from biodance.dance.followable.vocabulary import rest_cut_short
-from biodance.dance.performers import deviations_of_copies
-from biodance.dance.postures.ordering import support_sequence
-from biodance.dance.problem.information import PostureInformation, update_posterior
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import Stance, stance_words, under
-from biodance.dance.transitions.context import DesignContext
-from biodance.dance.transitions.move import Move, Task, straight_way
+from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.context import DesignContext
+from biodance.dance.search.course import Course, move_task
+from biodance.dance.search.information import PostureInformation, update_posterior
+from biodance.dance.search.move import Move, Task, straight_via
+from biodance.dance.search.posture_table import PostureTable
+from biodance.dance.search.reachability import Reachability, WordStep, feet_key
+from biodance.dance.search.straight_moves import AMPLE, ENOUGH, straight_move
+from biodance.dance.search.vocabulary import rest_cut_short, words_left_out
 from biodance.errors import BiodanceError
 from biodance.records import Array
 
 _INSTRUCTION = 0.5
 """s that one instruction is worth at simplicity 1."""
 _TRIES = 200
-"""Postures that are taken or given up before a walk is."""
-_WAYS_ON = 5
+"""Postures that are taken or given up before a search is."""
+_NEXT_TRIED = 5
 """Postures that are tried after another one before that one is given up."""
 _AT_ONCE = 12
 """Postures of which one that imprecise people surely can is taken before others that tell more."""
-_BETWEEN = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
-"""Shares of a move at which imprecise people must have room, too."""
-_SHORTLY = 0.2
-"""s of standing still before and after a move that is looked at alone."""
 _LIFTING = 1.4
 """Times as long as others that a move takes in which a foot is lifted or put down."""
 _LOOKED_AT = 24
-"""Postures that tell most standing still, whose ways are judged, too."""
+"""Postures that tell most standing still, whose moves are judged, too."""
 
 
-class NoWay(BiodanceError):
+class NoNextPosture(BiodanceError):
     """No posture follows on the feet ``stances[number]``; ``stance``, of what is danced, needs that change of feet."""
 
     def __init__(self, message: str, stances: tuple[Stance, ...], number: int) -> None:
@@ -59,100 +57,104 @@ class NoWay(BiodanceError):
 
 @dataclass(eq=False)
 class _Place:
-    """A place in the walk: the postures ``left`` to try after it, the ``posterior`` there, what was ``taken`` to it."""
+    """A place in the search: the ``step`` and ``move`` that were taken to it, the ``posterior`` there, and what is
+    ``left`` to try after it, None before the first look.
+    """
 
-    left: Iterator[tuple[DanceStep, Move | None]] | None
     posterior: Array
-    taken: tuple[DanceStep, Move | None] = None  # type: ignore[assignment]
+    step: WordStep | None = None
+    move: Move | None = None
+    left: Iterator[tuple[WordStep, Move | None]] | None = None
 
 
 @dataclass(eq=False)
-class Walk:
+class WordSearch:
     """The search for one dance; what was worked out is kept, so that another look costs little."""
 
     work: DesignContext
     _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
-    _still: dict[str, Array] = field(default_factory=dict)
+    _standing: dict[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         plan = self.work.plan
-        self.reach = Reach(self.work, self._can)
+        self.reachability = Reachability(self.work, self._can)
         self.information = PostureInformation(self.work.chain, plan, centres=plan.lively)
 
-    def take(self, stances: tuple[Stance, ...]) -> tuple[list[DanceStep], list[Move]]:
+    def course(self, stances: tuple[Stance, ...]) -> Course[WordStep]:
         """Return one step for each of ``stances`` and the moves between them.
 
         Raises
         ------
-        NoWay
+        NoNextPosture
             From some posture no other one can be reached; the message names the limit that most of them break.
         """
         self._check_feet(stances)
-        path, farthest = [_Place(None, self.information.beforehand)], 0
+        path, farthest = [_Place(self.information.beforehand)], 0
         why: dict[int, dict[str, int]] = {}
         for _ in range(_TRIES):
-            number, steps = len(path) - 1, [place.taken[0] for place in path[1:]]
+            number, steps = len(path) - 1, [place.step for place in path if place.step is not None]
             if number == len(stances):
-                return steps, [move for _, move in (place.taken for place in path[1:]) if move is not None]
+                return Course(tuple(steps), tuple(place.move for place in path[2:]))
             farthest = max(farthest, number)
             self.work.tell("postures", number, len(stances))
-            if path[-1].left is None:
+            here = path[-1]
+            if here.left is None:
                 broken = why.setdefault(number, {})
-                path[-1].left = islice(self.possible(steps, stances, path[-1].posterior, broken), _WAYS_ON)
-            found = next(path[-1].left, None)
+                here.left = islice(self.possible(steps, stances, here.posterior, broken), _NEXT_TRIED)
+            found = next(here.left, None)
             if found is not None:
-                path.append(_Place(None, self.posterior_after(path[-1].posterior, steps, found[0]), found))
+                path.append(_Place(self.posterior_after(here.posterior, steps, found[0]), *found))
             elif number:
                 path.pop()
             else:
                 break
-        raise NoWay(self._stuck(stances[farthest], farthest, why.get(farthest, {})), stances, farthest)
+        raise NoNextPosture(self._stuck(stances[farthest], farthest, why.get(farthest, {})), stances, farthest)
 
     def _check_feet(self, stances: tuple[Stance, ...]) -> None:
-        """Raise `NoWay` where this body cannot change feet in any posture of trunk and legs."""
+        """Raise `NoNextPosture` where this body cannot change feet in any posture of trunk and legs."""
         for number, pair in enumerate(pairwise(stances), start=1):
             if feet_key(pair[0]) == feet_key(pair[1]):
                 continue
-            was, now = (self.reach.catalogue(stance) for stance in pair)
-            if not any(self.reach.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
+            was, now = (self.reachability.table(stance) for stance in pair)
+            if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
-                raise NoWay(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
+                raise NoNextPosture(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
 
-    def choose(self, stances: tuple[Stance, ...]) -> list[DanceStep]:
-        """Return one step for each of ``stances``, as `take` does, without a look at the moves between them."""
-        steps, posterior = list[DanceStep](), self.information.beforehand
+    def postures(self, stances: tuple[Stance, ...]) -> list[WordStep]:
+        """Return one step for each of ``stances``, as `course` does, without a look at the moves between them."""
+        steps, posterior = list[WordStep](), self.information.beforehand
         for number, stance in enumerate(stances):
             step = next((one for one in self._ranked(steps, stances, posterior) if not self._kept(one)[1]), None)
             if step is None:
-                raise NoWay(self._stuck(stance, number, {}), stances, number)
+                raise NoNextPosture(self._stuck(stance, number, {}), stances, number)
             posterior = self.posterior_after(posterior, steps, step)
             steps.append(step)
         return steps
 
-    def posterior_after(self, posterior: Array, steps: list[DanceStep], step: DanceStep) -> Array:
+    def posterior_after(self, posterior: Array, steps: list[WordStep], step: WordStep) -> Array:
         """Return what is believed (k, k) when ``step`` follows on ``steps``, before whom it was ``posterior``."""
         return update_posterior(posterior, self._rows(steps[-1] if steps else None, step))
 
     def possible(
         self,
-        steps: list[DanceStep],
+        steps: list[WordStep],
         stances: tuple[Stance, ...],
         posterior: Array,
         why: dict[str, int],
         *,
-        wanted: Callable[[DanceStep], bool] = lambda _: True,
-    ) -> Iterator[tuple[DanceStep, Move | None]]:
+        wanted: Callable[[WordStep], bool] = lambda _: True,
+    ) -> Iterator[tuple[WordStep, Move | None]]:
         """Yield the postures that follow and are ``wanted`` with the move to them, the best first, of a handful those
         first that imprecise people surely can; ``why`` counts the limits that others break.
         """
         last, ranked = steps[-1] if steps else None, filter(wanted, self._ranked(steps, stances, posterior))
         while some := list(islice(ranked, _AT_ONCE)):
-            doubtful = list[tuple[float, DanceStep, Move | None]]()
+            doubtful = list[tuple[float, WordStep, Move | None]]()
             for step in some:
                 room, broken, move = *self._kept(step), None
                 if last is not None and not broken:
-                    move, least = self._way(last, step)
+                    move, least = self._judged_move(last, step)
                     room, broken = min(room, least), move.limit
                 if broken:
                     why[broken] = why.get(broken, 0) + 1
@@ -163,7 +165,7 @@ class Walk:
             yield from ((step, move) for _, step, move in sorted(doubtful, key=lambda one: -one[0]))
 
     def _stuck(self, stance: Stance, number: int, why: dict[str, int]) -> str:
-        if cut := rest_cut_short(self.work.chain.body, stance, self.reach.words):
+        if cut := rest_cut_short(self.work.chain.body, stance, self.reachability.words):
             return (
                 f"This body cannot be {stance_words(stance)} as the dance asks: {cut}. Choose a protocol on other "
                 f"feet, or widen that range if the person reaches farther."
@@ -175,19 +177,19 @@ class Walk:
             f"instructions, or leave this stance out of the protocol."
         )
 
-    def _ranked(self, steps: list[DanceStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[DanceStep]:
+    def _ranked(self, steps: list[WordStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[WordStep]:
         """Yield the postures within reach on the next feet, the best first."""
-        stance, catalogue = stances[len(steps)], self.reach.catalogue(stances[len(steps)])
+        stance, table = stances[len(steps)], self.reachability.table(stances[len(steps)])
         last = steps[-1] if steps else None
-        used, late = {step.s for step in steps if step.catalogue is catalogue}, self._late(len(steps), stances)
-        found = [step for step in self.reach.after(last, catalogue) if step.s not in used]
+        used, late = {step.s for step in steps if step.table is table}, self._late(len(steps), stances)
+        found = [step for step in self.reachability.after(last, table) if step.s not in used]
         if not found:
             return
         if stance.over is not None:
             least = sorted(found, key=lambda step: (len(step.said), step.s))
             yield from (step for step in least if not late(step))
             return
-        still = self.information.white(self._standing(catalogue)[[step.s for step in found]])
+        still = self.information.white(self._still(table)[[step.s for step in found]])
         gains = self.information.gains(posterior, still) / self._seconds(found)
         on = (found[k] for k in np.argsort(-gains, kind="stable") if not late(found[k]))
         first = list(islice(on, _LOOKED_AT))
@@ -195,81 +197,82 @@ class Walk:
         yield from (first[k] for k in np.argsort(-gains / self._seconds(first), kind="stable"))
         yield from on
 
-    def _late(self, number: int, stances: tuple[Stance, ...]) -> Callable[[DanceStep], bool]:
+    def _late(self, number: int, stances: tuple[Stance, ...]) -> Callable[[WordStep], bool]:
         """Return what says whether a posture in place ``number`` cannot be undone before the feet must change."""
         feet = feet_key(stances[number])
         left = next((k for k, one in enumerate(stances[number:]) if feet_key(one) != feet), 0)
         if not left or np.isinf(self.work.plan.instructions):
             return lambda step: False
-        goal = self.reach.catalogue(stances[number + left])
-        return lambda step: not self.reach.leads(step.catalogue, step.s, goal, left)
+        goal = self.reachability.table(stances[number + left])
+        return lambda step: not self.reachability.leads(step.table, step.s, goal, left)
 
-    def _seconds(self, steps: list[DanceStep]) -> Array:
+    def _seconds(self, steps: list[WordStep]) -> Array:
         """Return what each step costs, s."""
         plan = self.work.plan
         return np.array([plan.move + plan.hold + _INSTRUCTION * plan.simplicity * len(step.said) for step in steps])
 
-    def _kept(self, step: DanceStep) -> tuple[float, str]:
+    def _kept(self, step: WordStep) -> tuple[float, str]:
         """Return by how many deviations imprecise people keep a posture, and the limit that they break, "" if none."""
         if step.key not in self._held:
-            found, limit = step.catalogue.keeps(step.s, self.work.plan.limits)
+            found, limit = step.table.keeps(step.s, self.work.plan.limits)
             self._held[step.key] = found, limit if found < ENOUGH else ""
         return self._held[step.key]
 
-    def _can(self, last: DanceStep, step: DanceStep) -> bool:
+    def _can(self, last: WordStep, step: WordStep) -> bool:
         return not (self._kept(last)[1] or self._kept(step)[1] or self.move(last, step).limit)
 
-    def move(self, last: DanceStep, step: DanceStep) -> Move:
-        """Return the move from one step to the next, as `plain_move` finds it."""
-        return self._way(last, step)[0]
+    def move(self, last: WordStep, step: WordStep) -> Move:
+        """Return the move from one step to the next, as `straight_move` finds it."""
+        return self._judged_move(last, step)[0]
 
-    def _way(self, last: DanceStep, step: DanceStep) -> tuple[Move, float]:
+    def _judged_move(self, last: WordStep, step: WordStep) -> tuple[Move, float]:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
-            task, stances = self.task(last, step), (last.catalogue.stance, step.catalogue.stance)
-            self._moves[key] = plain_move(task, lambda move: _room(task, stances, move))
+            self._moves[key] = straight_move(self.task(last, step), (last.stance, step.stance))
         return self._moves[key]
 
-    def task(self, last: DanceStep, step: DanceStep) -> Task:
+    def task(self, last: WordStep, step: WordStep) -> Task:
         """Return what a move from one step to the next must do."""
-        work, (was, now) = self.work, (last.catalogue.stance, step.catalogue.stance)
-        slow = _LIFTING if was.planted != now.planted else 1.0
-        ends, duration = np.array([last.x, step.x]), slow * work.plan.move
-        return Task(work.chain, work.blocks, under(was, now), ends, duration, work.plan.limits)
+        slower = _LIFTING if last.stance.planted != step.stance.planted else 1.0
+        return move_task(self.work, last, step, slower=slower)
 
-    def _standing(self, catalogue: Catalogue) -> Array:
-        """Return the regressors (S, 6, 10 N) of standing still in all postures of a catalogue."""
-        key = feet_key(catalogue.stance)
-        if key not in self._still:
-            self._still[key] = self.information.standing(catalogue.x)
-        return self._still[key]
+    def _still(self, table: PostureTable) -> Array:
+        """Return the regressors (S, 6, 10 N) of standing still in all postures of a table."""
+        key = feet_key(table.stance)
+        if key not in self._standing:
+            self._standing[key] = self.information.standing(table.x)
+        return self._standing[key]
 
-    def _rows(self, last: DanceStep | None, step: DanceStep) -> Array:
+    def _rows(self, last: WordStep | None, step: WordStep) -> Array:
         """Return the whitened rows (m, k) of standing in a posture and of the straight way to it."""
-        still = self.information.of_posture(step.x, self._standing(step.catalogue)[step.s])
+        still = self.information.of_posture(step.x, self._still(step.table)[step.s])
         if last is None:
             return still
         return np.concatenate([still, self.information.of_ways(np.array([[last.x, step.x]]))[0]])
 
 
-def _room(task: Task, stances: tuple[Stance, Stance], move: Move) -> tuple[float, str]:
-    """Return what imprecise people leave on the way, as `deviations_of_copies` does."""
-    still, time = np.full(2, _SHORTLY), np.array([move.duration])
-    way = Dance("", task.chain.body, task.ends, stances, still, move.via[None], time, (task.stance,), 0)
-    return deviations_of_copies(way, task.limits, still[0] + move.duration * _BETWEEN)
+def word_course(work: DesignContext) -> tuple[WordSearch, Course[WordStep]]:
+    """Return the search and the course that it found; feet on which this person has no posture are left out, and this
+    is said, as are words that the person cannot do.
 
-
-def walked_dance(work: DesignContext, steps: list[DanceStep], moves: list[Move]) -> Dance:
-    """Return the dance of ``steps`` and the ``moves`` between them."""
-    plan, x = work.plan, np.array([step.x for step in steps])
-    stances = tuple(step.catalogue.stance for step in steps)
-    hold = np.array([plan.hold_on(stance) for stance in stances])
-    feet = tuple(under(*pair) for pair in pairwise(stances))
-    via = np.array([move.via for move in moves]).reshape(-1, 2, x.shape[1])
-    duration, names = np.array([move.duration for move in moves]), tuple(name_of(step) for step in steps)
-    dance = Dance(plan.name, work.chain.body, x, stances, hold, via, duration, feet, work.seed)
-    mirrored = tuple(p for p, step in enumerate(steps) if step.mirror)
-    return replace(dance, names=names, mirrored=mirrored)
+    Raises
+    ------
+    NoNextPosture
+        There is no posture on any of the feet.
+    """
+    plan, notes = work.plan, list[str]()
+    while True:
+        search = WordSearch(replace(work, plan=plan))
+        try:
+            course = search.course(support_sequence(work.chain.body, plan))
+            lacking = words_left_out(work.chain.body, plan, course.stances, search.reachability.words)
+            return search, replace(course, notes=(*notes, *lacking))
+        except NoNextPosture as why:
+            blocks = tuple(block for block in plan.blocks if block[0] != why.stance)
+            if not blocks or len(blocks) == len(plan.blocks):
+                raise
+            notes.append(f"Left out: all postures {why.stance.replace('_', ' ')}. {why}")
+            plan = replace(plan, blocks=blocks)
 
 
 def freer_dance(body: Body, plan: Plan, *, seed: int = 0) -> Dance:
@@ -279,7 +282,8 @@ def freer_dance(body: Body, plan: Plan, *, seed: int = 0) -> Dance:
     """
     free = replace(plan, instructions=np.inf, simplicity=0.0)
     stances = support_sequence(body, free)
-    steps = Walk(DesignContext.alone(body, free, seed)).choose(stances)
+    steps = WordSearch(DesignContext.alone(body, free, seed)).postures(stances)
     x, hold = np.array([step.x for step in steps]), np.full(len(steps), plan.hold)
-    via, move = straight_way(x[:-1], x[1:]), np.full(len(x) - 1, plan.move)
-    return Dance(plan.name, body, x, stances, hold, via, move, tuple(under(*pair) for pair in pairwise(stances)), seed)
+    via, move = straight_via(x[:-1], x[1:]), np.full(len(x) - 1, plan.move)
+    feet = tuple(feet_in_move(*pair) for pair in pairwise(stances))
+    return Dance(plan.name, body, x, stances, hold, via, move, feet, seed)

@@ -1,1 +1,0 @@
-"""Postures: found, exchanged, chosen, put in order."""

@@ -1,0 +1,133 @@
+"""The repair of a dance in which imprecise performers have too little room.
+
+All performers dance it (`performers`). Where one of them comes too near a limit, another move to that posture is taken,
+another posture in its place or before it, or it is left out. The same people dance the repaired place again, before it
+is taken; as everybody dances the rest as before, repairing one place spoils no other.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import replace
+from itertools import islice
+
+from biodance.dance.performers import PERFORMER_COUNT, PerformersResult, try_performers
+from biodance.dance.search.course import Course
+from biodance.dance.search.reachability import WordStep
+from biodance.dance.search.straight_moves import other_moves
+from biodance.dance.search.word_course import WordSearch
+
+_ROUNDS = 6
+"""Times that all performers dance the whole dance at most."""
+_OTHERS = 6
+"""Postures that are tried in the place of one."""
+_FEW = 40
+"""Performers of a first look."""
+
+_Other = tuple[Course[WordStep], tuple[int, ...]]
+"""A course, and the postures where it differs."""
+
+
+def repaired_course(
+    search: WordSearch, course: Course[WordStep], workers: Executor
+) -> tuple[Course[WordStep], PerformersResult]:
+    """Return the course as all performers can dance it, and what they leave of the limits; if it could not be repaired,
+    as well as it could be.
+    """
+    for number in range(_ROUNDS):
+        search.work.tell("performers", number, 0)
+        danced = course
+        found = try_performers(danced.dance(search.work), search.work.plan.limits, workers=workers)
+        for p in sorted({p for p, _ in found.bad}, reverse=True):  # what is left out moves no earlier place
+            course = _repaired_at(search, course, p, found, workers)
+        if found.safe or course is danced:
+            break
+    return danced, found
+
+
+def _repaired_at(
+    search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult, workers: Executor
+) -> Course[WordStep]:
+    """Return the course with another move to posture ``p`` or another posture there that is safe or nearest to it."""
+    best, most = course, _room(search, course, (p,), found.failed, workers)
+    for other, only in _others(search, course, p, found):
+        room = _room(search, other, only, found.failed, workers)
+        if room >= 0:
+            return other
+        if room > most:
+            best, most = other, room
+    return best
+
+
+def _room(
+    search: WordSearch, course: Course[WordStep], only: tuple[int, ...], first: tuple[int, ...], workers: Executor
+) -> float:
+    """Return how far the worst performer stays from what is demanded to and in the postures ``only``, in scales of the
+    limits; those who came too near before dance ``first``, the others only if these have room.
+    """
+    limits, dance, room = search.work.plan.limits, course.dance(search.work), float("inf")
+    scale = {limit.name: limit.scale for limit in limits}
+    others = tuple(k for k in range(PERFORMER_COUNT) if k not in first)
+    for who in (first, others[:_FEW], others[_FEW:]):
+        found = try_performers(dance, limits, who=who, only=only, workers=workers)
+        room = min(room, *((one.worst - one.least) / scale[one.limit] for one in found.least_margins))
+        if room < 0:
+            break
+    return room
+
+
+def _others(search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult) -> Iterator[_Other]:
+    """Yield what else may be done at posture ``p`` or just before, what changes least first: another move of the same
+    time, another posture, a slower move, another posture before, none at all.
+    """
+    yield from _by_other_moves(search, course, p, slower=False)
+    last = min(p + 1, len(course.steps) - 1)
+    yield from ((one, tuple(range(p, last + 1))) for one in islice(_exchanged(search, course, p), _OTHERS))
+    yield from _by_other_moves(search, course, p, slower=True)
+    if p:
+        yield from ((one, (p - 1, p)) for one in islice(_exchanged(search, course, p - 1), _OTHERS))
+    without = _without(search, course, p, found)
+    if without is not None:
+        yield without, (p,)
+
+
+def _by_other_moves(search: WordSearch, course: Course[WordStep], p: int, *, slower: bool) -> Iterator[_Other]:
+    """Yield courses with another move to posture ``p``."""
+    last = course.moves[p - 1] if p else None
+    if last is not None:
+        for move in other_moves(search.task(course.steps[p - 1], course.steps[p]), last, slower=slower):
+            yield course.spliced(p, p, (), (move,)), (p,)
+
+
+def _exchanged(search: WordSearch, course: Course[WordStep], q: int) -> Iterator[Course[WordStep]]:
+    """Yield courses with another posture in place ``q``, the best first."""
+    before, after = [*course.steps[:q]], next(iter(course.steps[q + 1 :]), None)
+    posterior, taken = search.information.beforehand, {step.key for step in course.steps}
+    for number, step in enumerate(before):
+        posterior = search.posterior_after(posterior, before[:number], step)
+
+    def on_from(step: WordStep) -> WordStep | None:
+        return None if after is None else search.reachability.link(step, after.table, after.s)
+
+    def fits(step: WordStep) -> bool:
+        return step.key not in taken and (after is None or on_from(step) is not None)
+
+    for step, move in search.possible(before, course.stances, posterior, {}, wanted=fits):
+        to, on = () if move is None else (move,), on_from(step)
+        if on is None:
+            yield course.spliced(q, q + 1, (step,), to)
+        elif not (way := search.move(step, on)).limit:
+            yield course.spliced(q, q + 2, (step, on), (*to, way, *course.moves[q + 1 : q + 2]))
+
+
+def _without(search: WordSearch, course: Course[WordStep], p: int, found: PerformersResult) -> Course[WordStep] | None:
+    """Return the course without posture ``p``, None where its neighbours need it."""
+    steps = course.steps
+    if not 0 < p < len(steps) - 1 or steps[p].stance.over is not None:
+        return None
+    on = search.reachability.link(steps[p - 1], steps[p + 1].table, steps[p + 1].s)
+    if on is None or (way := search.move(steps[p - 1], on)).limit:
+        return None
+    limits = " and ".join(limit.replace("_", " ") for at, limit in found.bad if at == p)
+    note = f"Left out: {steps[p].name}; whoever copies it imprecisely comes too near the limit on {limits}."
+    shorter = course.spliced(p, p + 2, (on,), (way, *course.moves[p + 1 : p + 2]))
+    return replace(shorter, notes=(*course.notes, note))
