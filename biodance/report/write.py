@@ -27,7 +27,12 @@ from biodance.report.documents.diagnosis import attention_document, diagnosis_do
 from biodance.report.documents.identification import identification_document
 from biodance.report.documents.methods import METHODS, methods_text
 from biodance.report.documents.plain import plain_values, to_text
-from biodance.report.documents.session import movement_document, provenance_document, results_document
+from biodance.report.documents.session import (
+    filter_document,
+    movement_document,
+    provenance_document,
+    results_document,
+)
 from biodance.report.files import write_files
 from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
@@ -101,6 +106,7 @@ def write_identification(
         "attention": attention_document(first),
         "judged": judged_document(identified_trials(result)),
         **identification_document(found),
+        "filter": filter_document(result),
         "movement": movement_document(movement) if movement else None,
         "provenance": provenance_document(made),
     }
@@ -130,6 +136,7 @@ def write_diagnosis(
     numbers = {
         "session": result.session.folder.name,
         **diagnosis_document(found),
+        "filter": filter_document(result),
         "movement": movement_document(movement) if movement else None,
         "failures": failures,
         "provenance": provenance_document(made),

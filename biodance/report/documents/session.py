@@ -7,6 +7,7 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
+from biodance.lab.filters import force_filter, motion_filter
 from biodance.motion.regressor import Agreement
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance
@@ -110,6 +111,20 @@ def _trial(result: TrialResult, identified: Agreement | None) -> dict[str, Any]:
     }
 
 
+def filter_document(result: SessionResult) -> dict[str, Any]:
+    """Return the cut-offs of the low-pass of joint coordinates and forces, the lowest of all moving trials and each:
+    ``chosen_by`` the "settings", the "trial" itself, or "usual" where its markers do not tell.
+    """
+    asked = result.settings.filter.cutoff
+    rows: list[dict[str, Any]] = []
+    for one in (one.trial for one in result.trials if one.trial.role != "static"):
+        markers, forces = motion_filter(one.settings).cutoff, force_filter(one.settings).cutoff
+        by = "settings" if asked != "auto" else "usual" if one.settings.filter.cutoff == "auto" else "trial"
+        rows.append({"trial": one.name, "markers_hz": markers, "forces_hz": forces, "chosen_by": by})
+    lowest = min(rows, key=lambda row: row["markers_hz"], default={})
+    return {key: lowest.get(key) for key in ("markers_hz", "forces_hz", "chosen_by")} | {"trials": rows}
+
+
 def _mass_check(result: SessionResult) -> dict[str, Any]:
     weighed = keyed(result.weighed, "mass_on_plates_kg=mass mass_on_plates_sd_kg=sd weighed_by=by.value trials")
     first = {"trial": result.weighed.trials[0] if result.weighed else None}
@@ -155,6 +170,7 @@ def results_document(result: SessionResult, provenance: Provenance) -> dict[str,
         },
         "steps": [keyed(step, _STEP) for step in result.steps],
         "checks": [vars(check) for check in result.all_checks],
+        "filter": filter_document(result),
         "mass_check": _mass_check(result),
         "identification": found and identification_document(found),
         "added_mass": found and added_mass_document(found.search),
