@@ -26,6 +26,13 @@ def test_both_passes_together_are_3_db_down_at_the_cutoff(order: int, rate: floa
     assert middle_gain(cutoff, rate, LowPass(order, cutoff)) == pytest.approx(np.sqrt(0.5), abs=1e-4)
 
 
+@pytest.mark.parametrize("kind", ["butterworth", "critically_damped"])
+@pytest.mark.parametrize("frequency", [2.0, 6.0, 9.0])
+def test_the_gain_is_that_of_a_tone(kind: str, frequency: float) -> None:
+    settings = LowPass(2, 5.0, kind)
+    assert settings.gain(np.array([frequency]), 30.0) == pytest.approx(middle_gain(frequency, 30.0, settings), abs=1e-4)
+
+
 def test_slow_tones_pass_and_fast_ones_do_not() -> None:
     assert middle_gain(2.0, 1000.0, LowPass()) == pytest.approx(1.0, abs=1e-5)
     assert abs(middle_gain(40.0, 1000.0, LowPass())) < 1e-5

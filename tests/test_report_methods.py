@@ -18,6 +18,12 @@ DOCUMENT = {
         "base_parameters": {"count": 101, "rank": 96},
         "validation": [{"table": AGREEMENT, "identified": AGREEMENT | {"rms": [5.0, 6.0, 12.5, 4.0, 3.0, 1.0]}}],
     },
+    "filter": {
+        "trials": [
+            {"trial": "dance_1", "markers_hz": 10.0, "forces_hz": 10.0, "chosen_by": "trial"},
+            {"trial": "squat_1", "markers_hz": 6.5, "forces_hz": 6.5, "chosen_by": "trial"},
+        ]
+    },
     "movement": {"parameters": "identified", "mass_kg": 45.7, "trials": [GAIT]},
     "diagnosis": {"verdict": "nothing wrong"},
     "provenance": {
@@ -29,8 +35,6 @@ DOCUMENT = {
             "joints": "functional",
             "filter.kind": "critically_damped",
             "filter.order": 5,
-            "filter.cutoff": 10.0,
-            "filter.force_cutoff": "same",
         },
     },
 }
@@ -41,7 +45,7 @@ SAID = [
     "carried 45.9 kg, +0.2 %",
     "de_leva_1996",
     "corrected by the movement",
-    "critically damped, order 5 in each direction, 10 Hz",
+    "critically damped, order 5 in each direction, 6.5 to 10 Hz, in each trial where",
     "Pinocchio 4.1.0",
     "12 segments were identified from the ground reaction wrench of dance_1",
     "19.5 N with the table and 12.5 N",

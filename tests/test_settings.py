@@ -27,6 +27,7 @@ OTHER = {
     "hip": "davis",
     "joints": "static",
     "filter.kind": "critically_damped",
+    "filter.cutoff": 6.0,
     "filter.force_cutoff": 20.0,
 }
 
@@ -77,10 +78,10 @@ def test_what_is_printed_is_what_may_be_written():
     [
         ({"filter.cutof": 6}, "'filter.cutof' is not a setting. Did you mean 'filter.cutoff'?"),
         ({"filter": 6}, "'filter' is not a setting"),
-        ({"filter.cutoff": "six"}, r"filter.cutoff = 'six' is not legal .* Legal: 1 to 100 Hz"),
-        ({"filter.cutoff": 600}, "Legal: 1 to 100 Hz"),
-        ({"filter.cutoff": float("nan")}, "Legal: 1 to 100 Hz"),
-        ({"filter.cutoff": True}, "Legal: 1 to 100 Hz"),
+        ({"filter.cutoff": "six"}, r"filter.cutoff = 'six' is not legal .* Legal: \"auto\", or 1 to 100 Hz"),
+        ({"filter.cutoff": 600}, 'Legal: "auto", or 1 to 100 Hz'),
+        ({"filter.cutoff": float("nan")}, 'Legal: "auto", or 1 to 100 Hz'),
+        ({"filter.cutoff": True}, 'Legal: "auto", or 1 to 100 Hz'),
         ({"filter.order": 2.5}, "Legal: 1 to 10, a whole number"),
         ({"filter.force_cutoff": "other"}, 'Legal: "same", or 1 to 500 Hz'),
         ({"hip": "bell"}, 'Legal: "harrington", "davis"'),
@@ -271,4 +272,4 @@ def test_the_command_prints_what_holds(capsys, folder):
     assert run(["settings", str(folder), "--set", "filter.cutof=6"]) == NOT_DONE
     assert "Did you mean 'filter.cutoff'?" in capsys.readouterr().err
     assert run(["settings", str(folder), "--set", "filter.cutoff=0"]) == NOT_DONE
-    assert "Legal: 1 to 100 Hz" in capsys.readouterr().err
+    assert 'Legal: "auto", or 1 to 100 Hz' in capsys.readouterr().err

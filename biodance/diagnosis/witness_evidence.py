@@ -110,16 +110,13 @@ class ObservedEvidence:
         return away <= _REACH
 
     def contacts(self, cause: tuple[str, str] | None = None) -> int:
-        """Return how many contacts of the person with the plates there are, or tell a cause: in how many its usual
-        fault is larger than what one observation errs by. What is exact needs none: `CONTACTS` then.
-        """
-        told = np.ones(len(self.observations), dtype=bool)
+        """Return how many contacts with the plates there are, or tell a ``cause``; what is exact counts as `CONTACTS`."""
+        seen = list(self.observations)
         if cause is not None:
-            own = np.array([one.sd for one in self.observations])
-            told = self.in_reach & (np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= own)
-        seen = [one for one, here in zip(self.observations, told, strict=True) if here]
-        touched = {one.contact for one in seen if one.observer not in _EXACT}
-        return CONTACTS if cause and any(one.observer in _EXACT for one in seen) else len(touched)
+            large = np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause])
+            seen = [o for o, here, size in zip(seen, self.in_reach, large, strict=True) if here and size >= o.sd]
+        exact = cause and any(one.observer in _EXACT for one in seen)
+        return CONTACTS if exact else len({one.contact for one in seen if one.observer not in _EXACT})
 
     def strongest(self, index: int) -> tuple[str, str]:
         """Return the cause to which an observation responds most at the usual fault size; empty names if to none."""

@@ -18,6 +18,8 @@ from biodance.errors import BiodanceError
 from biodance.records import Array, runs
 from biodance.settings import FilterKind, FilterSettings, Settings
 
+USUAL_CUTOFF = 10.0
+"""Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
 _NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
 
 
@@ -28,7 +30,7 @@ class LowPass:
     """
 
     order: int = FilterSettings.order
-    cutoff: float = FilterSettings.cutoff
+    cutoff: float = USUAL_CUTOFF
     kind: FilterKind = FilterSettings.kind
 
     def __post_init__(self) -> None:
@@ -41,14 +43,31 @@ class LowPass:
         down = f"3 dB down at {self.cutoff:g} Hz in both passes together"
         return f"{_NAMES[self.kind]} low-pass of order {self.order}, forwards and backwards, {down}"
 
+    def gain(self, frequency: Array, rate: float) -> Array:
+        """Return the gain (n,) of both passes together at each ``frequency`` (n,) Hz below half the ``rate`` Hz."""
+        relative = np.tan(np.pi * np.asarray(frequency) / rate) / self._raised(rate)
+        if self.kind == "critically_damped":
+            return np.asarray((1 + relative**2) ** -float(self.order))
+        return np.asarray(1 / (1 + relative ** (2 * self.order)))
+
+    def _raised(self, rate: float) -> float:
+        """Return tan(pi f / rate) of the frequency f that one pass is designed for."""
+        wanted = float(np.tan(np.pi * self.cutoff / rate))
+        if self.kind == "critically_damped":
+            return wanted / float(np.sqrt(2 ** (0.5 / self.order) - 1))
+        return wanted * float((np.sqrt(2) - 1) ** (-0.5 / self.order))
+
     def shortest(self, rate: float) -> int:
         """Return the shortest run of samples that is filtered: one period of the cut-off frequency."""
         return int(np.ceil(rate / self.cutoff)) + 1
 
 
 def motion_filter(settings: Settings) -> LowPass:
-    """Return the low-pass that an analyst chose for the joint coordinates."""
-    return LowPass(settings.filter.order, settings.filter.cutoff, settings.filter.kind)
+    """Return the low-pass of the joint coordinates: with the cut-off that an analyst or the trial chose, else the
+    usual one.
+    """
+    chosen = settings.filter.cutoff
+    return LowPass(settings.filter.order, USUAL_CUTOFF if chosen == "auto" else float(chosen), settings.filter.kind)
 
 
 def force_filter(settings: Settings) -> LowPass:
@@ -75,12 +94,10 @@ def design_low_pass(settings: LowPass, rate: float) -> Array:
             f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off "
             f"below {rate / 2:g} Hz."
         )
-    wanted = np.tan(np.pi * settings.cutoff / rate)
+    designed = np.arctan(settings._raised(rate)) * rate / np.pi
     if settings.kind == "critically_damped":
-        raised = wanted / np.sqrt(2 ** (0.5 / settings.order) - 1)
-        return np.tile(butter(1, np.arctan(raised) * rate / np.pi, fs=rate, output="sos"), (settings.order, 1))
-    raised = wanted * (np.sqrt(2) - 1) ** (-0.5 / settings.order)
-    return butter(settings.order, np.arctan(raised) * rate / np.pi, fs=rate, output="sos")
+        return np.tile(butter(1, designed, fs=rate, output="sos"), (settings.order, 1))
+    return butter(settings.order, designed, fs=rate, output="sos")
 
 
 def low_pass(values: Array, rate: float, settings: LowPass) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.body_file import read_body
 from biodance.errors import FileRefused, SessionRefused, TrialRefused
+from biodance.lab.filters import motion_filter
 from biodance.lab.session.manifest import refuse_mixture
 from biodance.lab.session.read import read_session
 from biodance.library import refuse_large
@@ -40,8 +41,8 @@ _TEXTS = ("marker_names", "notes", "joint_names")
 @dataclass(frozen=True, eq=False)
 class KeptResults:
     """A results folder as read: ``body`` with ``source`` in words; ``motions`` by trial; ``hashes`` of the recordings
-    by trial and what their ``loads`` sum to after preparing (N·s, N·m·s); ``session`` folder of the recordings, whose
-    ``settings`` were chosen.
+    by trial, what their ``loads`` sum to after preparing (N·s, N·m·s), and their ``cutoffs`` (Hz); ``session`` folder
+    of the recordings, whose ``settings`` were chosen.
     """
 
     body: Body
@@ -49,6 +50,7 @@ class KeptResults:
     motions: dict[str, Motion]
     hashes: dict[str, str]
     loads: dict[str, Array]
+    cutoffs: dict[str, float]
     session: Path
     settings: Mapping[str, Value]
 
@@ -62,6 +64,7 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
     held["trials"] = np.array([one.name for one in moved])
     held["hashes"] = np.array([one.trial.source.sha256 for one in moved])
     held["loads"] = np.array([_load(one.trial) for one in moved])
+    held["cutoffs"] = np.array([motion_filter(one.trial.settings).cutoff for one in moved])
     held["settings"] = np.array(json.dumps(result.settings.as_dict()))
     for k, one in enumerate(moved):
         held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in BY_FRAME}
@@ -136,13 +139,14 @@ def read_kept(folder: Path) -> KeptResults:
             motions = {str(name): _motion(held, k) for k, name in enumerate(held["trials"])}
             hashes = dict(zip(motions, (str(one) for one in held["hashes"]), strict=True))
             loads = dict(zip(motions, held["loads"], strict=True))
+            cutoffs = dict(zip(motions, map(float, held["cutoffs"]), strict=True))
             session = Path(os.path.normpath(folder / str(held["session"])))
             settings = json.loads(str(held["settings"]))
     except FileRefused:
         raise
     except (BadZipFile, EOFError, OSError, ValueError, KeyError, MemoryError, zlib.error) as error:
         raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
-    return KeptResults(body, source, motions, hashes, loads, session, settings)
+    return KeptResults(body, source, motions, hashes, loads, cutoffs, session, settings)
 
 
 def _load(trial: Trial) -> Array:
@@ -183,7 +187,8 @@ def _again(trial: Trial, kept: KeptResults, name: str) -> TrialResult:
         raise TrialRefused(
             f"Trial {name}: {trial.source.path} has changed since the results were made. Run the session again."
         )
-    ready, motion, steps = prepare_trial(trial), kept.motions[name], list[Step]()
+    filtered = replace(trial, settings=trial.settings.changed({"filter.cutoff": kept.cutoffs[name]}))
+    ready, motion, steps = prepare_trial(filtered), kept.motions[name], list[Step]()
     if not np.allclose(_load(ready.trial), kept.loads[name], rtol=1e-6, atol=1e-3):
         raise TrialRefused(
             f"Trial {name}: its plates were corrected when the results were made (a lab.toml). Give the session folder."

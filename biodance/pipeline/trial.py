@@ -19,6 +19,7 @@ from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.prepare import prepare
 from biodance.motion.contact.contact import Contact, ground_contact
 from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
+from biodance.motion.cutoff import with_own_cutoff
 from biodance.motion.quiet_standing import quiet_standing
 from biodance.motion.regressor import compare, predict_wrench
 from biodance.motion.track import track
@@ -59,11 +60,14 @@ def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A trial after preparing (as read where that was refused), the steps so far and the gaps as recorded."""
+    """A trial after preparing (as read where that was refused), the steps so far, the gaps as recorded, and the trial
+    as ``recorded``.
+    """
 
     trial: Trial
     steps: tuple[Step, ...]
-    gaps: tuple[MarkerGaps, ...] = ()
+    gaps: tuple[MarkerGaps, ...]
+    recorded: Trial
 
     @property
     def usable(self) -> bool:
@@ -83,7 +87,18 @@ def prepare_trial(trial: Trial) -> Prepared:
     """Prepare one trial; a refusal is a step, and the trial stays as it was read."""
     steps: list[Step] = []
     done = attempt(steps, "prepare", lambda: prepare(trial))
-    return Prepared(done or trial, tuple(steps), gaps_of(trial))
+    return Prepared(done or trial, tuple(steps), gaps_of(trial), trial)
+
+
+def filtered_as_it_asks(read: Prepared, body: Body | None) -> Trial:
+    """Return a prepared trial whose forces and joint coordinates have the cut-off that its own markers ask for under
+    ``body``; as it is where they ask for none, see `with_own_cutoff`.
+    """
+    trial = read.trial
+    if body is None or trial.markers is None or not trial.marker_set:
+        return trial
+    asked = with_own_cutoff(read.recorded, body, trial.markers)
+    return trial if asked is read.recorded else prepare(asked)
 
 
 def marker_fit(motion: Motion, groups: Mapping[str, str] | None = None) -> MarkerFit:
@@ -179,6 +194,7 @@ def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialRes
     trial, steps = read.trial, list(read.steps)
     if not read.usable:
         return TrialResult(trial, read.steps, read.gaps)
+    trial = filtered_as_it_asks(read, body)
     motion = attempt(steps, "track", lambda: track_trial(trial, body))
     groups = dict(zip(body.markers.names, marker_groups(body), strict=True)) if body else {}
     fit = marker_fit(motion, groups) if motion else None

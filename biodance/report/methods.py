@@ -84,13 +84,23 @@ def _trials(trials: list[dict[str, Any]]) -> str:
     return f"{told} and {_count(plates, 'force plate')} entered the analysis." if used else ""
 
 
-def _filter(kind: str, order: float, cutoff: float, forces: Any) -> str:
-    both = "" if forces == "same" else f" (forces: {forces:g} Hz)"
+def _filter(kind: str, order: float, trials: list[dict[str, Any]]) -> str:
+    if not trials:
+        return ""
+    markers, forces = (_range([one[key] for one in trials]) for key in ("markers_hz", "forces_hz"))
+    both = "" if forces == markers else f" (forces: {forces})"
+    own = any(one["chosen_by"] == "trial" for one in trials)
+    how = ", in each trial where the filtered markers lie nearest to the path of rigid segments" if own else ""
     words = spaced(kind).replace("butterworth", "Butterworth")
     return (
         f"Joint coordinates and forces were low-pass filtered forwards and backwards ({words}, order {order:g} in each "
-        f"direction, {cutoff:g} Hz{both})."
+        f"direction, {markers}{both}{how})."
     )
+
+
+def _range(cutoffs: list[float]) -> str:
+    low, high = min(cutoffs), max(cutoffs)
+    return f"{low:g} Hz" if low == high else f"{low:g} to {high:g} Hz"
 
 
 def _segments(segments: list[dict[str, Any]], trials: list[str], rank: int, count: int) -> str:
@@ -167,7 +177,7 @@ CLAUSES: tuple[MethodClause, ...] = (
     ),
     MethodClause("provenance/settings/joints", lambda joints: _MOVED[joints == "functional"]),
     MethodClause(
-        " ".join(f"provenance/settings/filter.{key}" for key in ("kind", "order", "cutoff", "force_cutoff")),
+        "provenance/settings/filter.kind provenance/settings/filter.order filter/trials",
         _filter,
         {"Robertson": "critically damped"},
     ),

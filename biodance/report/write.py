@@ -32,7 +32,7 @@ from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, diagnosis_document
 from biodance.report.tables.identification import identification_document
 from biodance.report.tables.schema import plain_values, to_text
-from biodance.report.tables.session import PROVENANCE_ROW, movement_document, results_document
+from biodance.report.tables.session import PROVENANCE_ROW, filter_document, movement_document, results_document
 
 PAGE, SUBJECT_PAGE, _NUMBERS = "report.html", "subject.html", "results.json"
 
@@ -101,6 +101,7 @@ def write_identification(
         "attention": ATTENTION_ROW.rows(first),
         "judged": JUDGED_ROW.rows(identified_trials(result)),
         **identification_document(found),
+        "filter": filter_document(result),
         "movement": movement_document(movement),
         "provenance": PROVENANCE_ROW.row(made),
     }
@@ -130,6 +131,7 @@ def write_diagnosis(
     numbers = {
         "session": result.session.folder.name,
         **diagnosis_document(found),
+        "filter": filter_document(result),
         "movement": movement_document(movement),
         "failures": failures,
         "provenance": PROVENANCE_ROW.row(made),

@@ -124,8 +124,10 @@ FilterKind: TypeAlias = Literal["butterworth", "critically_damped"]
 class FilterSettings(Group):
     """The low-pass of joint coordinates and forces, forwards and backwards (no delay).
 
-    The critically damped one does not overshoot (Robertson & Dowling 2003, doi:10.1016/S1050-6411(03)00080-4). Another
-    cut-off for the forces than for the joint coordinates appears in the residual.
+    Without a cut-off each trial has the one at which its filtered markers lie nearest to the path of rigid segments
+    (docs/decisions/2026-11-22-filtering.md). The critically damped one does not overshoot (Robertson & Dowling 2003,
+    doi:10.1016/S1050-6411(03)00080-4). Another cut-off for the forces than for the joint coordinates appears in the
+    residual.
     """
 
     name = "filter"
@@ -133,7 +135,14 @@ class FilterSettings(Group):
         "butterworth", ("butterworth", "critically_damped"), "low-pass of joint coordinates and forces"
     )
     order: int = number_field(5, 1, 10, "", "order of one of its two passes")
-    cutoff: float = number_field(10.0, 1.0, 100.0, "Hz", "frequency at which both passes together are 3 dB down")
+    cutoff: float | Literal["auto"] = number_field(
+        0.0,
+        1.0,
+        100.0,
+        "Hz",
+        "frequency at which both passes together are 3 dB down; auto: what each trial asks for",
+        word="auto",
+    )
     force_cutoff: float | Literal["same"] = number_field(
         0.0, 1.0, 500.0, "Hz", "the same for the forces of the plates", word="same"
     )

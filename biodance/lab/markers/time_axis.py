@@ -120,7 +120,7 @@ def time_axis(stamps: Array, *, where: str, row: str = "row") -> TimeAxis:
     pieces = [(a, b) for a, b in _pieces(stamps, np.ones(stamps.size, dtype=bool)) if b - a > 1]
     first, last = pieces[0][0], pieces[-1][1] - 1
     kept = stamps[first : last + 1]
-    time = kept[0] + step * np.arange(int((kept[-1] - kept[0]) / step + 1e-6) + 1)
+    time = np.minimum(kept[0] + step * np.arange(int((kept[-1] - kept[0]) / step + 1e-6) + 1), kept[-1])
     lone = stamps.size - kept.size
     cut = f" {lone} row{'s' * (lone > 1)} apart from the others at the ends left out." if lone else ""
     said = f"{_varying(kept)}: the rows were resampled at {1 / step:.4g} Hz by cubic splines on their own stamps.{cut}"

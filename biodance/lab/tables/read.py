@@ -2,11 +2,13 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from biodance.errors import FileRefused
+from biodance.lab.markers.arrival import camera_instants
 from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.resampled import resampled
@@ -48,8 +50,10 @@ def read_marker_table(path: Path, *, role: Role, told: Told | None = None) -> Tr
             f"columns (LASI_x, LASI_y, LASI_z). The columns are {', '.join(cells.labels[:6])} ..."
         )
     stamps, timed = _stamps(cells, columns, path)
-    axis = time_axis(stamps, where=str(path)).from_zero()
+    time_axis(stamps, where=str(path))  # refuses stamps that are none
     rows, lengths, turn = _markers(cells, columns, stamps, path)
+    instants, arrived = camera_instants(stamps, rows.xyz)
+    axis, rows = time_axis(instants, where=str(path)).from_zero(), replace(rows, time=instants)
     loads, weighed = loads_of(columns.plates, cells.labels, cells.units, cells.values)
     known, worn = recognise(rows.names), _worn(rows)
     markers, unseen = resampled(rows.names, rows.xyz, axis)
@@ -63,6 +67,7 @@ def read_marker_table(path: Path, *, role: Role, told: Told | None = None) -> Tr
         *lengths,
         *unseen,
         *([weighed] if weighed else []),
+        *([arrived] if arrived else []),
         *_time_said(axis, rows, loads),
         *plates.history,
     )

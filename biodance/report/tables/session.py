@@ -7,6 +7,7 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
+from biodance.lab.filters import force_filter, motion_filter
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
@@ -65,6 +66,22 @@ _JOINT = Schema(
         "held_out_with_mm": lambda gain: 1000 * gain.with_it,
     },
 )
+
+
+def filter_document(result: SessionResult) -> Row:
+    """Return the cut-offs of the low-pass of joint coordinates and forces, the lowest of all moving trials and each:
+    ``chosen_by`` the "settings", the "trial" itself, or "usual" where its markers do not tell.
+    """
+    asked = result.settings.filter.cutoff
+    rows: list[Row] = []
+    for one in (one.trial for one in result.trials if one.trial.role != "static"):
+        markers, forces = motion_filter(one.settings).cutoff, force_filter(one.settings).cutoff
+        by = "settings" if asked != "auto" else "usual" if one.settings.filter.cutoff == "auto" else "trial"
+        rows.append({"trial": one.name, "markers_hz": markers, "forces_hz": forces, "chosen_by": by})
+    lowest = min(rows, key=lambda row: row["markers_hz"], default={})
+    return {key: lowest.get(key) for key in ("markers_hz", "forces_hz", "chosen_by")} | {"trials": rows}
+
+
 _SESSION = Schema(
     "session=session.folder.name subject trials refused=session.refused notes=session.notes steps",
     {
@@ -81,6 +98,7 @@ _SESSION = Schema(
             },
         ).row,
         "checks": CHECK_ROW.at("all_checks"),
+        "filter": filter_document,
         "mass_check": Schema(
             "trial=weighed.trials.0 mass_on_plates_kg=weighed.mass mass_on_plates_sd_kg=weighed.sd "
             "weighed_by=weighed.by.value trials=weighed.trials declared_mass_kg=declared_mass "
