@@ -110,7 +110,7 @@ class ObservedEvidence:
         return away <= _REACH
 
     def contacts(self, cause: tuple[str, str] | None = None) -> int:
-        """Return how many contacts with the plates there are, or tell a ``cause``; what is exact counts as `CONTACTS`."""
+        """Return how many contacts with the plates there are, or tell a ``cause``; exact ones count `CONTACTS`."""
         seen = list(self.observations)
         if cause is not None:
             large = np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause])
