@@ -103,16 +103,14 @@ def test_diagnose_begins_with_its_headline() -> None:
         (Reason.UNUSUAL_BODY,),
         (Reason.OUTSIDE_TOLERANCES,),
         (Reason.UNUSUAL_BODY, Reason.OUTSIDE_TOLERANCES),
-        (Reason.WITHOUT_RESEMBLED,),
     ],
-    ids=("body", "tolerance", "both", "resembled"),
+    ids=("body", "tolerance", "both"),
 )
 def test_what_is_strange_is_no_alarm_before_a_limit_is_broken(reasons: tuple[Reason, ...]) -> None:
     quiet, why = (replace(LEFT[0], z=1.0),), dict.fromkeys(reasons, ())
     strange = replace(WHOLE, explained=False, adequacy=quiet, why=why, resembles=(FOUND,))
     for one, level, begins in (
         (strange, "warn", "Nobody can tell whether anything is wrong"),
-        (replace(strange, why=why | {Reason.OUTSIDE_EVERY_LABORATORY: ()}), "fail", "Something is wrong"),
         (replace(strange, adequacy=LEFT, why=why | UNLIKE), "warn", "Nobody can tell whether anything is wrong"),
         (replace(strange, adequacy=LEFT, why=why | UNLIKE | {Reason.LIMIT_BROKEN: ()}), "fail", "Something is wrong"),
     ):

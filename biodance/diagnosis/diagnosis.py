@@ -89,8 +89,6 @@ class Finding:
         What settles it in the laboratory.
     changes : tuple of str
         What accepting it changes in the body.
-    varies_with : str
-        Of one that is only resembled: what its size varies with ("" for none), though a true cause has one size.
     trials : tuple of str
         The trials in which it is; () for all.
     probability : float
@@ -112,7 +110,6 @@ class Finding:
     gain: Gain | None = None
     advice: str = ""
     changes: tuple[str, ...] = ()
-    varies_with: str = ""
     trials: tuple[str, ...] = ()
     probability: float = 1.0
     kind: "Cause | None" = None

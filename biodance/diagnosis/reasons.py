@@ -36,28 +36,14 @@ class Reason(StrEnum):
     """No marker shows what moves at some joints, and the plates measure it."""
     TOLERANCES_DO_NOT_HOLD = "tolerances do not hold"
     """The markers move more on the body than where tolerances were learned."""
-    EXCLUDED_BY_WITNESSES = "excluded by witnesses"
-    """Feet, clocks and weights exclude the only cause that the simulation names."""
     UNUSUAL_BODY = "unusual body"
     """The forces fit only a body that is more unlike the table than people are."""
     OUTSIDE_TOLERANCES = "outside tolerances"
     """They fit only if something that is small in every laboratory is many times as large here."""
-    OUTSIDE_EVERY_LABORATORY = "outside every laboratory"
-    """... and is none of what is small even in a laboratory twice as loud."""
-    WITHOUT_RESEMBLED = "judged without what it resembles"
-    """What is only resembled explains nothing: what is left is judged without it."""
-    SEVERAL_CROSSTALKS = "several cross-talks"
-    """Several channels would have to disturb each other at once."""
-    SIZE_VARIES = "size varies"
-    """The size of a cause is not constant, as that of a true one is."""
-    MAY_NOT_MATTER = "may not matter"
-    """A cause is known so poorly that what is there may be less than what matters."""
     LIMIT_BROKEN = "limit broken"
     """Forces, markers or weight are outside their limit, and no finding explains it."""
     FORCES_LEFT = "forces left"
     """What is left of the forces matters and is unlike sessions without fault."""
-    LOUD_LABORATORY = "loud laboratory"
-    """What no cause explains is larger than where tolerances were learned, in most bands and channels alike."""
 
 
 DOUBTS = frozenset(
@@ -71,35 +57,25 @@ DOUBTS = frozenset(
         Reason.UNDESCRIBED_JOINTS,
         Reason.UNSEEN_JOINTS,
         Reason.TOLERANCES_DO_NOT_HOLD,
-        Reason.EXCLUDED_BY_WITNESSES,
     )
 )
 """Reasons for which no cause can be told, whatever is left."""
-STRANGE = frozenset((Reason.UNUSUAL_BODY, Reason.OUTSIDE_TOLERANCES, Reason.WITHOUT_RESEMBLED))
+STRANGE = frozenset((Reason.UNUSUAL_BODY, Reason.OUTSIDE_TOLERANCES))
 """Reasons that alone speak of nothing wrong: how unlike the table people are, and how large what is small everywhere,
 was learned from few laboratories, and clean sessions of others are beyond it.
 """
-OF_RESIDUAL = frozenset(
-    (
-        *STRANGE,
-        Reason.OUTSIDE_EVERY_LABORATORY,
-        Reason.SEVERAL_CROSSTALKS,
-        Reason.SIZE_VARIES,
-        Reason.MAY_NOT_MATTER,
-        Reason.FORCES_LEFT,
-    )
-)
+OF_RESIDUAL = frozenset((*STRANGE, Reason.FORCES_LEFT))
 """Reasons that come of what is left beside the causes named."""
 
 
 def status_of(reasons: Collection[Reason], *, named: bool, clean: bool) -> DiagnosisStatus:
     """Return what a diagnosis ends with: whether anything is ``named``, nothing is wrong (``clean``), or why neither
     is. Forces left beside a strange body or stretched tolerances are judged by norms that do not hold there: they prove
-    something wrong only once a limit is broken, or no laboratory is so.
+    something wrong only once a limit is broken.
     """
     if named or clean:
         return DiagnosisStatus.NAMED if named else DiagnosisStatus.CLEAN
     if Reason.LIMIT_BROKEN in reasons:
         return DiagnosisStatus.UNKNOWN
-    strange = Reason.OUTSIDE_EVERY_LABORATORY not in reasons and not STRANGE.isdisjoint(reasons)
-    return DiagnosisStatus.CANNOT_TELL if strange or not DOUBTS.isdisjoint(reasons) else DiagnosisStatus.UNKNOWN
+    unsure = not (STRANGE | DOUBTS).isdisjoint(reasons)
+    return DiagnosisStatus.CANNOT_TELL if unsure else DiagnosisStatus.UNKNOWN

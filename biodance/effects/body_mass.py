@@ -1,7 +1,5 @@
 """The declared body mass is wrong: clothes, shoes, an old entry, another scale."""
 
-import numpy as np
-
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect, Parameter
 from biodance.effects._base.words import ACCEPT, About, CauseWords, CheckKind
@@ -48,10 +46,6 @@ class BodyMass(Effect):
     def columns(self, case: Case) -> Array:
         """Return the predicted wrench per kilogram of body mass."""
         return (case.predicted / case.phi[::10].sum())[:, :, None]
-
-    def in_proportion(self, case: Case, theta: Array) -> Array:
-        """Return the share of the body's mass, of every channel."""
-        return np.asarray(theta[0] / case.phi[::10].sum() * np.eye(6))
 
     def possible_in(self, case: Case, theta: Array) -> bool:
         """Return whether a scale or a form can be so wrong: by at most `_WRONG` of the person's mass."""

@@ -32,7 +32,6 @@ class PlateCrosstalk(InstalledPlate):
             alike=_ALIKE,
         ),
     )
-    single = True
     separated_by = "Squats, which change Fz, at several places of the plate."
     advice = "Load the plate with dead weights at its middle and corners; enter the maker's full calibration matrix."
     about = About(

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.effects._base.carried import Carried, carried_by_plates
-from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Parameter
 from biodance.effects._base.installed_plate import InstalledPlate
 from biodance.effects._base.quality_check import QualityCheck, Recorded
@@ -14,8 +13,7 @@ from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import CALIBRATE, TOO_MUCH, About, CauseWords, CheckKind
 from biodance.effects.body_mass import BodyMass
 from biodance.lab.plates.faults import GAIN
-from biodance.records import Array, Trial, Wrench
-from biodance.spatial import wrench_shift
+from biodance.records import Trial, Wrench
 
 _LARGE, _DEAD = 0.1, -0.9
 """Gain of a whole plate, five typical sizes, that statistics hold for nearly impossible; and one that reads a tenth of
@@ -77,11 +75,6 @@ class PlateGain(InstalledPlate):
     explains = (CheckKind.WEIGHT, CheckKind.FORCES)
     followed = (Quantity("gain", "1", name, "Fz", 0.003, 0.01, 0.1),)
     """Typical sizes of seven real visits of one laboratory (docs/benchmarks/plates.md)."""
-
-    def in_proportion(self, case: Case, theta: Array) -> Array:
-        """Return the gain of its channel about the plate's centre."""
-        there, only = wrench_shift(self.plate_of(case).centre), self.fault.slope(self.place)
-        return np.asarray(theta[0] * np.linalg.inv(there) @ only @ there)
 
     @classmethod
     def check(cls, recorded: Recorded) -> tuple[QualityCheck, ...]:

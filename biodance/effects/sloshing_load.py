@@ -43,7 +43,6 @@ class SloshingLoad(Effect):
         ),
         Parameter("high", "m", 0.1, "a bag hangs between loins and shoulders"),
     )
-    distinguished_by = "sloshing"
     separated_by = "A sudden stop and five seconds of standing still: the load goes on swinging, the person does not."
     advice = "Take the load off, or empty it, and repeat one trial."
     about = About(

@@ -26,11 +26,8 @@ _WHY: dict[Reason, tuple[str, str]] = {
     Reason.UNDESCRIBED_JOINTS: ("what is usual of some joints of this body is not known yet", _REFERENCE),
     Reason.UNSEEN_JOINTS: ("no marker shows how some joints move", "Put markers there, or compare two sessions."),
     Reason.TOLERANCES_DO_NOT_HOLD: ("the markers move unusually much on the body", "Check how they are fixed."),
-    Reason.EXCLUDED_BY_WITNESSES: ("feet and clocks contradict the movement", _REFERENCE),
     Reason.UNUSUAL_BODY: ("the forces fit only an unusual body, or a load or mass that nobody noted", _REFERENCE),
     Reason.OUTSIDE_TOLERANCES: ("something that is small elsewhere is large here", _REFERENCE),
-    Reason.SEVERAL_CROSSTALKS: ("several channels would have to disturb each other", "Measure the plates' corners."),
-    Reason.WITHOUT_RESEMBLED: ("what is left of the forces is too little to say", _REFERENCE),
 }
 """Why nobody can tell, and what to do about it; the first that holds is told."""
 

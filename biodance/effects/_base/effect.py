@@ -75,10 +75,6 @@ class Effect(Checked):
     laboratories find it."""
     by_load: ClassVar[bool] = False
     """Whether it is in proportion to what a plate carries: one that is always empty cannot show it."""
-    single: ClassVar[bool] = False
-    """Whether it is named only alone: several at once (cross-talks of a plate that lies elsewhere) are what a cause
-    looks like that nobody described.
-    """
     rarer: ClassVar[float] = 0.0
     """Natural logarithm: so much rarer than other faults it is."""
     screened_at: ClassVar[tuple[float, ...]] = ()
@@ -88,8 +84,6 @@ class Effect(Checked):
     carries: ClassVar[tuple[str, ...]] = ()
     """Joints of the model that it moves along: where a movement placed them without it, nothing beside them is accused.
     """
-    distinguished_by: ClassVar[str] = ""
-    """The parameter without which it is another, simpler cause (a load in which nothing sloshes); "" for none."""
 
     @classmethod
     def targets(cls, case: Case) -> tuple[str, ...]:
@@ -178,12 +172,6 @@ class Effect(Checked):
         measured, because it distorts the person's other errors and loads as well.
         """
         return self.added(case, theta)
-
-    def in_proportion(self, case: Case, theta: Array) -> Array:
-        """Return (6, 6): what this cause of size ``theta`` (p,) adds to the wrench about the lab origin is this matrix
-        times the wrench that the movement needs; errors of the movement are then in its columns, too. By default none.
-        """
-        return np.zeros((6, 6))
 
     def corrected(self, case: Case, theta: Array) -> Case:
         """Return the case without this cause of size ``theta`` (p,): what would have been measured, or the body that
