@@ -45,7 +45,6 @@ class PlateCrosstalk(InstalledPlate):
     )
     words = CauseWords("{size}{between} of {it} leaks into {other}", CALIBRATE, "a cross-talk")
     explains = (CheckKind.PRESSURE, CheckKind.FORCES)
-    rarer = 1.0
 
 
 EFFECT = PlateCrosstalk

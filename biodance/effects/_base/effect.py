@@ -75,8 +75,6 @@ class Effect(Checked):
     laboratories find it."""
     by_load: ClassVar[bool] = False
     """Whether it is in proportion to what a plate carries: one that is always empty cannot show it."""
-    rarer: ClassVar[float] = 0.0
-    """Natural logarithm: so much rarer than other faults it is."""
     screened_at: ClassVar[tuple[float, ...]] = ()
     """Sizes, in typical ones, at which a cause of one parameter is looked for beside its slope at none: where it is far
     from proportion to its size.
