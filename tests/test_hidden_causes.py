@@ -2,8 +2,8 @@
 in a set of few, with its sign and its size, and with a gain on a trial that was kept; or, for those of `UNTOLD`, at
 least no other one.
 
-The suite runs the causes of `ALWAYS` in one of them; ``make hidden`` runs them all, as CI does, ``make hidden
-PART=2/7`` every seventh.
+The suite runs the causes of `ALWAYS` in one of them; ``make hidden``, as CI, every cause in two of them (the first and
+one of the others in turn), ``make hidden PART=all`` in all three, ``PART=2/7`` a seventh.
 """
 
 import json
@@ -68,9 +68,11 @@ UNTOLD = (
 Whoever makes one of them nameable takes it out of here.
 """
 KEPT = "squat_1"
-"""Trial that no fit sees."""
-UNGAINED = ("marker_misplaced",)
-"""What is put right in the body before anything is fitted: no model without it is left to compare with."""
+"""Trial that no fit sees; where the plates do not measure it whole, each of the others is kept in turn."""
+UNGAINED = ("marker_misplaced", "external_contact")
+"""What is put right in the body before anything is fitted (no model without it is left to compare with), and a touch,
+which has another course in every trial.
+"""
 SET = 3
 """Causes that may stand in the set of one finding."""
 WITHIN = 0.25
@@ -78,10 +80,16 @@ WITHIN = 0.25
 
 
 def asked() -> list[tuple[str, str]]:
-    """Return person and cause of the part that BIODANCE_HIDDEN names (``2/7``), or those that are always run."""
-    part, _, parts = os.environ.get("BIODANCE_HIDDEN", "").partition("/")
+    """Return person and cause of the part that BIODANCE_HIDDEN names (``2/7``; ``all``), or those always run."""
+    word = os.environ.get("BIODANCE_HIDDEN", "")
+    first, *others = PEOPLE
     every = [(who, text) for who in PEOPLE for text in CAUSES]
-    return every[int(part) - 1 :: int(parts)] if parts else every[: len(ALWAYS)]
+    if word in ("", "all"):
+        return every if word else every[: len(ALWAYS)]
+    part, _, parts = word.partition("/")
+    twice = [(first, text) for text in CAUSES]
+    twice += [(others[k % len(others)], text) for k, text in enumerate(CAUSES)]
+    return twice[int(part) - 1 :: int(parts)]
 
 
 def sizes(one: dict[str, Any], name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -104,8 +112,8 @@ def assert_named(document: dict[str, Any], hidden: Hidden) -> None:
     assert along > 0, "the wrong sign"
     assert along == pytest.approx(np.linalg.norm(true), rel=WITHIN, abs=2 * float(sd.max()))
     if hidden.name not in UNGAINED:
-        assert first["gain"]["trials"] == [KEPT]
-        assert first["gain"]["ci95"][0] > 0, "no gain on the trial that was kept"
+        assert first["gain"]["trials"], "no gain was measured"
+        assert first["gain"]["ci95"][0] > 0, "no gain on trials that were kept"
 
 
 @pytest.mark.parametrize(("who", "text"), asked())

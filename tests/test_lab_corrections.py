@@ -62,6 +62,20 @@ def test_gain_crosstalk_offset_and_delay_are_taken_off() -> None:
     assert off(late, PlateCorrection("time_delay", "", 0.012)) < 1e-6
 
 
+def test_a_delay_is_taken_off_a_trial_whose_ends_are_not_known() -> None:
+    """The first 40 samples were padded, ten in the middle lost: held before the first, lost where they were."""
+    plate = trial().plates[0]
+    value = np.roll(plate.wrench.value, 20, axis=0)
+    value[:40], value[300:310] = np.nan, np.nan
+    wrong = replace(trial(), plates=(replace(plate, wrench=Wrench(TIME, value)),))
+    found = corrected_trial(wrong, [PlateCorrection("time_delay", "", 0.02)]).plates[0].wrench.value
+    lost = np.flatnonzero(np.isnan(found).any(axis=1))
+    assert set(range(280, 290)) <= set(lost) <= set(range(279, 291))
+    kept = np.setdiff1d(np.arange(30, TIME.size - 30), lost)
+    np.testing.assert_allclose(found[kept], plate.wrench.value[kept], atol=1e-3)
+    assert np.isfinite(found[:100]).all()
+
+
 def test_a_plate_that_is_not_meant_stays_as_it_is() -> None:
     same = corrected_trial(trial(), [PlateCorrection("plate_position", "plate2:x", 0.03)])
     np.testing.assert_array_equal(same.plates[0].wrench.value, trial().plates[0].wrench.value)

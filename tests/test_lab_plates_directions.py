@@ -60,6 +60,21 @@ def test_sway_is_not_seen_where_nobody_sways():
         assert sway_sign(force, rng.normal(0, 2 / 700, (4000, 3)), RATE) == 0
 
 
+@pytest.mark.parametrize("seconds", [2.6, 5.0])
+def test_sway_that_agrees_by_chance_tells_no_sign(seconds):
+    """Shear and pressure drawn apart, in the band of sway, in 400 short standings."""
+    rng, told, count = np.random.default_rng(1), 0, int(seconds * RATE)
+    low = np.fft.rfftfreq(count, 1 / RATE)
+    for _ in range(400):
+        spectrum = rng.normal(size=(4, low.size)) + 1j * rng.normal(size=(4, low.size))
+        spectrum[:, (low < 0.5) | (low > 5.0)] = 0
+        noise = np.fft.irfft(spectrum, count)
+        shear, cop = (part / part.std(axis=1, keepdims=True) for part in (noise[:2], noise[2:]))
+        force = np.column_stack([*(2.0 * shear), np.full(count, 700.0)])
+        told += sway_sign(force, np.column_stack([*(0.002 * cop), np.zeros(count)]), RATE) != 0
+    assert told <= 2
+
+
 @pytest.mark.parametrize("reaction", [True, False])
 def test_sway_confirms_a_sound_plate(reaction):
     plate = Emulated(3, half=np.array([0.3, 0.45]), origin=np.array([0.21, 0.35, -0.058]), reaction=reaction)

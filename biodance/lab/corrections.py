@@ -55,15 +55,23 @@ class PlateCorrection:
 
 
 def _free(plate: Plate, one: PlateCorrection) -> Plate:
-    """Return a plate as it would have recorded without the cause, at the same times: held constant beyond the ends."""
+    """Return a plate as it would have recorded without the cause, at the same times: held constant beyond the first and
+    last known sample, NaN beside samples between them that are.
+    """
     free = one.fault.undone(plate, one.target.rpartition(":")[2], one.value)
     time, moved = plate.wrench.time, free.wrench.time
     if moved is time:
         return free
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(moved, free.wrench.value, k=min(3, time.size - 1))
-    return replace(plate, wrench=Wrench(time, np.asarray(spline(np.clip(time, moved[0], moved[-1])))))
+    value = free.wrench.value
+    known = np.isfinite(value).all(axis=1)
+    if not known.any():
+        return plate
+    spline = make_interp_spline(moved[known], value[known], k=min(3, int(known.sum()) - 1))
+    there = np.clip(time, *moved[known][[0, -1]])
+    beside = np.interp(there, moved, np.logical_not(known)) > 0
+    return replace(plate, wrench=Wrench(time, np.where(beside[:, None], np.nan, spline(there))))
 
 
 def corrected_trial(trial: Trial, corrections: Iterable[PlateCorrection]) -> Trial:

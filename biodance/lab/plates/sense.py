@@ -199,15 +199,17 @@ def sway_sign(force: Array, point: Array, rate: float) -> int:
 
     A person who stands is an inverted pendulum: the ground's shear on the person is opposite to the quick part of the
     centre of pressure, ``F = -(m g / h) (CoP - CoM)``, whatever the sign of the vertical channel. Needs 2.5 s of
-    standing on this one plate (vertical within 5 %), and both axes must agree in sign, correlate by at least 0.4 and
-    have a slope between 0.25 and 3 per metre.
+    standing on this one plate (vertical within 5 %), and both axes must agree in sign, correlate by at least 0.4 and by
+    three standard errors (1 / sqrt of the seconds: the band holds 9 independent samples each), and have a slope between
+    0.25 and 3 per metre.
 
     ``force`` (S, 3) N and ``point`` (S, 3) m, the centre of pressure, in the same axes; ``rate`` Hz.
     """
     part = _standing(force[:, 2], rate)
     if part is None:
         return 0
-    signs = []
+    seconds = len(force[part]) / rate
+    least, signs = max(_SWAY_CORRELATION, 3 / np.sqrt(2 * (_SWAY_BAND[1] - _SWAY_BAND[0]) * seconds)), []
     for axis in (0, 1):
         shear, cop = _band(force[part, axis], rate), _band(point[part, axis], rate)
         power = float(cop @ cop)
@@ -215,7 +217,7 @@ def sway_sign(force: Array, point: Array, rate: float) -> int:
             return 0
         correlation = float(shear @ cop / np.sqrt(power * float(shear @ shear)))
         slope = abs(float(shear @ cop)) / power / abs(float(force[part, 2].mean()))
-        if abs(correlation) < _SWAY_CORRELATION or not _SWAY_SLOPE[0] <= slope <= _SWAY_SLOPE[1]:
+        if abs(correlation) < least or not _SWAY_SLOPE[0] <= slope <= _SWAY_SLOPE[1]:
             return 0
         signs.append(-np.sign(correlation))
     return int(signs[0]) if signs[0] == signs[1] else 0
