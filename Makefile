@@ -14,7 +14,7 @@ test: $(STAMP) bundle-if-possible
 	$(BIN)/python -m pytest -n 2 --dist worksteal # halves that stay whole: what a file's tests share is made once
 
 PART ?= 1/1
-hidden: $(STAMP) # every cause hidden in a session and found again; by hand PART=2/7: every seventh
+hidden: $(STAMP) # every cause hidden in sessions of two people and found again; by hand PART=all: of three, PART=2/7: a seventh
 	BIODANCE_HIDDEN=$(PART) $(BIN)/python -m pytest -n 2 tests/test_hidden_causes.py
 
 lint: $(STAMP)
