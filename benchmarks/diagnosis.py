@@ -14,6 +14,7 @@ import argparse
 import os
 import tempfile
 import time
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -38,12 +39,8 @@ from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 COLUMNS = ("real", "foreign", "third", "own", "drawn")
-REAL = (
-    *(f"biomechzoo/HC{number}A" for number in ("030", "031", "032", "038", "044", "050", "055")), "adl_gait", "pycgm",
-    "c3d_parser_Sydney", "c3d_parser_QCMAS", "gaitalytics/test_small", "gaitalytics/treadmill_no_events", "c3d_parser",
-)  # fmt: skip
-TRULY = {f"biomechzoo/HC0{n}A": {"labels_swapped"} for n in (30, 38, 50, 55)} | {"c3d_parser_QCMAS": {"time_delay"}}
-"""What is wrong in a real session: names that are not false."""
+REAL = tomllib.loads(Path(__file__).with_name("real_sessions.toml").read_text(encoding="utf-8"))
+"""Real sessions with their names that are not false."""
 UNKNOWN = "unknown"  # effect of a cause of the foreign laboratory that no file here describes
 FOREIGN = (
     ("plate_position", "plate_position", "0.03", "x"), ("plate_rotation", "plate_rotation", "5", "z"),
@@ -102,7 +99,7 @@ def real(name: str, _: Path) -> tuple[SessionResult, Told]:
     """Return a real session without a known fault."""
     place = Path(os.environ["BIODANCE_DATA"]) / name
     place = place if place.is_dir() else place.with_suffix(".c3d")
-    return biodance.examine(biodance.read_session(place)), Told(beside=frozenset(TRULY.get(name, ())))
+    return biodance.examine(biodance.read_session(place)), Told(beside=frozenset(REAL[name]))
 
 
 def foreign(seed: int, number: int | None, folder: Path) -> tuple[SessionResult, Told]:

@@ -4,15 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, offset, windows
+from diagnosed_sessions import about_plate, body, known, offset, windows
 from inferred_rows import Drawn, rows, search
 from inferred_sessions import heard, inferred
 from walking import MASS, Wrong, session, standing, walk
 
+from biodance.diagnosis.reasons import DiagnosisStatus
+from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause
-from biodance.inference.decision import IN_SET, NAMED, SUGGESTED, places
+from biodance.inference.decision import IN_SET, NAMED, places
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.sets import hypothesis
+from biodance.observations import Observation
+
+FAST = ("plate_gain", "plate_offset", "time_delay", "body_mass")
 
 
 @pytest.fixture(scope="module")
@@ -87,18 +92,85 @@ def test_a_second_cause_has_its_own_place(bare: Hypothesis) -> None:
     assert found == pytest.approx({"a": 0.6 / 0.68, "b": 0.6 / 0.9})
 
 
-FAST = ("plate_gain", "plate_offset", "time_delay", "body_mass")
+def test_two_causes_that_are_sure_beside_each_other_are_no_surer_than_both_together(bare: Hypothesis) -> None:
+    """Each explains what the other does wrong: neither is there alone, and both are as probable as none."""
+    none, both, alone = logs(0.49, 0.5, 0.005)
+    sizes = {"a": (1.0, 0.1), "b": (-1.0, 0.1)}
+    every = posterior(
+        holding(bare, none),
+        *(holding(bare, alone, **{name: sizes[name]}) for name in sizes),
+        holding(bare, both, **sizes),
+    )
+    assert [place.probability for place in places(every, {})] == pytest.approx([0.505, 0.505])
 
 
-@pytest.mark.parametrize("size", [2.5, 3.5, 6.0])
-def test_what_is_told_goes_by_the_probability(size: float) -> None:
+@pytest.mark.parametrize("unknown", [0.2, 0.6, 0.95])
+def test_a_cause_is_as_probable_as_with_and_without_an_unknown_one(bare: Hypothesis, unknown: float) -> None:
+    """0.9 where noise is as in laboratories, 0.3 where it is as loud as an unknown cause makes it."""
+    quiet = [holding(bare, np.log(0.1 * (1 - unknown))), holding(bare, np.log(0.9 * (1 - unknown)), a=(1.0, 0.1))]
+    beside = [replace(one, log_unknown=np.log(unknown / (1 - unknown)) + one.log_posterior) for one in quiet]
+    loud = posterior(holding(bare, np.log(0.7)), holding(bare, np.log(0.3), a=(2.0, 0.1)))
+    every = replace(posterior(*beside), louder=loud)
+    assert every.unknown == pytest.approx(unknown)
+    assert every.best in (loud.hypotheses if unknown > 0.5 else every.hypotheses)
+    assert every.probabilities() == {("drawn", "a"): pytest.approx((1 - unknown) * 0.9 + unknown * 0.3)}
+    for place in places(every, {}):
+        assert place.probability <= (1 - unknown) * 0.9 + unknown * 0.3 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("size", "where"), [(3.5, "tolerated"), (6.0, "tolerated"), (8.0, "findings"), (12.0, "findings")]
+)
+def test_what_is_told_is_sure_and_larger_than_laboratories_have(size: float, where: str) -> None:
+    """Zeros of up to 7 N stand in laboratories without being called a fault."""
     one = inferred(body(), windows(1, trials=2, hidden=offset(size)), tolerances=known(), effects=FAST)
     told = one.diagnosis
-    assert all(finding.probability >= NAMED for finding in told.findings)
-    assert all(SUGGESTED <= like.probability < NAMED for like in told.resembles)
+    (found,) = getattr(told, where)
+    assert found.effect == "plate_offset"
+    assert found.probability >= NAMED
+    assert found.parameters[0].value == pytest.approx(size, abs=0.6)
+    assert len(told.findings) + len(told.tolerated) == 1
     assert len(one.named) == len(told.findings)
-    for finding, cause in zip(told.findings, one.named, strict=True):
-        assert (finding.effect, finding.target) == (cause.effect.name, cause.effect.target)
+    assert told.explained
+
+
+def steps(*times: float) -> ObservedEvidence:
+    """Return a foot seen on the plate at some ``times`` (s), where it should be."""
+    seen = (
+        Observation("foot_along", f"left foot on plate1 at {t} s", "t0", 0.0, 0.02, 0.0, "m", plate="plate1")
+        for t in times
+    )
+    return ObservedEvidence(tuple(seen), {}, {})
+
+
+@pytest.mark.parametrize(("times", "told"), [((), True), ((1.0,), False), ((1.0, 2.5), True)])
+def test_one_step_names_no_fault_of_its_plate(times: tuple[float, ...], told: bool) -> None:
+    """Nor does it say that nothing is wrong: 40 N are there."""
+    hidden = windows(1, trials=2, hidden=offset(40.0))
+    one = inferred(body(), hidden, tolerances=known(), effects=FAST, evidence=steps(*times)).diagnosis
+    assert [f.effect for f in (one.findings if told else one.resembles)] == ["plate_offset"]
+    assert one.explained == told
+    assert one.status is (DiagnosisStatus.NAMED if told else DiagnosisStatus.CANNOT_TELL)
+
+
+@pytest.mark.parametrize(("lags", "told"), [((), True), ((0.0, 0.001), False), ((0.035, 0.04), True)])
+def test_no_delay_is_named_that_newton_contradicts(lags: tuple[float, ...], told: bool) -> None:
+    """Forces come 20 ms late; total force and trunk go together, or 35 to 40 ms apart."""
+
+    def late(local: np.ndarray, session: tuple[float, float]) -> np.ndarray:
+        return np.concatenate([local[:1], local[:-1]])
+
+    seen = ObservedEvidence(
+        tuple(Observation("newton", "all plates, lag", f"t{k}", lag, 0.002, 0.0, "s") for k, lag in enumerate(lags)),
+        {},
+        {},
+    )
+    hidden = windows(1, trials=2, hidden=about_plate(late))
+    one = inferred(body(), hidden, tolerances=known(), effects=FAST, evidence=seen).diagnosis
+    (found,) = one.findings if told else one.resembles
+    assert found.effect == "time_delay"
+    assert found.parameters[0].value == pytest.approx(0.02, abs=0.001)
+    assert one.status is (DiagnosisStatus.NAMED if told else DiagnosisStatus.CANNOT_TELL)
 
 
 def test_no_size_is_surer_than_plates_as_installed_are_alike() -> None:

@@ -13,7 +13,7 @@ from biodance.diagnosis.candidates import SCALE
 from biodance.effects import NamedCause
 from biodance.inference.causes import UNLIKE
 from biodance.inference.hypotheses import UNKNOWN, Hypothesis, Posterior
-from biodance.inference.scales import FLOOR, Scales, nominal, posterior, prior_sd
+from biodance.inference.scales import FLOOR, Scales, bare, nominal, posterior, prior_sd
 from biodance.inference.scales import LOUD as LOUDNESS
 from biodance.inference.sets import hypothesis, infer, screen
 from biodance.inference.unknown import EXCESS, OWN, P_UNKNOWN, energies, with_unknown
@@ -186,13 +186,25 @@ def test_what_nobody_knows_in_one_band_and_channel_is_probable_there(seed: int) 
     assert found.best.where_unknown == divmod(LOUD, 6)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_causes_are_sought_where_nothing_is_louder_than_the_noise(seed: int) -> None:
+    """A hundredfold square in one of thirty blocks: the noise grows until none of them stands out."""
+    some = search(beaten(seed))
+    found = infer(some)
+    assert found.louder is not None
+    (same,) = (one for one in found.louder.hypotheses if one.names == found.unexplained.names)
+    assert max(energies(one)[0].max() for one in found.hypotheses if one.names == same.names) > 2.0
+    assert energies(same)[0].max() < 1.2
+    assert same.fit.scales.noise > 1.0
+
+
 def test_the_noise_of_an_unknown_cause_makes_no_name() -> None:
     """At the noise of the session, several of ten such blocks name the cause that lies in them."""
     plain, final = [], []
     for seed in range(10):
         some = search(beaten(seed))
         base = hypothesis(some, ())
-        alone = screen(some, replace(base, fit=posterior(some.inner, prior_sd(some.rows), nominal(some.rows))))
+        alone = screen(some, replace(base, fit=posterior(bare(some.columns), prior_sd(some.rows), nominal(some.rows))))
         plain.append(alone[0].gain > 0)
         final.append(infer(some).probabilities().get(("drawn", "a"), 0.0))
     assert sum(plain) >= 3

@@ -36,6 +36,8 @@ class Reason(StrEnum):
     """No marker shows what moves at some joints, and the plates measure it."""
     TOLERANCES_DO_NOT_HOLD = "tolerances do not hold"
     """The markers move more on the body than where tolerances were learned."""
+    CONTRADICTED = "contradicted"
+    """What the simulation would name is contradicted by Newton, or rests on a single step."""
     UNUSUAL_BODY = "unusual body"
     """The forces fit only a body that is more unlike the table than people are."""
     OUTSIDE_TOLERANCES = "outside tolerances"
@@ -57,6 +59,7 @@ DOUBTS = frozenset(
         Reason.UNDESCRIBED_JOINTS,
         Reason.UNSEEN_JOINTS,
         Reason.TOLERANCES_DO_NOT_HOLD,
+        Reason.CONTRADICTED,
     )
 )
 """Reasons for which no cause can be told, whatever is left."""

@@ -3,7 +3,8 @@
 A cause is named where it, or a look-alike in its place, is there with at least the probability `NAMED`, and what it
 does matters to a laboratory (`consequence`). Its set holds 95 % of the posterior of its place, and whatever the data
 cannot tell from it, however rare it is. Its size is averaged over all sets of causes that hold it without a look-alike.
-No delay is named that Newton contradicts, and no fault of a plate from one step on it.
+No delay is named that Newton contradicts, and no fault of a plate from one step on it: nobody can then tell what is
+wrong.
 """
 
 from collections.abc import Mapping, Set
@@ -106,21 +107,9 @@ def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...
     """Return every cause of the most probable set, with what may stand in its place, as probable as with and without
     an unknown cause; where one of several is not sure beside the others, of the most probable set of one fewer.
     """
-    lead = posterior.lead
-    return tuple(replace(one, probability=_whatever_the_noise(posterior, one)) for one in _places(lead, prior))
-
-
-def _whatever_the_noise(posterior: Posterior, place: Place) -> float:
-    """Return the probability that a cause of a ``place`` is there: with an unknown cause, which makes all louder, or
-    without.
-    """
-    if posterior.louder is None:
-        return place.probability
-    with_it = posterior.lead is posterior.louder
-    other = replace(posterior, louder=None) if with_it else posterior.louder
-    share = posterior.unknown if with_it else 1 - posterior.unknown
-    names = {name for name, *_ in place.shares}
-    return share * place.probability + (1 - share) * other.share(names)
+    found = ((one, {name for name, *_ in one.shares}) for one in _places(posterior.lead, prior))
+    # beside the others a cause may be sure, and yet all of them together no better than none
+    return tuple(replace(one, probability=min(one.probability, posterior.share(names))) for one, names in found)
 
 
 def _places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
@@ -172,23 +161,26 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     """Return what a session ends with; ``bare`` its diagnosis before any judgement of causes."""
     rows, best = search.rows, posterior.best
     every = [(place, _finding(place, rows, best)) for place in places(posterior, search.prior)]
-    named = [(p, f) for p, f in every if p.probability >= NAMED and _told(rows, p.cause)]
-    resembled = [f for p, f in every if SUGGESTED <= p.probability < NAMED and _told(rows, p.cause)]
-    small = [f for p, f in every if p.probability >= SUGGESTED and not _told(rows, p.cause)]
+    likely = [(p, f) for p, f in every if p.probability >= SUGGESTED]
+    large = [(p, f) for p, f in likely if _is_large(rows, p.cause)]
+    sure = [(p, f) for p, f in large if p.probability >= NAMED]
+    named = [(p, f) for p, f in sure if not (_is_contradicted(rows, p.cause) or _is_of_one_step(rows, p.cause))]
+    resembled = [f for p, f in large if (p, f) not in named]
     left = adequacy(posterior.unexplained, rows) if rows.problem is not None else ()
     unknown = posterior.unknown >= UNKNOWN and any(row.matters for row in left)
     why = dict(bare.why) | dict.fromkeys(_strange(posterior.unexplained, rows) if unknown or named else (), ())
     why |= {Reason.FORCES_LEFT: ()} if unknown else {}
+    why |= {Reason.CONTRADICTED: ()} if len(named) < len(sure) else {}
     findings = tuple(replace(f, set=(*f.set, *_habit_alias(p, best, rows), *_load_alias(p, rows))) for p, f in named)
     habit = _habit(best, rows, findings)
     clean = float(posterior.weights[[not one.causes for one in posterior.hypotheses], 0].sum())
     told = replace(
         bare,
-        explained=not (unknown or (named and resembled)),
+        explained=not (unknown or (named and resembled) or len(named) < len(sure)),
         why=why,
         findings=(*findings, *habit),
         resembles=tuple(resembled),
-        tolerated=tuple(small),
+        tolerated=tuple(f for p, f in likely if (p, f) not in large),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
         p_clean=clean,
@@ -197,11 +189,11 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     return Inferred(told, search, posterior, tuple(p.cause for p, _ in named))
 
 
-def _told(rows: Rows, one: NamedCause) -> bool:
+def _is_large(rows: Rows, one: NamedCause) -> bool:
     """Return whether a cause is large enough to be told: it matters, is larger than laboratories have without calling
     it a fault (by a standard deviation), and what it changes in this session's wrench matters.
     """
-    if not matters(one.effect, one.theta) or _is_contradicted(rows, one) or _is_of_one_step(rows, one):
+    if not matters(one.effect, one.theta):
         return False
     if one.course:
         return True
