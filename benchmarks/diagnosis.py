@@ -6,7 +6,7 @@ third, own and drawn at random from our own family.
 
 Every session goes through the front door: written, read, examined, diagnosed. Each is run once and kept in FOLDER, so
 that a stopped run goes on; ``--tell`` prints only the table of what is there. Without ``--first`` people are drawn by
-the date of the run. Real sessions are those without a known fault; faults written into the bytes of real walks are in
+the date of the run. Real sessions stand in real_sessions.toml; faults written into the bytes of real walks are in
 `walks`.
 """
 
@@ -96,7 +96,7 @@ class Job(NamedTuple):
 
 
 def real(name: str, _: Path) -> tuple[SessionResult, Told]:
-    """Return a real session without a known fault."""
+    """Return a real session, and what is known to be wrong in it."""
     place = Path(os.environ["BIODANCE_DATA"]) / name
     place = place if place.is_dir() else place.with_suffix(".c3d")
     return biodance.examine(biodance.read_session(place)), Told(beside=frozenset(REAL[name]))
