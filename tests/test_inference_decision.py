@@ -92,7 +92,7 @@ def test_a_second_cause_has_its_own_place(bare: Hypothesis) -> None:
     assert found == pytest.approx({"a": 0.6 / 0.68, "b": 0.6 / 0.9})
 
 
-def test_two_causes_that_are_sure_beside_each_other_are_no_surer_than_both_together(bare: Hypothesis) -> None:
+def test_two_causes_sure_beside_each_other_are_no_surer_than_both(bare: Hypothesis) -> None:
     """Each explains what the other does wrong: neither is there alone, and both are as probable as none."""
     none, both, alone = logs(0.49, 0.5, 0.005)
     sizes = {"a": (1.0, 0.1), "b": (-1.0, 0.1)}
