@@ -10,7 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from biodance.diagnosis.consequence import matters
 from biodance.effects import NamedCause, effects
-from biodance.inference.decision import _told
+from biodance.inference.decision import _is_large
 
 ZERO, LEAK = ("plate_offset", "Fx"), ("plate_crosstalk", "Fz->Fx")
 
@@ -93,8 +93,8 @@ def test_what_is_told_must_move_something_that_matters() -> None:
     found = inferred(body(), some, tolerances=known(), effects=("plate_offset",))
     (named,), rows = found.named, found.search.rows
     leak = NamedCause(effects()["plate_crosstalk"].at("Fy->Fz", rows.problem.cases[0]), np.array([0.01]), np.eye(1))
-    assert _told(rows, named)
-    assert not _told(rows, replace(named, theta=np.array([0.2])))
+    assert _is_large(rows, named)
+    assert not _is_large(rows, replace(named, theta=np.array([0.2])))
     assert matters(leak.effect, leak.theta)
-    assert not _told(rows, leak)
-    assert _told(rows, replace(leak, course={"some trial": np.ones(3)}))
+    assert not _is_large(rows, leak)
+    assert _is_large(rows, replace(leak, course={"some trial": np.ones(3)}))
