@@ -100,3 +100,41 @@ def test_a_touch_that_came_and_went_before_is_not_judged_by_trials_without_it(mo
     for window, judged in zip(every, (False, True), strict=True):
         course = {window.trial.name: np.ones(3)}
         assert gains._acts(result, replace(touch, course=course)) is judged
+
+
+def test_a_habit_beside_named_causes_is_nothing_to_accept(monkeypatch: pytest.MonkeyPatch) -> None:
+    every = windows(1, trials=4, hidden=about_plate(lambda local, _: local * [1, 1, 1.05, 1, 1, 1]))
+    by_role = {"fit": every[:2], "validate": every[2:]}
+    monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
+    found = inferred(body(), by_role["fit"], tolerances=known(), effects=("plate_gain",))
+    habit = Finding("toe_landmark", "both", (), (Alias("toe_landmark", "both", np.inf),), 1.0)
+    told = replace(found, diagnosis=replace(found.diagnosis, findings=(*found.diagnosis.findings, habit)))
+    result: Any = SimpleNamespace(body=body(), trials=())
+    cases = cases_of(body(), every[:2])
+    before = identify_body(body(), tuple(case_fit(c, w.use) for c, w in zip(cases, every[:2], strict=True)))
+    one, last = gains.accepted(result, told, before).inferred.diagnosis.findings
+    assert one.gain is not None
+    assert one.gain.proven
+    assert (last.effect, last.gain) == ("toe_landmark", None)
+
+
+@pytest.mark.parametrize("judged", ["standing", "unchanged"])
+def test_what_tells_nothing_of_a_finding_does_not_take_it_back(monkeypatch: pytest.MonkeyPatch, judged: str) -> None:
+    """The trials that were kept only stand, or the cause does nothing in them: a plate where nobody steps."""
+    every = windows(1, trials=4, hidden=about_plate(lambda local, _: local * [1, 1, 1.05, 1, 1, 1]))
+    kept = every[2:]
+    if judged == "standing":
+        kept = tuple(replace(one, trial=replace(one.trial, role="static")) for one in kept)
+    by_role = {"fit": every[:2], "validate": kept}
+    monkeypatch.setattr(gains, "windows", lambda _, roles: by_role[roles[0]])
+    found = inferred(body(), by_role["fit"], tolerances=known(), effects=("plate_gain",))
+    size = 0.05 if judged == "unchanged" else -0.5
+    (cause,) = (replace(one, theta=np.array([size])) for one in found.named)
+    if judged == "unchanged":
+        monkeypatch.setattr(gains, "accept", lambda case, named: case)
+    result: Any = SimpleNamespace(body=body(), trials=())
+    cases = cases_of(body(), every[:2])
+    before = identify_body(body(), tuple(case_fit(c, w.use) for c, w in zip(cases, every[:2], strict=True)))
+    told = gains.accepted(result, replace(found, named=(cause,)), before).inferred.diagnosis
+    assert [one.effect for one in told.findings] == ["plate_gain"]
+    assert told.findings[0].gain is None or judged == "standing"

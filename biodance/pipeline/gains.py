@@ -124,12 +124,12 @@ def _accepted(result: SessionResult, inferred: Inferred, before: Identification)
     found = _corrected(result, partial(accept, named=every), phi)
     as_is = _corrected(result, partial(accept, named=()), phi, before)
     findings = tuple(replace(one, changes=_changes(before, found.identified)) for one in inferred.diagnosis.findings)
-    single = len(findings) == 1
+    single, habits = len(every) == 1, (None,) * (len(findings) - len(every))  # a habit is nothing to accept
     gains = [
-        _gain(as_is if single else _without(result, inferred, k), found) if _acts(result, every[k]) else None
-        for k in range(len(findings))
+        _gain(as_is if single else _without(result, inferred, k), found) if _acts(result, one) else None
+        for k, one in enumerate(every)
     ]
-    findings = tuple(replace(one, gain=gain) for one, gain in zip(findings, gains, strict=True))
+    findings = tuple(replace(one, gain=gain) for one, gain in zip(findings, (*gains, *habits), strict=True))
     told = replace(inferred, diagnosis=replace(inferred.diagnosis, findings=findings))
     left = (as_is.kept, found.kept) if as_is.kept and found.kept else None
     return Accepted(told, found.identified, left, _gain(as_is, found))
