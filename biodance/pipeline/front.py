@@ -14,8 +14,8 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels
 from biodance.pipeline.body import refuse_another_reference
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
-from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
+from biodance.pipeline.inside import identified_visit
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import known_body
@@ -100,6 +100,8 @@ def identify(
 ) -> SessionIdentification:
     """Return what every segment of a person weighs, with intervals, validated on the trials kept.
 
+    What the diagnosis proves to be wrong with signs, zeros, clocks and gains of the plates is taken off before.
+
     Parameters
     ----------
     session : Session, SessionResult, str or pathlib.Path
@@ -145,8 +147,8 @@ def identify(
     """
     before = None if reference is None else _earlier(reference, tell)
     result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
-    found = identification_of(result)
-    return found if dance is None else replace(found, performance=performance_of(result, dance))
+    known = read_lab(lab).tolerances
+    return identification_of(identified_visit(result, reference=before, tolerances=known, dance=dance, tell=tell))
 
 
 def diagnose(
@@ -276,7 +278,7 @@ def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:
     """Return what a visit says about the body."""
     if isinstance(session, SessionIdentification):
         return session
-    return identification_of(examined_visit(session, tell=tell))
+    return identify(session, tell=tell)
 
 
 def _beside(result: SessionResult, before: SessionIdentification) -> SessionResult:
@@ -286,7 +288,6 @@ def _beside(result: SessionResult, before: SessionIdentification) -> SessionResu
         return result
     refuse_another_reference(before.identification.body, result.body, result.subject.mass, before.name)
     name = result.session.folder.name
-    again = identify_trials(
-        result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior
-    )
-    return replace(result, identification=again)
+    known = {"prior": result.prior, "corrections": result.corrections, "weighed": result.weighed}
+    again = identify_trials(result.body, result.trials, name=name, reference=before, checks=result.checks, **known)
+    return replace(result, identification=replace(again, corrected=found.corrected))

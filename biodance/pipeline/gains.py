@@ -64,7 +64,7 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
         fault = PLATE_FAULTS.get(one.effect)
         size = {p.name: p for p in one.parameters}.get(fault.parameter) if fault else None
         if size is not None and np.isfinite(size.value):
-            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
+            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source, one.trials))
     return tuple(out)
 
 

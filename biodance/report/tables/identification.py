@@ -20,8 +20,21 @@ AGREEMENT_ROW = Schema("rms cc=correlation frames")
 """RMS and correlation of six channels; null where a correlation is not defined."""
 VALIDATION_ROW = Schema(
     "trial=name about_m=about",
-    {"table": AGREEMENT_ROW.at("table_agreement"), "identified": AGREEMENT_ROW.at("identified_agreement")},
+    {
+        "table": AGREEMENT_ROW.at("table_agreement"),
+        "identified": AGREEMENT_ROW.at("identified_agreement"),
+        "gain": Schema("", {name: Schema("value ci95") for name in ("mass", "distribution")}),
+    },
 )
+CORRECTED_ROW = Schema("effect target value=parameters.0.value sd=parameters.0.sd unit=parameters.0.unit trials")
+"""What was taken off before the fit, in the unit of its cause, null where it has no size; () = all trials. Of a turned
+sign: where in the lab its moments are about, if not about the plate's centre.
+"""
+
+
+def corrected_document(found: SessionIdentification | None) -> list[Row]:
+    """Return what was proven to be wrong with the recordings and taken off before the body was fitted."""
+    return CORRECTED_ROW.rows(found.corrected) if found else []
 
 
 def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:
