@@ -106,7 +106,7 @@ def _hangs_on(error: BaseException) -> Why:
 def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, TrialRows]:
     """Return status, reason and rows of a session that goes through."""
     from biodance.lab.session.read import read_session
-    from biodance.pipeline.inside import diagnosed_and_corrected
+    from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine

@@ -1,5 +1,6 @@
 """The commands that ask what is wrong and what a body weighs: foresee, diagnose, identify; of a person, or a robot."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -176,7 +177,8 @@ def identify_command(
         for_people = (*reading.given(), *(name for name, value in given.items() if value is not None))
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
-    from biodance.pipeline.inside import identified_visit
+    from biodance.pipeline.diagnosis import diagnosed_and_corrected
+    from biodance.pipeline.front_dance import performance_of
     from biodance.pipeline.judged_trials import failed_checks
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.movement import describe_movement
@@ -188,8 +190,11 @@ def identify_command(
         shown = None if dance is None else Dance.load(dance)
         result, before, place = examine_with_reference(session, reading, results, tell, dance=shown)
         known = read_lab(reading.lab).tolerances
-        result = identified_visit(result, reference=before, tolerances=known, dance=shown, tell=tell)
+        result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
         found = identification_of(result)
+        if shown is not None:
+            found = replace(found, performance=performance_of(result, shown))
+            result = replace(result, identification=found)
         tell("checking units, signs, labels and clocks")
         checks = failed_checks(result)
         moved = describe_movement(result, lab=reading.lab, tell=tell)

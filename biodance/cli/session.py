@@ -45,7 +45,7 @@ def report_session(
     """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
     person who was measured; return the result and the content of results.json.
     """
-    from biodance.pipeline.inside import diagnosed_and_corrected
+    from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement

@@ -13,9 +13,9 @@ from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels
 from biodance.pipeline.body import refuse_another_reference
-from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
+from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
+from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
-from biodance.pipeline.inside import identified_visit
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import known_body
@@ -148,7 +148,9 @@ def identify(
     before = None if reference is None else _earlier(reference, tell)
     result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
     known = read_lab(lab).tolerances
-    return identification_of(identified_visit(result, reference=before, tolerances=known, dance=dance, tell=tell))
+    result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
+    found = identification_of(result)
+    return found if dance is None else replace(found, performance=performance_of(result, dance))
 
 
 def diagnose(
@@ -288,6 +290,8 @@ def _beside(result: SessionResult, before: SessionIdentification) -> SessionResu
         return result
     refuse_another_reference(before.identification.body, result.body, result.subject.mass, before.name)
     name = result.session.folder.name
-    known = {"prior": result.prior, "corrections": result.corrections, "weighed": result.weighed}
-    again = identify_trials(result.body, result.trials, name=name, reference=before, checks=result.checks, **known)
+    again = identify_trials(
+        result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior,
+        corrections=result.corrections, weighed=result.weighed,
+    )  # fmt: skip
     return replace(result, identification=replace(again, corrected=found.corrected))
