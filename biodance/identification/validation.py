@@ -68,7 +68,7 @@ class TrialValidation:
         unit = np.maximum(found[2].sum(axis=0), _TINY)
         sums = np.stack([(squares / unit).sum(axis=1) for squares in found])
         drawn = np.random.default_rng(0).integers(0, sums.shape[1], (_DRAWS, sums.shape[1]))
-        value, spread = sums.sum(axis=1), sums[:, drawn].sum(axis=2)
+        value, spread = (np.maximum(one, _TINY) for one in (sums.sum(axis=1), sums[:, drawn].sum(axis=2)))
 
         def removed(first: int, second: int) -> ShareRemoved:
             low, high = np.percentile(1 - np.sqrt(spread[second] / spread[first]), [2.5, 97.5])

@@ -1,9 +1,10 @@
 """What identification found. Channels in the order Fx Fy Fz Mx My Mz."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from biodance.diagnosis.diagnosis import Finding
 from biodance.display import spaced
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
@@ -26,7 +27,14 @@ VALIDATION_ROW = Schema(
         "gain": Schema("", {name: Schema("value ci95") for name in ("mass", "distribution")}),
     },
 )
-CORRECTED_ROW = Schema("effect target value=parameters.0.value sd=parameters.0.sd unit=parameters.0.unit trials")
+
+
+def _size(name: str) -> Callable[[Finding], object]:
+    """Return a function that tells value, sd or unit of a finding's first parameter; None without one."""
+    return lambda one: getattr(one.parameters[0], name) if one.parameters else None
+
+
+CORRECTED_ROW = Schema("effect target trials", {name: _size(name) for name in ("value", "sd", "unit")})
 """What was taken off before the fit, in the unit of its cause, null where it has no size; () = all trials. Of a turned
 sign: where in the lab its moments are about, if not about the plate's centre.
 """
