@@ -1,7 +1,7 @@
 """How often a diagnosis is right: sessions without fault and with one clear fault, in laboratories real, foreign,
-third, own and drawn at random from our own family.
+third, own, drawn at random from our own family, and home: without fault, as a user simulates them.
 
-    python -m benchmarks diagnosis FOLDER --lab real foreign third own drawn [--kind clean fault] [--sessions 24]
+    python -m benchmarks diagnosis FOLDER --lab real foreign third own drawn home [--kind clean fault] [--sessions 24]
         [--first SEED] [--tell]
 
 Every session goes through the front door: written, read, examined, diagnosed. Each is run once and kept in FOLDER, so
@@ -38,7 +38,9 @@ from biodance.virtual_lab.recording.family import draw_laboratory, draw_visitor
 from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
-COLUMNS = ("real", "foreign", "third", "own", "drawn")
+COLUMNS = ("real", "foreign", "third", "own", "drawn", "home")
+HOME = ("squat", "short", "easy", "diagnosis")
+"""Sessions that a user simulates, in turn: two protocols, and two dances designed for the person."""
 REAL = tomllib.loads(Path(__file__).with_name("real_sessions.toml").read_text(encoding="utf-8"))
 """Real sessions with their names that are not false."""
 UNKNOWN = "unknown"  # effect of a cause of the foreign laboratory that no file here describes
@@ -135,6 +137,15 @@ def own(seed: int, text: str, drawn: bool, folder: Path) -> tuple[SessionResult,
         effect, target = text.partition(":")[0], text.partition("target=")[2].partition(",")[0]
         told = Told({f"{effect} {target}".strip(): size}, frozenset(SAME.get(effect, ())))
     return biodance.examine(biodance.read_session(folder / "s")), told
+
+
+def home(seed: int, plan: str, folder: Path) -> tuple[SessionResult, Told]:
+    """Return a session without fault of a protocol or a dance, from the function behind ``biodance simulate``."""
+    who = subject_of(seed)
+    danced = plan in ("short", "easy")
+    shown = biodance.design_dance(who, protocol=plan, seed=seed).dance if danced else None
+    biodance.simulate(who, None if danced else plan, folder / "s", seed=seed, dance=shown)
+    return biodance.examine(biodance.read_session(folder / "s")), Told()
 
 
 def third(seed: int, fault: str, folder: Path) -> tuple[SessionResult, Told]:
@@ -235,6 +246,9 @@ def jobs(columns: list[str], kinds: list[str], sessions: int, first: int) -> lis
     out = []
     if "real" in columns and "clean" in kinds:
         out += [Job("real", name, partial(real, name)) for name in REAL]
+    if "clean" in kinds:
+        plans = [(first + k, HOME[k % len(HOME)]) for k in range(sessions)]
+        out += [Job("home", f"{seed} {plan}", partial(home, seed, plan)) for seed, plan in plans]
     for kind in kinds:
         for k in range(sessions):
             seed, fault = first + k + 50 * (kind == "fault"), kind == "fault"

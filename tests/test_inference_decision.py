@@ -89,7 +89,27 @@ def test_a_second_cause_has_its_own_place(bare: Hypothesis) -> None:
         holding(bare, ab, **sizes),
     )
     found = {place.cause.effect.target: place.probability for place in places(every, {})}
-    assert found == pytest.approx({"a": 0.6 / 0.68, "b": 0.6 / 0.9})
+    assert found == pytest.approx({"a": 0.38 / 0.4, "b": 0.6})
+
+
+def test_one_cause_does_not_stand_in_two_places(bare: Hypothesis) -> None:
+    """Either a and b together, or c alone in place of both: that one of a and c is there is sure, and b is not."""
+    none, ab, c, bc = logs(0.005, 0.53, 0.43, 0.03)
+    a, rare = 0.004, np.log(0.001)
+    every = posterior(
+        holding(bare, none),
+        holding(bare, np.log(a), a=(-0.03, 0.01)),
+        holding(bare, rare, b=(1.0, 0.1)),
+        holding(bare, c, c=(0.04, 0.01)),
+        holding(bare, ab, a=(-0.04, 0.01), b=(1.0, 0.1)),
+        holding(bare, bc, b=(0.1, 0.1), c=(0.04, 0.01)),
+        holding(bare, np.log(0.001), a=(-0.02, 0.01), c=(0.02, 0.01)),
+    )
+    first, second = places(every, {})
+    assert (first.cause.effect.target, second.cause.effect.target) == ("c", "b")
+    assert first.probability > 0.98
+    assert second.probability == pytest.approx(every.share(first.names, second.names))
+    assert second.probability < 0.6
 
 
 def test_two_causes_sure_beside_each_other_are_no_surer_than_both(bare: Hypothesis) -> None:

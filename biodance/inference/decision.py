@@ -9,6 +9,7 @@ wrong.
 
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
@@ -59,6 +60,11 @@ class Place:
     shares: tuple[tuple[Key, float, float], ...]
 
     @property
+    def names(self) -> frozenset[Key]:
+        """All that may stand in its place."""
+        return frozenset(name for name, *_ in self.shares)
+
+    @property
     def set(self) -> tuple[Alias, ...]:
         """The cause, then all that the data cannot tell from it (`TOGETHER`), and what else it takes to hold `IN_SET`
         of the posterior.
@@ -104,25 +110,33 @@ class Inferred:
 
 
 def places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
-    """Return every cause of the most probable set, with what may stand in its place, as probable as with and without
-    an unknown cause; where one of several is not sure beside the others, of the most probable set of one fewer.
-    """
-    found = ((one, {name for name, *_ in one.shares}) for one in _places(posterior.lead, prior))
-    # beside the others a cause may be sure, and yet all of them together no better than none
-    return tuple(replace(one, probability=min(one.probability, posterior.share(names))) for one, names in found)
+    """Return the causes of the largest of the most probable sets of three, two and one that is sure as a whole, each
+    with what may stand in its place, as probable as with and without an unknown cause; then what else the most probable
+    set holds, as probable as it is beside them.
 
-
-def _places(posterior: Posterior, prior: Mapping[Key, float]) -> tuple[Place, ...]:
-    """Return the places of the causes at one noise: of the most probable set all of whose causes are sure beside the
-    others, or of that of a single one.
+    Beside the others a cause may be sure, and yet all of them together no better than none, or than another one alone.
     """
-    best = posterior.unexplained
-    while True:
-        found = tuple(_place(posterior, best, cause, prior) for cause in best.causes)
-        if len(found) < 2 or all(one.probability >= NAMED for one in found):
-            return found
-        fewer = [one for one in posterior.hypotheses if len(one.causes) == len(best.causes) - 1]
+    lead, best = posterior.lead, posterior.best
+    every: list[tuple[Place, ...]] = []
+    while best.causes:
+        every.append(tuple(_place(lead, best, cause, prior) for cause in best.causes))
+        if posterior.share(*(one.names for one in every[-1])) >= NAMED:
+            break
+        fewer = [one for one in lead.hypotheses if len(one.causes) == len(best.causes) - 1]
         best = max(fewer, key=lambda one: np.logaddexp(one.log_posterior, one.log_unknown))
+    sure, rest = (every[-1] if best.causes else ()), list(every[0] if every else ())
+    for one in sure:
+        rest.remove(max(rest, key=partial(_share_in, cause_key(one.cause))))
+    held = [one.names for one in sure]
+    return (
+        *(replace(one, probability=min(one.probability, posterior.share(one.names))) for one in sure),
+        *(replace(one, probability=min(one.probability, posterior.share(*held, one.names))) for one in rest),
+    )
+
+
+def _share_in(name: Key, place: Place) -> float:
+    """Return how probable a cause is in a place."""
+    return next((share for key, share, _ in place.shares if key == name), 0.0)
 
 
 def _place(posterior: Posterior, best: Hypothesis, cause: NamedCause, prior: Mapping[Key, float]) -> Place:

@@ -1,7 +1,8 @@
 """What a search over sets of causes finds: each set with its sizes and scales, and the probability of each."""
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from scipy.special import logsumexp
@@ -130,14 +131,22 @@ class Posterior:
         """The most probable hypothesis where noise is as in laboratories: beside it more may be left."""
         return self.hypotheses[int(np.argmax(self.weights.sum(axis=1)))]
 
-    def share(self, names: Set[Key]) -> float:
-        """Return the probability that any of the causes ``names`` is there, whatever the noise."""
-        held = [not names.isdisjoint(one.names) for one in self.hypotheses]
+    def share(self, *places: Set[Key]) -> float:
+        """Return the probability that every one of some ``places`` holds a cause of its own, any of the names that the
+        place may have, whatever the noise.
+        """
+        held = [_seated(one.names, places) for one in self.hypotheses]
         own = float(self.weights[held].sum())
-        return own if self.louder is None else (1 - self.unknown) * own + self.unknown * self.louder.share(names)
+        return own if self.louder is None else (1 - self.unknown) * own + self.unknown * self.louder.share(*places)
 
     def probabilities(self) -> dict[Key, float]:
         """Return the probability of every cause."""
         every = (*self.hypotheses, *(self.louder.hypotheses if self.louder else ()))
         out = {name: self.share({name}) for one in every for name in one.names}
         return dict(sorted(out.items(), key=lambda pair: -pair[1]))
+
+
+def _seated(names: Set[Key], places: Sequence[Set[Key]]) -> bool:
+    """Return whether different ones of some ``names`` can be put into all ``places``."""
+    ways = permutations(names, len(places))
+    return any(all(name in place for name, place in zip(way, places, strict=True)) for way in ways)

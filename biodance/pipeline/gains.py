@@ -2,12 +2,14 @@
 on its own what is lost on data that were not used when all findings but this one are accepted.
 
 Those data are the trials that were kept; where none was, each half of the movement, judged with the body that the
-other half gives. What makes them worse is no repair.
+other half gives. What makes them worse is no repair; where nobody moves, or the finding changes nothing, they tell
+nothing of it.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import compress
 
 import numpy as np
 
@@ -23,6 +25,7 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
 from biodance.inference.decision import NAMED, Inferred
 from biodance.inference.hypotheses import Key
+from biodance.inference.session import is_moving
 from biodance.lab.corrections import PlateCorrection
 from biodance.lab.plates.faults import DELAY, GAIN, OFFSET, PLATE_FAULTS
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
@@ -33,6 +36,8 @@ from biodance.records import Array, Role
 
 _Mend = Callable[[Case], Case]
 _Fits = tuple[Fit, ...]
+_SAME = 0.01
+"""N, N·m: residuals that differ nowhere by more are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +201,12 @@ def _acts(result: SessionResult, one: NamedCause) -> bool:
 
 
 def _gain(before: _Corrected | None, after: _Corrected) -> Gain | None:
-    """Return what the second gains against the first on the data not used; None where these are too few."""
+    """Return what the second gains against the first on the data not used; None where these are too few, or the same
+    is left of them.
+    """
     if before is None or before.kept is None or after.kept is None or before.used is None or after.used is None:
+        return None
+    if all(np.allclose(a, b, rtol=0, atol=_SAME) for a, b in zip(before.kept.left, after.kept.left, strict=True)):
         return None
     try:
         return gain_by_naming(before.kept, after.kept, fitted=(before.used, after.used))
@@ -209,22 +218,25 @@ def _corrected(result: SessionResult, mend: _Mend, phi: Array, as_is: Identifica
     """Return the session with every trial mended, seen with the parameters ``phi`` (10N,), and identified again.
     ``as_is``: the body identified from the trials as they are, where it is known.
     """
-    body, fitted = _mended(result, FITTED_ROLES, mend, phi)
-    kept = _mended(result, KEPT_ROLES, mend, phi)[1]
+    body, fitted, judged = _mended(result, FITTED_ROLES, mend, phi)
+    kept = _mended(result, KEPT_ROLES, mend, phi)[2]
     found = as_is or identify_body(body, fitted)
     about = standing_point(kept or fitted)
     if not kept:
-        return _Corrected(found, *_by_halves(body, fitted, about))
+        return _Corrected(found, *(_by_halves(body, judged, about) if judged else (None, None)))
     return _Corrected(found, *(residuals_of(found.identified, some, about) for some in (fitted, kept)))
 
 
-def _mended(result: SessionResult, roles: tuple[Role, ...], mend: _Mend, phi: Array) -> tuple[Body, _Fits]:
-    """Return the body and the trials of the ``roles``, mended."""
+def _mended(result: SessionResult, roles: tuple[Role, ...], mend: _Mend, phi: Array) -> tuple[Body, _Fits, _Fits]:
+    """Return the body, the trials of the ``roles``, mended, and those of them by which a gain is judged, as causes are:
+    somebody moves (sway and another body look like any fault of a plate while one stands), for a second and more.
+    """
     assert result.body is not None
     found = windows(result.trials, roles)
     cases = [mend(replace(case, phi=phi)) for case in cases_of(result.body, found)]
     fits = tuple(case_fit(case, window.use) for case, window in zip(cases, found, strict=True))
-    return (cases[0].body if cases else result.body), fits
+    judged = [is_moving(case) and window.seconds > 0 for case, window in zip(cases, found, strict=True)]
+    return (cases[0].body if cases else result.body), fits, tuple(compress(fits, judged))
 
 
 def _by_halves(body: Body, fits: _Fits, about: Array) -> tuple[Residuals | None, Residuals | None]:
