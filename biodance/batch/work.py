@@ -106,7 +106,7 @@ def _hangs_on(error: BaseException) -> Why:
 def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, TrialRows]:
     """Return status, reason and rows of a session that goes through."""
     from biodance.lab.session.read import read_session
-    from biodance.pipeline.diagnosis import diagnosed
+    from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import session_movement
     from biodance.pipeline.session import examine
@@ -115,7 +115,7 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
 
     session = read_session(task.session, settings=assignments(task.chosen), tell=tell)
     result = examine(session, tell=tell)
-    found = diagnosed(result, tell=tell)
+    result, found = diagnosed_and_corrected(result, tell=tell)
     result = as_diagnosed(result, found.diagnosis) if found else result
     tell("writing")
     document = write_report(result, folder, diagnosis=found, movement=session_movement(result), drawn=task.pages)

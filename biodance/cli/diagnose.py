@@ -177,17 +177,24 @@ def identify_command(
         for_people = (*reading.given(), *(name for name, value in given.items() if value is not None))
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
-    from biodance.pipeline import front
+    from biodance.pipeline.diagnosis import diagnosed_and_corrected
+    from biodance.pipeline.front_dance import performance_of
     from biodance.pipeline.judged_trials import failed_checks
+    from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.movement import describe_movement
+    from biodance.pipeline.session import identification_of
     from biodance.report.write import write_identification
 
     with progress() as tell:
         tables = results.make_tables_folder(session)
         shown = None if dance is None else Dance.load(dance)
-        result, _, place = examine_with_reference(session, reading, results, tell, dance=shown)
-        found = front.identify(result, dance=shown)
-        result = replace(result, identification=found)
+        result, before, place = examine_with_reference(session, reading, results, tell, dance=shown)
+        known = read_lab(reading.lab).tolerances
+        result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
+        found = identification_of(result)
+        if shown is not None:
+            found = replace(found, performance=performance_of(result, shown))
+            result = replace(result, identification=found)
         tell("checking units, signs, labels and clocks")
         checks = failed_checks(result)
         moved = describe_movement(result, lab=reading.lab, tell=tell)

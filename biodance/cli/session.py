@@ -45,21 +45,22 @@ def report_session(
     """Report an examined session into ``folder``, as tables into ``tables``, ``for_subject`` with the page for the
     person who was measured; return the result and the content of results.json.
     """
-    from biodance.pipeline.diagnosis import diagnosed
+    from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.load import as_diagnosed
     from biodance.pipeline.movement import describe_movement
     from biodance.pipeline.session import stopped_before
     from biodance.report.write import write_report, write_subject_page
 
-    moved = describe_movement(result, lab=lab, tell=tell)
+    found = None
     try:
-        stopped = result.stopped
         known = read_lab(lab).tolerances
-        found = None if stopped else diagnosed(result, reference=reference, tolerances=known, tell=tell)
+        if not result.stopped:
+            result, found = diagnosed_and_corrected(result, reference=reference, tolerances=known, tell=tell)
     except KeyboardInterrupt:
         found, result = None, stopped_before(result, "the diagnosis")
     result = as_diagnosed(result, found.diagnosis) if found else result
+    moved = describe_movement(result, lab=lab, tell=tell)
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None, movement=moved)
     if for_subject:

@@ -2,12 +2,15 @@
 another one.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded, overruled_files
 from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
-from biodance.records import CHANNELS, Array
+from biodance.lab.plates.faults import CROSSTALK, GAIN
+from biodance.records import CHANNELS, Array, Plate, Trial
 from biodance.spatial import wrench_about_point
 
 ALONE = 0.95
@@ -18,6 +21,14 @@ MIRRORED = 0.5
 """Share of the squared residual that must be left when the sign is turned (measured: below 0.25 where it is wrong,
 above 5 where not).
 """
+_TURNED = -2.0
+"""Gain of a channel with the wrong sign: it reads minus what is there, and so does its own inverse."""
+_LEVERS = {"Fx": ("Mz", 1, 0.5), "Fy": ("Mz", 0, -0.5)}
+"""By turned force: the moment that follows it where the moments were recorded about another point than the plate's
+centre, the axis along which that point lies beside it, and how far (m) per ratio of the two: the force counts twice, as
+recorded and as turned."""
+_ANEW = 0.1
+"""Share of the frames that tell anything new: forces of people change at a tenth of the rate."""
 _SECONDS = 2.0
 _WORDS = {
     "corners": r"corners run the wrong way round",
@@ -62,11 +73,13 @@ class AxisError(DiscreteEffect):
     @classmethod
     def _signs(cls, cases: tuple[Case, ...], plate: str) -> tuple[QualityCheck, ...]:
         seen = (case for case in cases if np.all(case.body.free))  # an unseen trunk needs other shear than is computed
-        pairs = [pair for case in seen if (pair := on_one_plate(case, plate)) is not None]
+        centre = next(one.centre for case in cases for one in case.trial.plates if one.name == plate)
+        pairs = [pair for case in seen if (pair := on_one_plate(case, plate, centre)) is not None]
         if not pairs:
             return ()
         measured, needed = (np.concatenate([pair[k] for pair in pairs]) for k in range(2))
         wrong = sign_turned(measured, needed)
+        points = {name: moment_point(measured, needed, name, centre) for name in wrong}
         if not wrong:
             return (
                 QualityCheck("signs of the channels", True, f"No channel of {plate} mirrors what the motion needs."),
@@ -76,18 +89,50 @@ class AxisError(DiscreteEffect):
             QualityCheck(
                 "signs of the channels",
                 False,
-                f"{plate} {name} has the opposite sign of what the motion needs.",
+                f"{plate} {name} has the opposite sign of what the motion needs{_beside(name, *point)}.",
                 cls.name,
                 f"{prefix}{name}",
+                point[0],
+                "point",
+                "m",
+                sd=point[1],
             )
-            for name in wrong
+            for name, point in points.items()
         )
 
+    @classmethod
+    def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
+        """Return the trial with the sign turned back, its moments about the point that they were recorded about; as it
+        is where the reader has overruled the file.
+        """
+        name, _, channel = found.target.rpartition(":")
+        if channel not in CHANNELS or found.unit != "m":
+            return trial
+        plates = (_turned(p, channel, found.size) if p.name == name or not name else p for p in trial.plates)
+        return replace(trial, plates=tuple(plates))
 
-def on_one_plate(case: Case, name: str) -> tuple[Array, Array] | None:
-    """Return measured and needed wrench (n, 6) about a plate's centre where it carries the person alone, less their
-    means and what follows the needed vertical force (a centre of mass that is a little off does); None without two
-    seconds of that.
+
+def _turned(plate: Plate, channel: str, point: float) -> Plate:
+    """Return a plate with a channel's sign turned, its moments kept about the ``point`` (m, lab); NaN: its centre."""
+    right = GAIN.undone(plate, channel, _TURNED)
+    if channel not in _LEVERS or np.isnan(point):
+        return right
+    moment, axis, share = _LEVERS[channel]
+    return CROSSTALK.undone(right, f"{channel}->{moment}", float(point - plate.centre[axis]) / share)
+
+
+def _beside(channel: str, point: float, sd: float) -> str:
+    """Return where the moments were recorded about, to go on a sentence with; "" for the plate's centre."""
+    if np.isnan(point):
+        return ""
+    along = "xyz"[_LEVERS[channel][1]]
+    return f", and its moments are about a point at {along} = {point:.3f} ± {sd:.3f} m, not about the plate's centre"
+
+
+def on_one_plate(case: Case, name: str, about: Array) -> tuple[Array, Array] | None:
+    """Return measured and needed wrench (n, 6) of a plate about the point ``about`` (3,) m where it carries the person
+    alone, less their means and what follows the needed vertical force (a centre of mass that is a little off does);
+    None without two seconds of that.
     """
     plate = next((plate for plate in case.trial.plates if plate.name == name), None)
     if plate is None:
@@ -96,7 +141,7 @@ def on_one_plate(case: Case, name: str) -> tuple[Array, Array] | None:
     alone = (own[:, 2] > ALONE * total) & (own[:, 2] > 0.5 * needed[:, 2]) & np.isfinite(own).all(axis=1)
     if alone.sum() < _SECONDS * case.motion.rate:
         return None
-    measured, needed = (wrench_about_point(value[alone], plate.centre) for value in (own, needed))
+    measured, needed = (wrench_about_point(value[alone], about) for value in (own, needed))
     nuisance = np.stack([np.ones(alone.sum()), needed[:, 2]], axis=1)
     both = np.hstack([measured, needed])
     rest = both - nuisance @ np.linalg.lstsq(nuisance, both, rcond=None)[0]
@@ -108,6 +153,26 @@ def sign_turned(measured: Array, needed: Array) -> tuple[str, ...]:
     as_is, turned = np.sum((measured - needed) ** 2, axis=0), np.sum((measured + needed) ** 2, axis=0)
     wrong = (needed.std(axis=0) > MOVING) & (turned < MIRRORED * as_is)
     return tuple(name for name, bad in zip(CHANNELS, wrong, strict=True) if bad)
+
+
+def moment_point(measured: Array, needed: Array, channel: str, centre: Array) -> tuple[float, float]:
+    """Return where (m in the lab, with its standard deviation) the point lies about which the moments of a plate were
+    recorded whose force ``channel`` is turned; NaN where that is its ``centre`` (3,) m. Wrenches (n, 6) about that.
+
+    Who moves moments from a point p to the centre c with a force that is turned errs by 2 (p - c) x F. Only what leaves
+    at most `MIRRORED` of the moment's squared residual is believed.
+    """
+    if channel not in _LEVERS:
+        return np.nan, np.nan
+    moment, axis, share = _LEVERS[channel]
+    force = -measured[:, CHANNELS.index(channel)]
+    left = (measured - needed)[:, CHANNELS.index(moment)]
+    ratio = float(force @ left / (force @ force))
+    rest = left - ratio * force
+    if not rest @ rest < MIRRORED * (left @ left):
+        return np.nan, np.nan
+    sd = float(np.sqrt(rest @ rest / (len(rest) * _ANEW) / (force @ force)))
+    return float(centre[axis]) + share * ratio, abs(share) * sd
 
 
 EFFECT = AxisError

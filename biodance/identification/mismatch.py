@@ -43,7 +43,8 @@ the parameters absorb part of what is noise)."""
 @dataclass(frozen=True, eq=False)
 class Mismatch:
     """``kinematics`` (p, n), ``plates`` (p, m): scores W' S^-1 e over all trials of n and m independent sources of
-    errors e, each of one standard deviation. Behind the plates stand the shares of `Body.parts`.
+    errors e, each of one standard deviation. Behind the plates stand the shares of `Body.parts`, and the corrections
+    of the plates that were made (`Fit.doubts`).
     """
 
     kinematics: Array
@@ -66,15 +67,19 @@ def mismatch(body: Body, fits: tuple[Fit, ...], noise: Noise, *, softer: float |
     whole, found = parts_as_segments(body), nothing(body)
     sources = of_markers(whole)
     scores, plate_scores = np.array(found.kinematics), np.array(found.plates)
+    doubt_scores = np.zeros((len(scores), max((fit.doubts.shape[2] for fit in fits), default=0)))
     for fit, pick in long_runs(fits, noise.bands):
         motion = fit.motion.at(pick)
         weight, wrong = _weighed(body, motion, noise.at(fit.motion.rate))
         plate_scores += np.tensordot(weight, wrong, axes=((0, 1), (0, 1)))
         del wrong  # a tenth of what a long run keeps
+        if doubt_scores.size:
+            doubt_scores += np.tensordot(weight, fit.doubts[pick], axes=((0, 1), (0, 1)))
         scores += transpose(sources, Response.of(whole, motion), weight).T
     soft = np.array([not joint for source in sources for joint in source.joints])
     more = softness(body, fits, noise.bands) if softer is None else softer
-    return Mismatch(scores * np.where(soft, more, 1.0) * deviations(whole, sources), plate_scores)
+    scores *= np.where(soft, more, 1.0) * deviations(whole, sources)
+    return Mismatch(scores, np.column_stack([plate_scores, doubt_scores]))
 
 
 def _weighed(body: Body, motion: Motion, noise: Noise) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@ memory.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -33,7 +33,8 @@ that only the slowest bands count.
 class Fit:
     """One trial to identify from: ``motion`` and ``wrench`` (about the lab origin) at the same times, ``use`` (T,) True
     where both hold; ``outlier`` the share of the load by which a frame may differ from the table's prediction
-    (`Settings.outlier`, `believable`).
+    (`Settings.outlier`, `believable`); ``doubts`` (T, 6, n) N, N·m about the lab origin: what one standard deviation
+    of each of n corrections makes of the wrench, the same n in all trials of a session.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Fit:
     wrench: Wrench
     use: NDArray[np.bool_]
     outlier: float = Settings.outlier
+    doubts: Array = field(default_factory=lambda: np.zeros((0, 6, 0)))
 
     def __post_init__(self) -> None:
         frames = self.motion.time.size

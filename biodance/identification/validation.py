@@ -5,6 +5,7 @@ parameters and their intervals belong beside these numbers.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,28 @@ BLOCK_SECONDS = 1.0
 """s: errors of a person's trial are correlated over about a movement; blocks this long are drawn as units."""
 
 
+@dataclass(frozen=True)
+class ShareRemoved:
+    """Share of an RMS residual that a model removes, ``value`` (0.12 = 12 % of it, negative = it adds) with its 95 %
+    interval ``ci95``; None: fewer than three blocks of one second.
+    """
+
+    value: float
+    ci95: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class ParameterGain:
+    """What the right total ``mass`` removes, and what its ``distribution`` over the segments removes of the rest."""
+
+    mass: ShareRemoved
+    distribution: ShareRemoved
+
+
 @dataclass(frozen=True, eq=False)
 class TrialValidation:
     """One trial: ``measured``, ``table`` and ``identified`` wrenches about ``about`` (3,) m, the frames ``use`` (T,)
-    compared, and how well each agrees (paper Table II, Fig. 9).
+    compared, and how well each agrees (paper Table II, Fig. 9); ``weighed`` the mass on the plates over the table's.
     """
 
     name: str
@@ -34,6 +53,29 @@ class TrialValidation:
     use: NDArray[np.bool_]
     table_agreement: Agreement
     identified_agreement: Agreement
+    weighed: float = 1.0
+
+    @cached_property
+    def gain(self) -> ParameterGain:
+        """What the identified parameters gain on the table's, parted into mass and distribution.
+
+        Between them stands the table with the mass on the plates, all masses and inertias in proportion. A model's
+        residual is the root of its summed squares over frames and channels, each channel in units of what the
+        identified parameters leave of it; intervals by a bootstrap over blocks of one second.
+        """
+        scaled = Wrench(self.table.time, self.weighed * self.table.value)
+        found = [_block_squares(self, model) for model in (self.table, scaled, self.identified)]
+        unit = np.maximum(found[2].sum(axis=0), _TINY)
+        sums = np.stack([(squares / unit).sum(axis=1) for squares in found])
+        drawn = np.random.default_rng(0).integers(0, sums.shape[1], (_DRAWS, sums.shape[1]))
+        value, spread = (np.maximum(one, _TINY) for one in (sums.sum(axis=1), sums[:, drawn].sum(axis=2)))
+
+        def removed(first: int, second: int) -> ShareRemoved:
+            low, high = np.percentile(1 - np.sqrt(spread[second] / spread[first]), [2.5, 97.5])
+            ci95 = (float(low), float(high)) if sums.shape[1] >= _FEWEST else None
+            return ShareRemoved(float(1 - np.sqrt(value[second] / value[first])), ci95)
+
+        return ParameterGain(removed(0, 1), removed(1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +99,9 @@ class ResidualRatio:
         return min(self.force_interval[0], self.moment_interval[0]) > 1
 
 
-def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialValidation:
+def validate(body: Body, identified: Body, fit: Fit, *, about: Array, mass: float | None = None) -> TrialValidation:
     """Return how the table (``body.sip``) and the identified body predict the wrench of one trial, moments about
-    ``about`` (3,) m lab.
+    ``about`` (3,) m lab; ``mass`` kg on the plates, by default what was identified.
 
     ``about``: the middle of the plates, or `standing_point` of the session; moments about the distant lab origin hide
     the differences.
@@ -82,11 +124,14 @@ def validate(body: Body, identified: Body, fit: Fit, *, about: Array) -> TrialVa
         fit.use,
         compare(measured, table, fit.use),
         compare(measured, found, fit.use),
+        float((mass or identified.sip.mass.sum()) / body.sip.mass.sum()),
     )
 
 
-_DRAWS = 1000
-"""Of the bootstrap."""
+_DRAWS, _FEWEST = 1000, 3
+"""Of the bootstrap, and blocks that it needs."""
+_TINY = 1e-12
+"""N², N²·m²: least unit of a channel."""
 
 
 def residual_ratio(trials: tuple[TrialValidation, ...]) -> ResidualRatio:
@@ -97,19 +142,15 @@ def residual_ratio(trials: tuple[TrialValidation, ...]) -> ResidualRatio:
     BiodanceError
         There are fewer than three blocks of one second: no interval can be given.
     """
-    first, second = [], []
-    for trial in trials:
-        size = max(1, round(BLOCK_SECONDS * trial.measured.rate))
-        use = np.flatnonzero(trial.use)
-        for piece in np.array_split(use, max(1, use.size // size)):
-            first.append(_squares(trial.measured, trial.table, piece))
-            second.append(_squares(trial.measured, trial.identified, piece))
-    if len(first) < 3:
+    a, b = (
+        np.concatenate([_block_squares(one, getattr(one, name)) for one in trials]).reshape(-1, 2, 3).sum(axis=2)
+        for name in ("table", "identified")
+    )
+    if len(a) < _FEWEST:
         raise BiodanceError(
-            f"The trials hold {len(first)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3. Record "
+            f"The trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs {_FEWEST}. Record "
             f"longer."
         )
-    a, b = np.array(first), np.array(second)
     drawn = np.random.default_rng(0).integers(0, len(a), (_DRAWS, len(a)))
     ratio = np.sqrt(a[drawn].sum(axis=1) / b[drawn].sum(axis=1))
     low, high = np.percentile(ratio, [2.5, 97.5], axis=0)
@@ -119,7 +160,8 @@ def residual_ratio(trials: tuple[TrialValidation, ...]) -> ResidualRatio:
     )
 
 
-def _squares(measured: Wrench, simulated: Wrench, frames: NDArray[np.intp]) -> Array:
-    """Return the summed squared difference (2,) of forces and of moments."""
-    difference = (measured.value[frames] - simulated.value[frames]) ** 2
-    return np.array([difference[:, :3].sum(), difference[:, 3:].sum()])
+def _block_squares(trial: TrialValidation, simulated: Wrench) -> Array:
+    """Return the summed squared differences (n, 6) of measured and simulated wrench in blocks of one second."""
+    size, use = max(1, round(BLOCK_SECONDS * trial.measured.rate)), np.flatnonzero(trial.use)
+    difference = (trial.measured.value - simulated.value) ** 2
+    return np.array([difference[piece].sum(axis=0) for piece in np.array_split(use, max(1, use.size // size))])

@@ -19,9 +19,9 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.plates.faults import DELAY, PLATE_FAULTS, POSITION, ROTATION, PlateFault
+from biodance.lab.plates.faults import DELAY, OFFSET, PLATE_FAULTS, POSITION, ROTATION, PlateFault
 from biodance.library import read_toml
-from biodance.records import Plate, Session, Trial, Wrench
+from biodance.records import Array, Plate, Session, Trial, Wrench
 
 APPLIED = "corrected.toml"
 """File in a folder of corrected trials that says what was corrected already."""
@@ -30,7 +30,7 @@ APPLIED = "corrected.toml"
 @dataclass(frozen=True)
 class PlateCorrection:
     """One accepted cause: ``effect`` at ``target`` of size ``value`` with ``sd``, in the unit of its parameter (m, rad,
-    1, s, N or N·m); ``source`` in words: where it was found.
+    1, s, N or N·m); ``source`` in words: where it was found; ``trials`` it is in (() = all).
     """
 
     effect: str
@@ -38,6 +38,7 @@ class PlateCorrection:
     value: float
     sd: float = float("nan")
     source: str = ""
+    trials: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         name = f"{self.effect} {self.target}".replace("_", " ").strip()
@@ -48,10 +49,14 @@ class PlateCorrection:
         """What it corrects."""
         return PLATE_FAULTS[self.effect]
 
-    def of(self, plate: str, plates: tuple[str, ...]) -> bool:
-        """Return whether ``plate`` is meant; a target without a plate means the only one, a delay all of them."""
+    def of(self, plate: Plate, trial: Trial) -> bool:
+        """Return whether a ``plate`` of a ``trial`` is meant; a target without a plate means the only one, a delay all
+        of them. A zero that was read from the empty plate is off already.
+        """
+        if (self.trials and trial.name not in self.trials) or (self.fault is OFFSET and plate.tared):
+            return False
         named, colon, _ = self.target.partition(":")
-        return plate == named if colon else self.fault is DELAY or len(plates) == 1
+        return plate.name == named if colon else self.fault is DELAY or len(trial.plates) == 1
 
 
 def _free(plate: Plate, one: PlateCorrection) -> Plate:
@@ -76,14 +81,24 @@ def _free(plate: Plate, one: PlateCorrection) -> Plate:
 
 def corrected_trial(trial: Trial, corrections: Iterable[PlateCorrection]) -> Trial:
     """Return a trial as read, with its plates as they would have recorded without the causes."""
-    names = tuple(plate.name for plate in trial.plates)
     plates, said = list(trial.plates), []
     for one in corrections:
-        meant = [k for k, name in enumerate(names) if one.of(name, names)]
+        meant = [k for k, plate in enumerate(plates) if one.of(plate, trial)]
         for k in meant:
             plates[k] = _free(plates[k], one)
         said += [f"{_said(one)}, {one.source or 'from lab.toml'}."] * bool(meant)
     return replace(trial, plates=tuple(plates), history=(*trial.history, *said))
+
+
+def correction_doubts(trial: Trial, corrections: Iterable[PlateCorrection]) -> Array:
+    """Return what one standard deviation more of each of n ``corrections`` takes off the wrench of a ``trial`` that was
+    corrected for them, (T, 6, n) N, N·m about the lab origin; zero where it says nothing, or its sd is not known.
+    """
+    found, plain = [], trial.wrench.value
+    for one in corrections:
+        more = corrected_trial(trial, [replace(one, value=one.sd)]) if np.isfinite(one.sd) else trial
+        found.append(np.nan_to_num(plain - more.wrench.value))
+    return np.stack(found, axis=2) if found else np.zeros((*plain.shape, 0))
 
 
 def _said(one: PlateCorrection) -> str:

@@ -99,7 +99,7 @@ def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> 
     while found:
         tell("examining a copy with the labels exchanged")
         trials = tuple(renamed(trial, found.get(trial.name, {})) for trial in result.session.trials)
-        mended = examine(replace(result.session, trials=trials))
+        mended = examine(replace(result.session, trials=trials), known=result.known)
         worse = {
             after.name
             for before, after in zip(result.trials, mended.trials, strict=True)
@@ -151,13 +151,14 @@ def with_faults_undone(
         recorded = Recorded(result.session, cases_of(result.body, all_windows(result.trials)))
         known = {(one.effect, one.target, one.trials) for one in found}
         failed = [(kind, one) for kind in undoing for one in kind.check(recorded) if not one.ok]
+        failed = [pair for pair in failed if any(_undone(t, [pair]) is not t for t in result.session.trials)]
         new = [(kind, one) for kind, one in failed if (one.effect, one.target, one.trials) not in known]
         if not new:
             break
         found += [replace(one, advice=kind.advice) for kind, one in new]
         tell(f"examining a copy without {', '.join(sorted({spaced(one.effect) for _, one in new}))}")
         trials = tuple(_undone(trial, new) for trial in result.session.trials)
-        result = examine(replace(result.session, trials=trials), reference=reference)
+        result = examine(replace(result.session, trials=trials), reference=reference, known=result.known)
     if not found:
         return mended
     exchanged, checks = (mended.exchanged, mended.checks) if mended else ({}, ())

@@ -9,7 +9,7 @@ from biodance.diagnosis.diagnosis import Diagnosis, Finding
 from biodance.diagnosis.reasons import Reason
 from biodance.diagnosis.repairs import failed_check
 from biodance.diagnosis.witness_evidence import ObservedEvidence
-from biodance.display import spaced
+from biodance.display import listed, spaced
 from biodance.effects import CheckKind, QualityCheck
 from biodance.identification.load_words import size_and_segments
 from biodance.pipeline.checks import NOT_WEIGHED
@@ -124,7 +124,23 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
     outside = [check for check in result.all_checks if not check.inside]
     found += [_checked(check, findings) for check in outside if not (told and check.what.startswith(CheckKind.WEIGHT))]
     found += [_habit(one) for one in findings if one.cause.habit]
-    return strongest_first([*found, *_load(result, findings)])
+    return strongest_first([*found, *_load(result, findings), *corrected_attention(result)])
+
+
+def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
+    """Return what was taken off the recordings before the body was fitted, one sentence each: the laboratory's next
+    recording will have it again.
+    """
+    found = result.identification.corrected if result.identification else ()
+    return tuple(
+        Attention(
+            "warn",
+            f"taken off before the body was fitted, in {listed(one.trials) or 'all trials'}: {spoken(one).fact}. "
+            f"{one.advice}".strip(),
+            about=one.effect,
+        )
+        for one in found
+    )
 
 
 def _habit(one: Finding) -> Attention:

@@ -26,7 +26,7 @@ from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
 from biodance.pipeline.accepted import with_faults_undone
 from biodance.pipeline.attention import reconcile_with_checks
-from biodance.pipeline.gains import accepted
+from biodance.pipeline.gains import accepted, with_proven_corrections
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
@@ -224,18 +224,23 @@ def standing_notes(result: SessionResult) -> tuple[str, ...]:
     )
 
 
-def diagnosed(
+def diagnosed_and_corrected(
     result: SessionResult,
     *,
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     tell: Callable[[str], None] = lambda _: None,
-) -> SessionDiagnosis | None:
-    """Return the diagnosis of a session; None where the recordings cannot carry one."""
+) -> tuple[SessionResult, SessionDiagnosis | None]:
+    """Return a session identified without what its diagnosis proves to be wrong (`with_proven_corrections`), and the
+    diagnosis of the session as it was recorded; None where the recordings cannot carry one.
+    """
     try:
-        return diagnose_session(result, reference=reference, tolerances=tolerances, tell=tell)
+        found = diagnose_session(result, reference=reference, tolerances=tolerances, tell=tell)
     except BiodanceError:
-        return None
+        return result, None
+    if result.corrections:
+        return result, found
+    return with_proven_corrections(result, found.inferred, found.mended, reference=reference, tell=tell), found
 
 
 def _prior(reference: SessionIdentification | None, result: SessionResult) -> Sip | None:

@@ -13,7 +13,7 @@ from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels
 from biodance.pipeline.body import refuse_another_reference
-from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session
+from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
 from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.lab_file import read_lab
@@ -100,6 +100,8 @@ def identify(
 ) -> SessionIdentification:
     """Return what every segment of a person weighs, with intervals, validated on the trials kept.
 
+    What the diagnosis proves to be wrong with signs, zeros, clocks and gains of the plates is taken off before.
+
     Parameters
     ----------
     session : Session, SessionResult, str or pathlib.Path
@@ -145,6 +147,8 @@ def identify(
     """
     before = None if reference is None else _earlier(reference, tell)
     result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
+    known = read_lab(lab).tolerances
+    result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
     found = identification_of(result)
     return found if dance is None else replace(found, performance=performance_of(result, dance))
 
@@ -276,7 +280,7 @@ def _earlier(session: Earlier, tell: _Tell) -> SessionIdentification:
     """Return what a visit says about the body."""
     if isinstance(session, SessionIdentification):
         return session
-    return identification_of(examined_visit(session, tell=tell))
+    return identify(session, tell=tell)
 
 
 def _beside(result: SessionResult, before: SessionIdentification) -> SessionResult:
@@ -287,6 +291,7 @@ def _beside(result: SessionResult, before: SessionIdentification) -> SessionResu
     refuse_another_reference(before.identification.body, result.body, result.subject.mass, before.name)
     name = result.session.folder.name
     again = identify_trials(
-        result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior
-    )
-    return replace(result, identification=again)
+        result.body, result.trials, name=name, reference=before, checks=result.checks, prior=result.prior,
+        corrections=result.corrections, weighed=result.weighed,
+    )  # fmt: skip
+    return replace(result, identification=replace(again, corrected=found.corrected))

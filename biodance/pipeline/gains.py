@@ -17,18 +17,21 @@ from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals, accept, case_fit, gain_by_naming, join_residuals, residuals_of
 from biodance.diagnosis.diagnosis import Finding
 from biodance.diagnosis.gain import Gain
+from biodance.diagnosis.repairs import failed_check
 from biodance.display import cause_in_words, spaced
 from biodance.effects import Case, NamedCause
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
-from biodance.inference.decision import Inferred
+from biodance.inference.decision import NAMED, Inferred
+from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving
 from biodance.lab.corrections import PlateCorrection
-from biodance.lab.plates.faults import PLATE_FAULTS
-from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
+from biodance.lab.plates.faults import DELAY, GAIN, OFFSET, PLATE_FAULTS
+from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import cases_of, windows
-from biodance.pipeline.results import SessionResult
+from biodance.pipeline.results import MendedCopy, SessionResult
+from biodance.pipeline.session import examine
 from biodance.records import Array, Role
 
 _Mend = Callable[[Case], Case]
@@ -69,8 +72,53 @@ def accepted_corrections(findings: Iterable[Finding], source: str) -> tuple[Plat
         fault = PLATE_FAULTS.get(one.effect)
         size = {p.name: p for p in one.parameters}.get(fault.parameter) if fault else None
         if size is not None and np.isfinite(size.value):
-            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source))
+            out.append(PlateCorrection(one.effect, one.target, size.value, size.sd, source, one.trials))
     return tuple(out)
+
+
+_INSIDE = (OFFSET.name, DELAY.name, GAIN.name)
+"""Causes that statistics find and that are taken off before the body is fitted: zeros, clocks, gains."""
+
+
+def with_proven_corrections(
+    result: SessionResult,
+    inferred: Inferred | None,
+    mended: MendedCopy | None,
+    *,
+    reference: SessionIdentification | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SessionResult:
+    """Return the session examined again without what is proven: what checks undid in the copy ``mended``, and the
+    zeros, delays and gains that are `proven` in ``inferred``, each as unsure in the fit as there. The identification
+    names them all (``corrected``). The same session where nothing is proven; what is only suspected stays as recorded.
+    """
+    checks = mended.checks if mended else ()
+    if any(one.alike for one in checks):
+        return result
+    undone = tuple(failed_check(one) for one in checks)
+    own = tuple(f for f in inferred.diagnosis.findings if proven(f, inferred.search.prior)) if inferred else ()
+    own = tuple(one for one in own if (one.effect, one.target) not in {(c.effect, c.target) for c in checks})
+    base = mended.result if mended else result
+    if own:
+        tell("identifying without what is proven to be wrong")
+        corrections = accepted_corrections(own, f"session {result.session.folder.name}")
+        base = examine(base.session, reference=reference, known=result.known, corrections=corrections)
+    if not (undone or own) or base.identification is None:
+        return result
+    return replace(base, identification=replace(base.identification, corrected=(*undone, *own)))
+
+
+def proven(one: Finding, prior: Mapping[Key, float]) -> bool:
+    """Return whether a finding is taken off before the fit: a zero, a delay or a gain without which data that were not
+    used for it fit better, and which is there with the probability `NAMED` rather than another cause of its set (of
+    log ``prior`` probabilities by effect and target).
+    """
+    if one.effect not in _INSIDE or one.gain is None or not one.gain.proven:
+        return False
+    logs = np.array([alias.log_bayes_factor + prior.get((alias.effect, alias.target), 0.0) for alias in one.set])
+    same = np.array([alias.effect == one.effect for alias in one.set])
+    shares = np.exp(logs - logs.max())
+    return bool(one.probability * shares[same].sum() / shares.sum() >= NAMED)
 
 
 def accepted(result: SessionResult, inferred: Inferred, before: Identification) -> Accepted:

@@ -12,6 +12,7 @@ import numpy as np
 from biodance import display
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
+from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
@@ -21,9 +22,10 @@ from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
+from biodance.lab.corrections import PlateCorrection
 from biodance.motion.regressor import Agreement, compare, predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
-from biodance.pipeline.trial_result import Check, TrialResult, trial_fit
+from biodance.pipeline.trial_result import Check, TrialResult, Weighing, trial_fit
 from biodance.records import ROLES, Role, Sip
 from biodance.threads import Sendable, one_thread
 from biodance.uncertainty.plates import around_zero
@@ -67,6 +69,8 @@ class SessionIdentification(Sendable):
     failures : mapping
         What could not be computed ("segments", "reference", "differences"), each with cause and cure: without segments
         the fields that need them are empty.
+    corrected : tuple of Finding
+        What was proven to be wrong with the recordings, and was taken off before the fit (`with_proven_corrections`).
 
     Examples
     --------
@@ -86,6 +90,7 @@ class SessionIdentification(Sendable):
     performance: "PerformanceScore | None" = None
     notes: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
+    corrected: tuple[Finding, ...] = ()
 
     def __repr__(self) -> str:
         sip = self.identification.sip
@@ -159,20 +164,23 @@ def identify_trials(
     reference: SessionIdentification | None = None,
     checks: tuple[Check, ...] = (),
     prior: Sip | None = None,
+    corrections: tuple[PlateCorrection, ...] = (),
+    weighed: Weighing | None = None,
 ) -> SessionIdentification:
     """Identify ``body`` from the trials with role fit, validate on those kept, and look for a load.
 
     ``name`` of the session; ``reference`` an earlier, unloaded session of the same person: what changed since is told,
     and a load is looked for against it; without it, against the table. ``checks`` of the session: where they or those
     of the trials failed, no load is stated (`load_doubts`). ``prior`` is what is known of the body before (by default
-    the table).
+    the table). ``corrections`` were made in the trials: their standard deviations count in every interval.
+    ``weighed`` on the plates: the mass that parts the gain into mass and distribution, by default the identified one.
 
     Raises
     ------
     TrialRefused
         No trial with role fit has motion and fully measured ground contact.
     """
-    fits, others = _fits(results, FITTED_ROLES), _fits(results, KEPT_ROLES)
+    fits = _fits(results, FITTED_ROLES, *corrections)
     if not fits:
         raise TrialRefused(
             f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be "
@@ -203,9 +211,8 @@ def identify_trials(
         notes=found.notes,
         failures=failures,
     )
-    if reference is not None and found.status == "solved":
-        return _weighed(_predicted(one, results, fits, others), reference)
-    return one if found.status == "failed" else _predicted(one, results, fits, others)
+    told = one if found.status == "failed" else _predicted(one, results, weighed)
+    return _weighed(told, reference) if reference is not None and found.status == "solved" else told
 
 
 def _weighed(one: SessionIdentification, reference: SessionIdentification) -> SessionIdentification:
@@ -246,12 +253,14 @@ def _changes(
 
 
 def _predicted(
-    one: SessionIdentification, results: tuple[TrialResult, ...], fits: tuple[Fit, ...], others: tuple[Fit, ...]
+    one: SessionIdentification, results: tuple[TrialResult, ...], weighed: Weighing | None
 ) -> SessionIdentification:
     """Return the same with what the identified body predicts of all trials."""
-    found, about, identified = one.identification, standing_point(fits), one.identification.identified
+    found, identified, mass = one.identification, one.identification.identified, weighed.mass if weighed else None
+    parts = [_fits(results, roles) for roles in (FITTED_ROLES, KEPT_ROLES)]
+    about, every = standing_point(parts[0]), _fits(results, ROLES)
     fitted, kept = (
-        tuple(validate(found.body, identified, fit, about=about) for fit in some) for some in (fits, others)
+        tuple(validate(found.body, identified, fit, about=about, mass=mass) for fit in some) for some in parts
     )
     notes = list(one.notes)
     if not kept:
@@ -264,9 +273,7 @@ def _predicted(
         one,
         fitted=fitted,
         validations=kept,
-        agreements={
-            f.name: compare(f.wrench, predict_wrench(identified, f.motion), f.use) for f in _fits(results, ROLES)
-        },
+        agreements={f.name: compare(f.wrench, predict_wrench(identified, f.motion), f.use) for f in every},
         gain=_gain(kept, notes),
         shown=_shown(results),
         notes=tuple(notes),
@@ -279,8 +286,8 @@ def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
     return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
 
 
-def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[Fit, ...]:
-    found = [trial_fit(result) for result in results if result.trial.role in roles]
+def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...], *made: PlateCorrection) -> tuple[Fit, ...]:
+    found = [trial_fit(result, made) for result in results if result.trial.role in roles]
     return tuple(fit for fit in found if fit is not None)
 
 

@@ -15,6 +15,7 @@ from biodance import display
 from biodance.body.body import Body
 from biodance.effects import QualityCheck
 from biodance.effects._base.exchange_spans import Pair, Spans
+from biodance.lab.corrections import PlateCorrection
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import Check, ShownJoints, Step, Still, TrialResult, Weighing
@@ -60,6 +61,10 @@ class SessionResult:
         The mass on the plates that is compared with the declared one, by standing, strides or Newton; None without.
     shown_joints : ShownJoints
         The joints beyond its 23 axes that the body has because its markers show them, and what each brings.
+    known : Body or None
+        The body of an earlier session that it started from; None for the table's.
+    corrections : tuple of PlateCorrection
+        What was taken off the plates of ``session`` before all stages.
 
     Examples
     --------
@@ -83,6 +88,8 @@ class SessionResult:
     prior: Sip | None = None
     weighed: Weighing | None = None
     shown_joints: ShownJoints = field(default_factory=ShownJoints)
+    known: Body | None = None
+    corrections: tuple[PlateCorrection, ...] = ()
 
     def __repr__(self) -> str:
         return (

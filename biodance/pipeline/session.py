@@ -7,6 +7,7 @@ from functools import partial
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused
+from biodance.lab.corrections import PlateCorrection, corrected_trial
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh
@@ -34,6 +35,7 @@ def examine(
     *,
     reference: SessionIdentification | None = None,
     known: Body | None = None,
+    corrections: tuple[PlateCorrection, ...] = (),
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
     """Take a session through all stages: prepare, scale, track, compare, identify; one trial that fails never stops the
@@ -50,6 +52,8 @@ def examine(
     known : Body, optional
         The body as identified in an earlier session (``body.json``): its inertial parameters are then what is known
         before, not the table's. Lengths and joints are measured anew.
+    corrections : tuple of PlateCorrection
+        Faults of the plates to take off first; what is not known of their sizes counts in every interval.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -77,6 +81,7 @@ def examine(
     Motion(23 joint angles, 611 frames at 100 Hz, 6.10 s)
     """
     reference_person(session.settings.table, session.subject)
+    session = replace(session, trials=tuple(corrected_trial(trial, corrections) for trial in session.trials))
     steps: list[Step] = []
     read = []
     for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
@@ -109,7 +114,15 @@ def examine(
     if body is not None and can_identify(done):
         tell("identifying the segments")
         work = partial(
-            identify_trials, body, done, name=session.folder.name, reference=reference, checks=checks, prior=prior
+            identify_trials,
+            body,
+            done,
+            name=session.folder.name,
+            reference=reference,
+            checks=checks,
+            prior=prior,
+            corrections=corrections,
+            weighed=weighed,
         )
         try:
             identification = attempt(steps, "identify", work)
@@ -130,6 +143,8 @@ def examine(
         more_stills=_stills(body, done, identification) if body else (),
         prior=prior,
         shown_joints=shown,
+        known=known,
+        corrections=corrections,
     )
 
 

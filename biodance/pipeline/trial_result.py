@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from biodance import display
 from biodance.identification.statistics import Fit
+from biodance.lab.corrections import PlateCorrection, correction_doubts
 from biodance.lab.markers.gaps import MarkerGaps
 from biodance.motion.contact.contact import Contact
 from biodance.motion.optional_joints import JointGain
@@ -259,13 +260,13 @@ class Still:
     about: str = ""
 
 
-def trial_fit(result: TrialResult) -> Fit | None:
-    """Return what a trial gives to identify from or to validate on; None without motion, wrench or a frame to
-    compare.
+def trial_fit(result: TrialResult, corrections: tuple[PlateCorrection, ...] = ()) -> Fit | None:
+    """Return what a trial gives to identify from or to validate on, with the doubt of the ``corrections`` that were
+    made in it; None without motion, wrench or a frame to compare.
     """
-    found = result.comparison
+    found, trial = result.comparison, result.trial
     if found is None or result.motion is None or not found.used.any():
         return None
-    return Fit(
-        result.trial.name, result.motion, Wrench(found.time, found.measured), found.used, result.trial.settings.outlier
-    )
+    doubts = {"doubts": correction_doubts(trial, corrections)} if corrections else {}
+    measured = Wrench(found.time, found.measured)
+    return Fit(trial.name, result.motion, measured, found.used, trial.settings.outlier, **doubts)

@@ -21,7 +21,7 @@ from biodance.report.tables.diagnosis import LIMIT_ROW
 from biodance.report.tables.identification import SEGMENT_ROW
 from biodance.report.tables.schema import Row, Schema, shown
 from biodance.report.tables.session import TRIAL_ROW
-from biodance.report.wording import causes_by_effect, format_number, sizes_in_words, trial_and_subject
+from biodance.report.wording import causes_by_effect, format_number, parted_gain, sizes_in_words, trial_and_subject
 
 
 class SafeConsole(Console):
@@ -150,6 +150,7 @@ def print_identification(found: Row, console: Console) -> None:
             f"{name} {' '.join(format_number(x) for x in row[name]['rms'])}" for name in ("table", "identified")
         )
         print_line(console, f"{row['trial']}, RMS Fx Fy Fz Mx My Mz: {told}")
+        print_line(console, f"{row['trial']}: {parted_gain(row['gain'])}")
     print_line(console, f"added mass: {found['added_mass_search']['text']}")
     if found["performance"]:
         _print_performance(found["performance"], console)

@@ -9,7 +9,7 @@ from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.lab.corrections import APPLIED, PlateCorrection
 from biodance.pipeline.accepted import CORRECTED, Written, write_corrected, write_mended
-from biodance.pipeline.attention import identified_attention, session_attention
+from biodance.pipeline.attention import corrected_attention, identified_attention, session_attention
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.export import body_of_result
 from biodance.pipeline.for_subject import account_for
@@ -30,7 +30,7 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, diagnosis_document
-from biodance.report.tables.identification import identification_document
+from biodance.report.tables.identification import corrected_document, identification_document
 from biodance.report.tables.schema import plain_values, to_text
 from biodance.report.tables.session import PROVENANCE_ROW, filter_document, movement_document, results_document
 
@@ -49,7 +49,7 @@ def write_report(
     return the content of the latter.
     """
     made = provenance(result, created=now())
-    first = diagnosis.diagnosis.attention if diagnosis else session_attention(result)
+    first = (*diagnosis.diagnosis.attention, *corrected_attention(result)) if diagnosis else session_attention(result)
     judged = diagnosis.diagnosis.judged if diagnosis else ()
     numbers = {
         **results_document(result, made),
@@ -61,7 +61,7 @@ def write_report(
     found: dict[str, Any] = plain_values(numbers)
     files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
     if drawn:
-        files |= {PAGE: _page(result, made, diagnosis, movement)} | _kept(result, folder)
+        files |= {PAGE: _page(result, made, first, diagnosis, movement)} | _kept(result, folder)
     write_files(folder, files)
     return found
 
@@ -101,12 +101,13 @@ def write_identification(
         "attention": ATTENTION_ROW.rows(first),
         "judged": JUDGED_ROW.rows(identified_trials(result)),
         **identification_document(found),
+        "corrected": corrected_document(found),
         "filter": filter_document(result),
         "movement": movement_document(movement),
         "provenance": PROVENANCE_ROW.row(made),
     }
     told: dict[str, Any] = plain_values(numbers)
-    page = _page(result, made, movement=movement, attention=first)
+    page = _page(result, made, first, movement=movement)
     files = {_NUMBERS: to_text(told), METHODS: methods_text(told), PAGE: page}
     write_files(folder, files | _kept(result, folder))
     return told
@@ -217,12 +218,11 @@ def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[s
 def _page(
     result: SessionResult,
     made: Provenance,
+    attention: tuple[Attention, ...],
     diagnosis: SessionDiagnosis | None = None,
     movement: SessionMovement | None = None,
-    attention: tuple[Attention, ...] | None = None,
 ) -> str:
     told = diagnosis_section(diagnosis) if diagnosis else ""
     moved = movement_section(movement) if movement else ""
-    attention = diagnosis.diagnosis.attention if diagnosis else attention
     frames = frames_of(result)
     return page(result, made, attention=attention, diagnosis=told, movement=moved, replay=frames)

@@ -35,11 +35,12 @@ from biodance.report.tables.identification import (
     SEGMENT_ROW,
     SUSPECT_ROW,
     TORQUE_ROW,
+    VALIDATION_ROW,
     segments_document,
     torques_document,
 )
 from biodance.report.tables.schema import Row
-from biodance.report.wording import changed, signed
+from biodance.report.wording import changed, parted_gain, signed
 
 if TYPE_CHECKING:
     from biodance.dance.scoring import PerformanceScore
@@ -223,6 +224,7 @@ def identification_section(found: SessionIdentification) -> str:
         marks=MARKS,
         gain=found.gain,
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
+        parted={row["trial"]: parted_gain(row["gain"]) for row in VALIDATION_ROW.rows(found.validations)},
         channels=CHANNEL_TITLES,
         ranked=Markup(impact_figure(found.impacts)) if found.impacts else "",
         torques=found.torques,

@@ -1,9 +1,10 @@
 """What identification found. Channels in the order Fx Fy Fz Mx My Mz."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from biodance.diagnosis.diagnosis import Finding
 from biodance.display import spaced
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.identification import Identification
@@ -20,8 +21,28 @@ AGREEMENT_ROW = Schema("rms cc=correlation frames")
 """RMS and correlation of six channels; null where a correlation is not defined."""
 VALIDATION_ROW = Schema(
     "trial=name about_m=about",
-    {"table": AGREEMENT_ROW.at("table_agreement"), "identified": AGREEMENT_ROW.at("identified_agreement")},
+    {
+        "table": AGREEMENT_ROW.at("table_agreement"),
+        "identified": AGREEMENT_ROW.at("identified_agreement"),
+        "gain": Schema("", {name: Schema("value ci95") for name in ("mass", "distribution")}),
+    },
 )
+
+
+def _size(name: str) -> Callable[[Finding], object]:
+    """Return a function that tells value, sd or unit of a finding's first parameter; None without one."""
+    return lambda one: getattr(one.parameters[0], name) if one.parameters else None
+
+
+CORRECTED_ROW = Schema("effect target trials", {name: _size(name) for name in ("value", "sd", "unit")})
+"""What was taken off before the fit, in the unit of its cause, null where it has no size; () = all trials. Of a turned
+sign: where in the lab its moments are about, if not about the plate's centre.
+"""
+
+
+def corrected_document(found: SessionIdentification | None) -> list[Row]:
+    """Return what was proven to be wrong with the recordings and taken off before the body was fitted."""
+    return CORRECTED_ROW.rows(found.corrected) if found else []
 
 
 def segment_rows(found: Identification, name: str) -> tuple[Known, ...]:

@@ -13,7 +13,12 @@ from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS
-from biodance.report.tables.identification import AGREEMENT_ROW, added_mass_document, identification_document
+from biodance.report.tables.identification import (
+    AGREEMENT_ROW,
+    added_mass_document,
+    corrected_document,
+    identification_document,
+)
 from biodance.report.tables.schema import Row, Schema
 
 CHECK_ROW = Schema("what where value limit inside advice")
@@ -105,6 +110,7 @@ _SESSION = Schema(
             "difference_percent=mass_difference"
         ).row,
         "identification": lambda one: one.identification and identification_document(one.identification),
+        "corrected": lambda one: corrected_document(one.identification),
         "added_mass": lambda one: one.identification and added_mass_document(one.identification.search),
         "diagnosis": lambda _: None,
     },
