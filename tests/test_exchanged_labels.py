@@ -4,6 +4,8 @@ mended copies.
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -258,3 +260,17 @@ def test_names_that_a_body_follows_worse_are_refused() -> None:
     whole = ((0, trial.markers.time.size),)
     assert refuted(case.body, trial, {("LWRA", "RWRA"): whole})
     assert not refuted(case.body, swapped(trial, (("LWRA", "RWRA"),)), {("LWRA", "RWRA"): whole})
+
+
+@pytest.mark.parametrize("with_static", [True, False])
+def test_a_body_placed_by_the_labels_in_question_refutes_nothing(
+    with_static: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A walk without a static trial gives the body by its own labels: it follows them, whatever they are."""
+    monkeypatch.setattr("biodance.effects.labels_swapped.refuted", lambda *_: True)
+    static, walk = visit(speed=1.5)
+    wrong = swapped(walk, (("LASI", "RASI"),))
+    session = Session(Subject(62.0, 1.7, "F"), (static, wrong) if with_static else (wrong,), Path())
+    case: Any = SimpleNamespace(trial=wrong, body=None)
+    found = exchanges(Recorded(session, (case,)))
+    assert {name: set(pairs) for name, pairs in found.items()} == ({} if with_static else {"fit": {("LASI", "RASI")}})

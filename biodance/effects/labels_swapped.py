@@ -99,7 +99,8 @@ def exchanges(recorded: Recorded) -> dict[str, dict[Pair, Spans]]:
     bodies = {case.trial.name: case.body for case in recorded.cases}
     for trial in trials:
         own = {pair: spans for pair, spans in found[trial.name].items() if pair not in known}
-        if own and trial.name in bodies and refuted(bodies[trial.name], trial, own):
+        # without a static trial the body was placed by these labels, and follows them whatever they are
+        if own and static is not None and trial.name in bodies and refuted(bodies[trial.name], trial, own):
             found[trial.name] = {}
     return {name: pairs for name, pairs in found.items() if pairs}
 
