@@ -204,10 +204,10 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
 
 
 def _is_large(rows: Rows, one: NamedCause) -> bool:
-    """Return whether a cause is large enough to be told: it matters, is larger than laboratories have without calling
-    it a fault (by a standard deviation), and what it changes in this session's wrench matters.
+    """Return whether a cause is large enough to be told: the size that is told matters, it is larger than laboratories
+    have without calling it a fault (by a standard deviation), and what it changes in this session's wrench matters.
     """
-    if not matters(one.effect, one.theta):
+    if not matters(one.effect, _told_size(rows, one)):
         return False
     if one.course:
         return True
@@ -251,9 +251,7 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
     their models.
     """
     one, known = place.cause, rows.tolerances
-    theta, covariance = one.theta, one.covariance
-    if rows.problem is not None and not one.course:
-        theta = one.effect.measured(theta, *rows.problem.cases)
+    theta, covariance = _told_size(rows, one), one.covariance
     alike = known.size(key_of(one.effect.name, one.effect.target)) * one.effect.typical / one.effect.typical[0]
     units = np.array([parameter.unit for parameter in one.effect.parameters])
     length = np.array([np.linalg.norm(theta[units == unit]) for unit in units])
@@ -275,6 +273,11 @@ def _finding(place: Place, rows: Rows, best: Hypothesis) -> Finding:
         probability=place.probability,
         kind=one.effect,
     )
+
+
+def _told_size(rows: Rows, one: NamedCause) -> Array:
+    """Return the size (p,) of a cause that is told: where markers show it by themselves, that."""
+    return one.theta if rows.problem is None or one.course else one.effect.measured(one.theta, *rows.problem.cases)
 
 
 def _visible(one: NamedCause, rows: Rows, best: Hypothesis) -> float:
