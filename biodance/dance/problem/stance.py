@@ -27,8 +27,8 @@ STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
 """(4, 2) m, the legs of a stool from below the hips: a seat of 0.4 m by 0.4 m bears the thighs to their middle."""
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
-_GRIP = (0.18, 0.28, 0.50)
-"""Grips of a walking frame: m ahead of the heels, m to the side, height over stature (crease of the wrist)."""
+_GRIP = (0.24, 0.30, 0.53)
+"""Grips of a walking frame: m ahead of the ankles, m to the side, height over stature (hands of half-bent arms)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +107,11 @@ class Stance(Sendable):
     def whole(self) -> "Stance":
         """The same feet, wherever above them the weight is."""
         return self if self.over is None else replace(self, over=None)
+
+    @property
+    def holding(self) -> tuple[int, ...]:
+        """The hands (0 right, 1 left) that hold a grip."""
+        return tuple(side for side in (0, 1) if np.isfinite(self.hands[side, 0]))
 
     @cached_property
     def sole_centres(self) -> Array:

@@ -67,6 +67,11 @@ class Word:
         return angles.get(PELVIS_TURN, 0.0), angles.get(PELVIS_LEAN, 0.0), angles.get(PELVIS_TILT, 0.0)
 
 
+_HOLDING = Word(
+    "hold", "{} hands on the frame", (("shoulder_adduction", -0.3), ("elbow_flexion", 0.7)), "hold", rest=True
+)
+"""What an arm does that holds a frame: from these angles it is bent to its grip (`posture_table.posed`)."""
+
 Vocabulary = dict[str, tuple[Word, ...]]
 """Group: its words, the one for rest first."""
 
@@ -123,10 +128,18 @@ def words_for(body: Body, plan: Plan, stance: Stance, words: Vocabulary, rng: np
     free = () if plan.gentle else free_words(rng)
     out: Vocabulary = {}
     for part, group in groups_of(stance).items():
+        if _holds(stance, part):
+            out[part] = (_HOLDING,)
+            continue
         kept = _asked(plan, stance, (*words[group], *(free if group == "arm" else ())))
         fitted = [_fitted(body, part, word) for word in kept if stance.over is None or word.rest or group == "arm"]
         out[part] = tuple(word for word in fitted if word is not None)
     return out
+
+
+def _holds(stance: Stance, part: str) -> bool:
+    """Return whether a part of the body is an arm that holds a frame."""
+    return part in [f"{SIDES[side]}_arm" for side in stance.holding]
 
 
 def _asked(plan: Plan, stance: Stance, words: tuple[Word, ...]) -> list[Word]:
@@ -149,7 +162,7 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
     found: dict[str, dict[str, str]] = {}
     for stance in stances:
         for part, group in groups_of(stance).items():
-            for word in _asked(plan, stance, words[group]):
+            for word in [] if _holds(stance, part) else _asked(plan, stance, words[group]):
                 if joint := _short_of(body, part, word):
                     side = part.partition("_")[0]
                     text = singular(word.text.format(f"the {side}"))
