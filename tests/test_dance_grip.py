@@ -13,7 +13,8 @@ from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.nlp import no_objective
-from biodance.dance.problem.person import fit_to_person, read_person
+from biodance.dance.problem.person import fit_to_person
+from biodance.dance.problem.person_file import read_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import feet_in_move, holding, stance
@@ -96,5 +97,5 @@ def test_a_persons_file_puts_the_hand_on_the_frame_in_every_stance(tmp_path: Pat
     assert all(np.isfinite(one.hands[0]).all() and np.isnan(one.hands[1]).all() for one in feet)
     assert not any(np.isfinite(one.hands).any() for one in support_sequence(body, replace(plan, holds=())))
     path.write_text('hold_frame = ["both"]\n')
-    with pytest.raises(BiodanceError, match="list of hands"):
+    with pytest.raises(BiodanceError, match="'both' is not a hand"):
         read_person(path)

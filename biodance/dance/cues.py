@@ -165,7 +165,7 @@ def instructions(body: Body, before: Array, after: Array, was: Stance | None, no
         before = before.copy()
         before[legs] = [_HANGING if "knee" in body.joints[j].name else after[j] for j in legs]
     before = before.copy()
-    for side in now.holding:  # the hand stays on the frame, and the arm follows of itself
+    for side in now.quiet:  # it hangs, or the hand stays on the frame and the arm follows of itself
         arm = [j for j, joint in enumerate(body.joints) if joint.name.startswith(_ARMS[side])]
         before[arm] = after[arm]
     moved = calls(body, np.degrees(before), np.degrees(after), planted, (hips[0], hips[1]))

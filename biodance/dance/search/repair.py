@@ -25,6 +25,9 @@ _OTHERS = 6
 _FEW = 40
 """Performers of a first look."""
 
+_MUCH = 1 / 3
+"""Share of the plan's postures with which nothing longer is looked for."""
+
 _Other = tuple[Course[WordStep], tuple[int, ...]]
 """A course, and the postures where it differs."""
 
@@ -32,9 +35,10 @@ _Other = tuple[Course[WordStep], tuple[int, ...]]
 def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult]:
     """Return a course as all performers can dance it, and what they leave of the limits.
 
-    People who tire (a gentle plan) are first asked only for what leaves imprecise people `AMPLE` room, others where a
-    course with `ENOUGH` could not be repaired. If none is safe, the longest stretch of it is danced at which nobody
-    comes too near a limit; if there is none, the course as it is.
+    People who tire (a gentle plan) or have limits of their own are first asked only for what leaves imprecise people
+    `AMPLE` room, others where a course with `ENOUGH` could not be repaired; both where less than a third of the plan is
+    left. If none is safe, the longest stretch of it is danced at which nobody comes too near a limit; if there is none,
+    the course as it is.
 
     Raises
     ------
@@ -42,17 +46,19 @@ def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult
         There is no course.
     """
     found, missing = list[tuple[Course[WordStep], PerformersResult]](), list[NoNextPosture]()
-    for enough in (AMPLE, ENOUGH) if work.plan.gentle else (ENOUGH, AMPLE):
+    for enough in (AMPLE, ENOUGH) if work.plan.careful or work.plan.gentle else (ENOUGH, AMPLE):
         search = WordSearch(work, enough)
         try:
             found.append(repaired_course(search, word_course(search), work.workers))
         except NoNextPosture as why:
             missing.append(why)
         else:
-            if found[-1][1].safe:
+            if found[-1][1].safe and len(found[-1][0].steps) >= _MUCH * work.plan.count:
                 return found[-1]
     if not found:
         raise missing[0]
+    if safe := [one for one in found if one[1].safe]:
+        return max(safe, key=lambda one: len(one[0].steps))
     shorter = _stretch(*found[0])
     return found[0] if shorter is None else repaired_course(WordSearch(work), shorter, work.workers)
 

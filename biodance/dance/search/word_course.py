@@ -24,7 +24,7 @@ from biodance.dance.search.context import DesignContext
 from biodance.dance.search.course import Course, move_task
 from biodance.dance.search.information import PostureInformation, update_posterior
 from biodance.dance.search.move import Move, Task, straight_via
-from biodance.dance.search.no_next_posture import LEAST, NoNextPosture, nearest_in_words
+from biodance.dance.search.no_next_posture import LEAST, NoNextPosture, nearest_in_words, words_never_kept
 from biodance.dance.search.posture_table import PostureTable
 from biodance.dance.search.reachability import Reachability, WordStep, feet_key
 from biodance.dance.search.straight_moves import AMPLE, ENOUGH, straight_move
@@ -113,6 +113,14 @@ class WordSearch:
             if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
                 raise self._stuck(stances, number, Counter(limits[-1:]))
+
+    def never_kept(self, course: Course[WordStep]) -> tuple[str, ...]:
+        """Return in sentences the words that a person with own limits can do on none of the feet of a course."""
+        if not self.work.plan.careful:
+            return ()
+        tables = {feet_key(one): self.reachability.table(one) for one in course.stances if one.over is None}
+        found = [words_never_kept(table, self.work.plan.limits) for table in tables.values()]
+        return tuple(sentence for one in found for sentence in one)
 
     def postures(self, stances: tuple[Stance, ...]) -> list[WordStep]:
         """Return one step for each of ``stances``, as `course` does, without a look at the moves between them."""
@@ -261,8 +269,11 @@ def word_course(search: WordSearch) -> Course[WordStep]:
             notes.append(why.note(plan.blocks))
             plan = replace(plan, blocks=blocks)
         else:
-            lacking = words_left_out(body, plan, course.stances, search.reachability.words)
-            return replace(course, notes=(*notes, *lacking))
+            lacking = (
+                *words_left_out(body, plan, course.stances, search.reachability.words),
+                *search.never_kept(course),
+            )
+            return replace(course, notes=tuple(dict.fromkeys((*notes, *lacking))))
 
 
 def freer_dance(body: Body, plan: Plan, *, seed: int = 0, stances: tuple[Stance, ...] = ()) -> Dance:
