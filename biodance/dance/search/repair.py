@@ -59,11 +59,11 @@ def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult
         raise missing[0]
     if safe := [one for one in found if one[1].safe]:
         return max(safe, key=lambda one: len(one[0].steps))
-    shorter = _stretch(*found[0])
+    shorter = safe_stretch(*found[0])
     return found[0] if shorter is None else repaired_course(WordSearch(work), shorter, work.workers)
 
 
-def _stretch(course: Course[WordStep], found: PerformersResult) -> Course[WordStep] | None:
+def safe_stretch(course: Course[WordStep], found: PerformersResult) -> Course[WordStep] | None:
     """Return the longest part of a course at no posture of which somebody came too near a limit, from both feet to both
     feet; None where not even two postures follow on each other.
     """
