@@ -85,7 +85,7 @@ class Plan:
     words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached
     without effort, or all that a healthy joint allows (the paper); ``slower`` times that it takes as long as the
     protocol says, whose seconds must be legal: of robots; ``seat_height`` m of a person's own stool, 0 any; ``careful``
-    of people with limits of their own: first only what leaves imprecise people ample room; ``hanging`` arms.
+    of people with limits of their own: words that they can do nowhere are named; ``hanging`` arms.
     """
 
     name: str

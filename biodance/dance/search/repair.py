@@ -10,6 +10,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import combinations, islice
 
+from biodance.dance.limits._arm_lift import ArmLift
 from biodance.dance.performers import PERFORMER_COUNT, PerformersResult, try_performers
 from biodance.dance.search.context import DesignContext
 from biodance.dance.search.course import Course
@@ -35,10 +36,10 @@ _Other = tuple[Course[WordStep], tuple[int, ...]]
 def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult]:
     """Return a course as all performers can dance it, and what they leave of the limits.
 
-    People who tire (a gentle plan) or have limits of their own are first asked only for what leaves imprecise people
-    `AMPLE` room, others where a course with `ENOUGH` could not be repaired; both where less than a third of the plan is
-    left. If none is safe, the longest stretch of it is danced at which nobody comes too near a limit; if there is none,
-    the course as it is.
+    People who tire (a gentle plan) or whose arms stay near the body are first asked only for what leaves imprecise
+    people `AMPLE` room, others where a course with `ENOUGH` could not be repaired; both where less than a third of the
+    plan is left. If none is safe, the longest stretch of it is danced at which nobody comes too near a limit; if there
+    is none, the course as it is.
 
     Raises
     ------
@@ -46,14 +47,16 @@ def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult
         There is no course.
     """
     found, missing = list[tuple[Course[WordStep], PerformersResult]](), list[NoNextPosture]()
-    for enough in (AMPLE, ENOUGH) if work.plan.careful or work.plan.gentle else (ENOUGH, AMPLE):
+    plan = work.plan
+    near = plan.holds or plan.hanging or any(isinstance(limit, ArmLift) for limit in plan.limits)
+    for enough in (AMPLE, ENOUGH) if plan.gentle or near else (ENOUGH, AMPLE):
         search = WordSearch(work, enough)
         try:
             found.append(repaired_course(search, word_course(search), work.workers))
         except NoNextPosture as why:
             missing.append(why)
         else:
-            if found[-1][1].safe and len(found[-1][0].steps) >= _MUCH * work.plan.count:
+            if found[-1][1].safe and len(found[-1][0].steps) >= _MUCH * plan.count:
                 return found[-1]
     if not found:
         raise missing[0]
