@@ -212,7 +212,7 @@ def test_words_beyond_a_lift_are_left_out_or_say_that_they_are_cut_short(tmp_pat
     assert texts["side_in_part"] == "{} arms out to the side (a T), as far as you may"
     assert "side" in {word.key for word in words["right_arm"]}
     assert words_left_out(body, plan, (stance,), read_vocabulary()) == ()
-    body, plan, _ = fit_to_person(BODY, plan, written(tmp_path, "[at_most_deg]\nleft_arm_lift = 55\n"))
+    body, plan, _ = fit_to_person(BODY, plan, written(tmp_path, "[at_most_deg]\nleft_arm_lift = 59\n"))
     (said,) = words_left_out(body, plan, (stance,), read_vocabulary())
     assert said.startswith("Left out for the left arm: the left arm out to the side (a T)")
 
