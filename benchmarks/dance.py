@@ -2,18 +2,19 @@
 imprecise people leave, what will be known, how long a design takes.
 
     OMP_NUM_THREADS=1 python -m benchmarks dance FOLDER [--protocols short easy] [--bodies reference careful]
-        [--seconds 800] [--play]
+        [--seconds 800] [--play] [--patients 40]
 
 A row a body and protocol, all with seed 0. Everything is kept in FOLDER: what is found there is not designed again, and
 after ``--seconds`` no other one is begun. The margins are those that the design itself reports, of 200 imprecise
 performers. ``--play`` plays each dance
-in MuJoCo, which takes half as long as the dance.
+in MuJoCo, which takes half as long as the dance. ``--patients`` designs for so many generated patients instead.
 """
 
 import argparse
 import json
 import resource
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,9 +29,11 @@ from biodance.dance.design import design
 from biodance.dance.expectation import expect
 from biodance.dance.performers import OF_PERFORMERS, for_imprecise
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person
+from biodance.dance.problem.person_file import read_person
 from biodance.dance.problem.plan import read_plan
 from biodance.dance.rehearsal import rehearse
 from biodance.errors import BiodanceError
+from biodance.library import folder as shipped
 from biodance.records import Subject
 
 STIFF = PersonLimits(
@@ -38,6 +41,35 @@ STIFF = PersonLimits(
     reason="left side stiff",
 )
 CAREFUL = PersonLimits(stand_alone_on=(), reason="no standing on one leg")
+_PATIENTS = ("stroke", "hip_tep", "parkinson", "child", "old", "amputee")
+_AGES = {"child": (9, 15), "old": (75, 92), "hip_tep": (55, 85)}
+
+
+def patients(count: int) -> dict[str, tuple[Subject, PersonLimits, str]]:
+    """Return ``count`` generated patients by name: whose limits are those of the templates in turn, harder or milder;
+    how often they stand free, hold a frame or sit, and the protocol that they are asked.
+    """
+    out = {}
+    for k in range(count):
+        rng, kind = np.random.default_rng([40, k]), _PATIENTS[k % len(_PATIENTS)]
+        sex, age = "FM"[k // len(_PATIENTS) % 2], float(rng.uniform(*_AGES.get(kind, (35, 75))))
+        stature = float(rng.normal(1.45, 0.08) if kind == "child" else rng.normal(1.63 if sex == "F" else 1.76, 0.07))
+        mass = float(np.clip(rng.normal(19 if kind == "child" else 26, 4), 15, 40)) * stature**2
+        person, way = read_person(shipped("protocols") / "limits" / f"{kind}.toml"), int(rng.integers(3))
+        ease = float(rng.uniform(0.8, 1.2))
+        person = replace(
+            person,
+            ranges=tuple((key, ease * low, ease * high) for key, low, high in person.ranges),
+            strengths=tuple((key, min(1.0, ease * share)) for key, share in person.strengths),
+            max_speed=ease * person.max_speed,
+            holds=((), ("right",), ())[way],
+        )
+        protocol = "chair" if way == 2 else "easy" if kind == "child" else "patient"
+        subject = Subject(round(max(mass, 30.0), 1), round(max(stature, 1.2), 2), sex, round(age))
+        out[f"{kind} {k + 1}"] = (subject, person, protocol)
+    return out
+
+
 BODIES: dict[str, tuple[Subject, PersonLimits]] = {
     "reference": (Subject(65.0, 1.75, "F", 33.0), HEALTHY),
     "small_woman": (Subject(45.0, 1.50, "F", 25.0), HEALTHY),
@@ -65,26 +97,29 @@ HEADING = (
 )
 
 
-def found(name: str, protocol: str, folder: Path) -> Row:
-    """Return the numbers of the dance of one body and protocol, designed if it is not in the folder."""
+def found(name: str, protocol: str, folder: Path, who: tuple[Subject, PersonLimits] | None = None) -> Row:
+    """Return the numbers of the dance of one body (``who``, else that of this name) and protocol, designed if it is not
+    in the folder.
+    """
     path = folder / f"{name}_{protocol}.json"
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))
-    subject, person = BODIES[name]
+    subject, person = who or BODIES[name]
     plan = read_plan(protocol)
     body = replace(human(subject), limits=joint_limits(subject, within=plan.ranges))
-    body, plan, _ = fit_to_person(body, plan, person)
+    body, plan, corrected = fit_to_person(body, plan, person)
     before, start = _spent(), time.time()
     try:
         dance, margins = design(body, plan, seed=0)
     except BiodanceError as error:
-        out: Row = {"refused": str(error)}
+        out: Row = {"refused": str(error), "cpu_s": _spent() - before}
     else:
         cpu, wall, known = _spent() - before, time.time() - start, expect(dance, steps=1)
         needs = {f"{limit.name}_{OF_PERFORMERS}": one.least for limit, one in for_imprecise(plan.limits).items()}
         counts = [len(said) for said in dance_instructions(dance)]
         out = {
-            "notes": list(dance.notes),
+            "notes": [*corrected, *dance.notes],
+            "unsafe": [one.limit for one in dance.unsafe],
             "postures": len(dance.postures),
             "duration_s": dance.duration,
             "instructions": [float(np.mean(counts)), max(counts)],
@@ -118,6 +153,29 @@ def row(name: str, protocol: str, folder: Path) -> str:
     )
 
 
+def patient_rows(count: int, folder: Path) -> Iterator[str]:
+    """Yield the table of generated patients, and at last how many have a safe dance in a minute of processor time."""
+    yield "| patient | protocol | postures | s | safe | inside, mm | apart, mm | mass sd, kg | left out | CPU, s |"
+    yield "|" + "---|" * 10
+    good = 0
+    for name, (subject, person, protocol) in patients(count).items():
+        one = found(name.replace(" ", "_"), protocol, folder, (subject, person))
+        who = f"{name}: {subject.sex}, {subject.age:g} y, {subject.stature:.2f} m, {subject.mass:.0f} kg"
+        who += f", holds {person.holds[0]}" if person.holds and protocol != "chair" else ""
+        if "refused" in one:
+            yield f"| {who} | {protocol} | refused: {one['refused']} |" + " |" * 7
+            continue
+        good += not one["unsafe"] and one["cpu_s"] <= 60
+        left = " | ".join(f"{1000 * worst:.0f}" for key, worst in one["left"].items() if not key.startswith("floor"))
+        mass = " -> ".join(f"{sd:.2f}" for sd in one["mass"])
+        notes = sum("eft out" in note for note in one["notes"])
+        yield (
+            f"| {who} | {protocol} | {one['postures']} | {one['duration_s']:.0f} | {'no' if one['unsafe'] else 'yes'} "
+            f"| {left} | {mass} | {notes} | {one['cpu_s']:.0f} |"
+        )
+    yield f"\n{good} of {count} have a safe dance in 60 s of processor time."
+
+
 _SIZES = (("mass", 1.0, 2), ("com", 1000.0, 1))
 _PROTOCOLS = ("easy", "patient", "chair", "short", "full")
 
@@ -130,8 +188,13 @@ def main() -> None:
     ask.add_argument("--bodies", nargs="+", choices=tuple(BODIES), default=tuple(BODIES))
     ask.add_argument("--seconds", type=float, default=np.inf)
     ask.add_argument("--play", action="store_true")
+    ask.add_argument("--patients", type=int, default=0)
     asked = ask.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
+    if asked.patients:
+        for line in patient_rows(asked.patients, asked.folder):
+            print(line, flush=True)
+        return
     begun = time.time()
     print(HEADING, flush=True)
     for protocol in asked.protocols:

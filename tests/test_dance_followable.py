@@ -21,10 +21,11 @@ from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.support import support_sequence
 from biodance.dance.search import repair
 from biodance.dance.search.context import Checkpoint, DesignContext
+from biodance.dance.search.no_next_posture import NoNextPosture
 from biodance.dance.search.posture_table import PostureTable
 from biodance.dance.search.reachability import Reachability
-from biodance.dance.search.vocabulary import read_vocabulary, rest_cut_short, words_for, words_left_out
-from biodance.dance.search.word_course import NoNextPosture, WordSearch
+from biodance.dance.search.vocabulary import read_vocabulary, words_for, words_left_out
+from biodance.dance.search.word_course import WordSearch
 from biodance.dance.verify import broken, verify
 from biodance.motion.kinematics import poses
 from biodance.report.pages.dance import mannequin_svg
@@ -98,26 +99,20 @@ def test_feet_that_cannot_be_reached_are_named() -> None:
     assert NoNextPosture("", stances, down + 1).stance == NoNextPosture("", stances, down + 2).stance == "single_left"
 
 
-def test_who_cannot_bend_the_hip_to_sit_is_told_so() -> None:
-    stiff = limit_body(BODY, PersonLimits(ranges=(("left_hip_flexion", -0.1, np.radians(70.0)),)))
-    (seated,) = support_sequence(BODY, replace(PLAN, blocks=(("seated", 1),)))
-    words = read_vocabulary()
-    assert rest_cut_short(BODY, seated, words) == ""
-    said = "left hip flexion reaches 68 of 91 degrees"
-    assert rest_cut_short(replace(BODY, limits=stiff), seated, words) == said
-
-
-def test_a_share_of_the_range_does_not_take_the_chair_away() -> None:
+def test_whoever_sits_bends_the_hip_whatever_the_file_says_and_this_is_said() -> None:
     plan = replace(PLAN, blocks=(("seated", 1),))
-    body, _, notes = fit_to_person(BODY, plan, PersonLimits(range_shares=(("left", 0.6),)))
-    (seated,) = support_sequence(body, plan)
-    assert rest_cut_short(body, seated, read_vocabulary()) == ""
-    assert any("left hip flexion to 93 degrees" in note for note in notes)
-    assert not any("right" in note for note in notes)
-    stiff = PersonLimits(range_shares=(("left", 0.6),), ranges=(("left_hip_flexion", -0.1, np.radians(70.0)),))
-    body, _, notes = fit_to_person(BODY, plan, stiff)
-    assert rest_cut_short(body, seated, read_vocabulary()).startswith("left hip flexion reaches")
-    assert not any("left hip flexion" in note for note in notes)
+    share, told = PersonLimits(range_shares=(("left", 0.6),)), ("left_hip_flexion", -0.1, np.radians(70.0))
+    for person in (share, replace(share, ranges=(told,))):
+        body, fitted, notes = fit_to_person(BODY, plan, person)
+        (seated,) = support_sequence(body, fitted)
+        words = words_for(body, fitted, seated, read_vocabulary(), np.random.default_rng(0))
+        assert np.degrees(dict(words["left_hanging"][0].angles)["hip_flexion"]) == pytest.approx(91.0)
+        assert any("left hip flexion reaches" in note and "to 93 degrees" in note for note in notes)
+        assert not any("right" in note for note in notes)
+    right_angle = PersonLimits(ranges=(("left_hip_flexion", -np.inf, np.radians(90.0)),))
+    body, _, notes = fit_to_person(BODY, plan, right_angle)
+    assert notes == ()
+    assert body.limits.upper[BODY.joint_index("left_hip_flexion")] == pytest.approx(np.radians(90.0))
 
 
 def test_what_a_stiff_arm_cannot_do_is_said() -> None:

@@ -9,17 +9,21 @@ import pytest
 
 from biodance.body.human.human import human
 from biodance.dance.dance import Dance
+from biodance.dance.imprecision import PlannedDance
 from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.nlp import no_objective
-from biodance.dance.problem.person import fit_to_person, read_person
-from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.person import fit_to_person
+from biodance.dance.problem.person_file import read_person
+from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import feet_in_move, holding, stance
 from biodance.dance.problem.state import State
 from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.context import DesignContext
 from biodance.dance.search.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
+from biodance.dance.search.word_course import WordSearch
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
@@ -27,6 +31,7 @@ from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))
 CHAIN = Chain(BODY)
+NO_HANDS = np.full((2, 3), np.nan)
 FRAME = holding(stance(BODY, "parallel"), BODY, ("right",))
 
 
@@ -96,5 +101,31 @@ def test_a_persons_file_puts_the_hand_on_the_frame_in_every_stance(tmp_path: Pat
     assert all(np.isfinite(one.hands[0]).all() and np.isnan(one.hands[1]).all() for one in feet)
     assert not any(np.isfinite(one.hands).any() for one in support_sequence(body, replace(plan, holds=())))
     path.write_text('hold_frame = ["both"]\n')
-    with pytest.raises(BiodanceError, match="list of hands"):
+    with pytest.raises(BiodanceError, match="'both' is not a hand"):
         read_person(path)
+
+
+def test_every_known_posture_holds_the_frame_and_nobody_is_told_to_move_that_arm() -> None:
+    plan = replace(read_plan("patient"), blocks=(("parallel", 4),), holds=("right",))
+    search = WordSearch(DesignContext.alone(BODY, plan, 0))
+    (stance, *_) = support_sequence(BODY, plan)
+    table = search.reachability.table(stance)
+    assert [word.key for word in table.words["right_arm"]] == ["hold"]
+    upright = np.flatnonzero(table.index[:, table.parts.index("legs")] == 0)
+    held = State(CHAIN, stance, table.x[upright], *np.zeros((2, len(upright), CHAIN.size)))
+    assert (Grip().margins(held).value > 0).all()
+    first, *others = search.postures((stance,) * 4)
+    assert first.said[0] == "hold the frame with the right hand"
+    assert not any("right arm" in said or "right elbow" in said for step in others for said in step.said)
+    free = WordSearch(DesignContext.alone(BODY, replace(plan, holds=()), 0)).postures(
+        (replace(stance, hands=NO_HANDS),)
+    )
+    assert not any("frame" in said for said in free[0].said)
+
+
+def test_a_hand_on_the_frame_errs_with_the_trunk_only() -> None:
+    dance = Dance("t", BODY, held()[None], (FRAME,), np.ones(1), np.empty((0, 2, CHAIN.size)), np.empty(0), (), 0)
+    copies = PlannedDance(dance).held_by(20, np.zeros(1)).q[:, -len(BODY.joints) :]
+    right, left = (np.ptp(copies[:, [c - ROOT for c in arm]], axis=0) for arm in CHAIN.arm_columns)
+    np.testing.assert_allclose(right, 0.0, atol=1e-12)
+    assert (left > 0.1).all()

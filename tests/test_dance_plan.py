@@ -8,7 +8,8 @@ import pytest
 
 from biodance import library
 from biodance.body.human.human import human
-from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, limit_body, read_person
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, limit_body
+from biodance.dance.problem.person_file import read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import Subject

@@ -11,17 +11,28 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
 from biodance.dance.limits import family
+from biodance.dance.performers import PerformersResult
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.nlp import no_objective
-from biodance.dance.problem.person import HEALTHY, PersonLimits, limit_body
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, limit_body
+from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance
+from biodance.dance.problem.support import support_sequence
+from biodance.dance.search.context import DesignContext
+from biodance.dance.search.course import Course, PlainStep
+from biodance.dance.search.no_next_posture import NoNextPosture
 from biodance.dance.search.posture import KEPT, initial_guess, refuse, solve
+from biodance.dance.search.repair import safe_stretch
+from biodance.dance.search.word_course import WordSearch, word_course
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
 SUBJECT = Subject(65.0, 1.75, "F", 33.0)
 BODY = replace(human(SUBJECT), limits=joint_limits(SUBJECT, within="comfortable"))
 FEET = stance(BODY, "parallel")
+STIFF = PersonLimits(
+    ranges=(("ankle_dorsiflexion", -np.inf, np.radians(9.0)), ("left_shoulder_flexion", -np.inf, np.radians(40.0)))
+)
 
 
 def limits_of(person: PersonLimits) -> Body:
@@ -59,3 +70,60 @@ def test_an_ankle_that_stays_pointed_cannot_stand() -> None:
     said = words(stiff, FEET)
     assert "both feet side by side" in said
     assert "ankle dorsiflexion (short by about" in said
+
+
+# ---- known postures: what is not possible is left out, the rest is danced
+
+PLAN = Plan("p", "", (("parallel", 4), ("single_right", 2)), hold=1.0, instructions=3.0, wide=1.35, gentle=True)
+
+
+def test_what_is_not_possible_is_left_out_and_the_rest_is_kept() -> None:
+    stances = support_sequence(BODY, PLAN)
+    on = [(one.name, one.over) for one in stances]
+    third, single = NoNextPosture("too weak", stances, 2), on.index(("single_right", None))
+    assert third.possible(PLAN.blocks) == (("parallel", 2), ("single_right", 2))
+    assert third.note(PLAN.blocks) == "Left out: 2 of the 4 postures parallel; too weak."
+    lifted = NoNextPosture("too weak", stances, single)
+    assert lifted.possible(PLAN.blocks) == (("parallel", 4),)
+    assert lifted.note(PLAN.blocks) == "Left out: all 2 postures single right; too weak."
+    assert NoNextPosture("", stances, single + 1).possible(PLAN.blocks) == (("parallel", 4), ("single_right", 1))
+    assert NoNextPosture("", stances, 0).possible(PLAN.blocks) == (("single_right", 2),)
+
+
+def test_a_dance_of_more_postures_than_there_are_is_shorter_and_not_refused() -> None:
+    body, plan, _ = fit_to_person(BODY, replace(PLAN, blocks=(("parallel", 30),)), STIFF)
+    course = word_course(WordSearch(DesignContext.alone(body, plan, 0)))
+    assert 2 <= len(course.steps) < 30
+    assert course.notes[0].startswith(f"Left out: {30 - len(course.steps)} of the 30 postures parallel; ")
+    assert any(
+        "lean to the right; it would break the limit on joint range of left ankle" in note for note in course.notes
+    )
+
+
+def test_only_where_nothing_is_left_a_dance_is_refused_with_joint_and_number() -> None:
+    body, plan, _ = fit_to_person(BODY, PLAN, PersonLimits(strengths=(("all", 0.05),)))
+    with pytest.raises(NoNextPosture, match=r"joint torque of (left|right) [a-z ]+ \(short by about \d+ N m\)"):
+        word_course(WordSearch(DesignContext.alone(body, plan, 0)))
+
+
+@pytest.mark.parametrize(("bad", "kept"), [((4,), (5, 9)), ((0, 8), (1, 7)), ((1, 3, 5, 7, 9), None)])
+def test_the_longest_stretch_at_which_nobody_errs_is_left(bad: tuple[int, ...], kept: tuple[int, int] | None) -> None:
+    steps = tuple(PlainStep(np.full(3, float(p)), FEET, mirror=True) for p in range(10))
+    found = PerformersResult(1, (), tuple((p, "balance") for p in bad))
+    shorter = safe_stretch(Course(steps, (None,) * 9), found)
+    if kept is None:
+        assert shorter is None
+        return
+    assert shorter is not None
+    assert [int(step.x[0]) for step in shorter.steps] == list(range(kept[0], kept[1] + 1))
+    assert len(shorter.moves) == len(shorter.steps) - 1
+    assert [step.mirror for step in shorter.steps] == [False] + [True] * (len(shorter.steps) - 1)
+    assert shorter.notes[0].startswith(f"Left out: {10 - len(shorter.steps)} of 10 postures")
+
+
+def test_a_stretch_begins_and_ends_on_both_feet() -> None:
+    feet = (FEET, FEET, replace(FEET, over=0), FEET.on(0), FEET.on(0), replace(FEET, over=0), FEET, FEET)
+    steps = tuple(PlainStep(np.full(3, float(p)), one) for p, one in enumerate(feet))
+    shorter = safe_stretch(Course(steps, (None,) * 7), PerformersResult(1, (), ((0, "balance"), (4, "balance"))))
+    assert shorter is not None
+    assert [int(step.x[0]) for step in shorter.steps] == [6, 7]

@@ -29,7 +29,7 @@ from biodance.cli.app import (
     show_place,
     whole,
 )
-from biodance.errors import BiodanceError
+from biodance.errors import BiodanceError, UnknownName
 
 if TYPE_CHECKING:
     from biodance.dance.problem.plan import Plan
@@ -53,7 +53,8 @@ class DanceAsked:
         str, Parameter(help="Built-in protocol (easy, patient, chair, short, one_segment, full) or a TOML file.")
     ] = "full"
     limits: Annotated[
-        Path | None, Parameter(help="TOML file with the joint, strength and other limits of the person.")
+        Path | None,
+        Parameter(help="TOML file with what the person can and may do; `biodance limits` writes one to begin with."),
     ] = None
     plate: Annotated[
         str | None,
@@ -95,7 +96,8 @@ def dance_command(
     there. If no dance satisfies all limits, the violated limit is reported (exit code 1). What leads a person (cards,
     cues, dance.c3d) is not written of a dance that is NOT SAFE when imprecise, unless --despite is given.
     """
-    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.person import HEALTHY
+    from biodance.dance.problem.person_file import read_person
     from biodance.pipeline.dance import (
         UNFINISHED,
         dance_folder,
@@ -133,6 +135,28 @@ def dance_command(
     if not result.feasible:
         say(f"There is no such dance. {result.reason}")
     return DONE if result.feasible and result.complete else NEEDS_A_PERSON
+
+
+@app.command(name="limits")
+def limits_command(
+    *,
+    template: Annotated[
+        str, Parameter(help="Whose limits: stroke, hip_tep (a new hip), parkinson, child, old or amputee.")
+    ],
+    out: Annotated[Path, Parameter(name="--out", help="Output file, e.g. person.toml.")],
+    force: ForceOption = False,
+) -> int:
+    """Write a commented file of one person's limits, to be changed and given to `biodance dance --limits`."""
+    from biodance.library import folder, names
+    from biodance.report.files import refuse_file
+
+    legal = names("protocols/limits")
+    if template not in legal:
+        raise UnknownName.of("template of limits", template, legal)
+    refuse_file(out, force=force)
+    shutil.copyfile(folder("protocols") / "limits" / f"{template}.toml", out)
+    show_place(out)
+    return DONE
 
 
 @app.command(name="feedback")

@@ -33,6 +33,8 @@ _BENT = 30.0
 """degrees by which the hips lean of themselves when knees that stand bend."""
 PLANTED = ("knee_flexion",)
 """What is called of a leg that stands: its other joints follow from the feet."""
+_ARMS = tuple((f"{side}_shoulder", f"{side}_elbow") for side in SIDES)
+"""Beginnings of the names of the joints of the right and of the left arm."""
 PLURAL = {"foot": "feet"}
 MIRROR_CALL = ("mirror: the same with right and left exchanged",)
 """What is called for the image of the last posture: one known thing."""
@@ -162,8 +164,19 @@ def instructions(body: Body, before: Array, after: Array, was: Stance | None, no
         legs = [j for j, joint in enumerate(body.joints) if _is_leg(_split(joint.name)[1])]
         before = before.copy()
         before[legs] = [_HANGING if "knee" in body.joints[j].name else after[j] for j in legs]
+    before = before.copy()
+    for side in now.quiet:  # it hangs, or the hand stays on the frame and the arm follows of itself
+        arm = [j for j, joint in enumerate(body.joints) if joint.name.startswith(_ARMS[side])]
+        before[arm] = after[arm]
     moved = calls(body, np.degrees(before), np.degrees(after), planted, (hips[0], hips[1]))
-    return (*_feet_calls(was, now), *moved)
+    return (*_grip_calls(was, now), *_feet_calls(was, now), *moved)
+
+
+def _grip_calls(was: Stance | None, now: Stance) -> tuple[str, ...]:
+    """Return what the hands take hold of at the start."""
+    if was is not None or not now.holding:
+        return ()
+    return (f"hold the frame with {'both hands' if len(now.holding) == 2 else f'the {SIDES[now.holding[0]]} hand'}",)
 
 
 def dance_instructions(dance: Dance) -> tuple[tuple[str, ...], ...]:

@@ -19,8 +19,7 @@ from biodance.dance.limits import Limit
 from biodance.dance.problem.plan import Plan
 from biodance.dance.search.context import Checkpoint, DesignContext, Tell
 from biodance.dance.search.optimised_course import optimised_course
-from biodance.dance.search.repair import repaired_course
-from biodance.dance.search.word_course import word_course
+from biodance.dance.search.repair import safe_course
 from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread
@@ -78,8 +77,7 @@ def design(
 
 def _followable(work: DesignContext) -> tuple[Dance, tuple[Margin, ...]]:
     """Return a dance that people can follow, and what imprecise performers leave."""
-    search, course = word_course(work)
-    course, found = repaired_course(search, course, work.workers)
-    dance = course.dance(search.work)
+    course, found = safe_course(work)
+    dance = course.dance(work)
     margins = found.margins(dance)
     return replace(dance, unsafe=broken(margins)), margins

@@ -36,6 +36,7 @@ class StanceWords(_Entry):
     seat: float = Field(0.0, ge=0, le=3, allow_inf_nan=False)
     over: _Foot | None = None
     hands: list[list[_Grip]]
+    hanging: list[_Foot] = Field(default_factory=list, max_length=2)
 
 
 class PersonWords(_Entry):

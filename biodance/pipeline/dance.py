@@ -25,6 +25,7 @@ from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
 from biodance.dance.robot import design_robot, expect_robot, robot_plan
+from biodance.dance.search.no_next_posture import NoNextPosture
 from biodance.dance.search.word_course import freer_dance
 from biodance.dance.verify import Margin, broken
 from biodance.display import cause_in_words
@@ -116,7 +117,7 @@ def make_dance(
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
-            free = aside.submit(_freer_expectation, own, plan, seed)
+            free = aside.submit(_freer_expectation, dance, plan)
             expected, counted, freely = makers.expect(dance), numbers.result(), free.result()
         reason = " ".join(
             f"The limit on {cause_in_words(m.limit, m.what)} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
@@ -129,9 +130,16 @@ def make_dance(
     return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason, freely)
 
 
-def _freer_expectation(body: Body, plan: Plan, seed: int) -> Expectation | None:
-    """Return what the same postures chosen freely would tell; None where the plan leaves the choice free."""
-    return expect(freer_dance(body, plan, seed=seed), steps=1) if np.isfinite(plan.instructions) else None
+def _freer_expectation(dance: Dance, plan: Plan) -> Expectation | None:
+    """Return what as many postures chosen freely on the same feet would tell; None where the plan leaves the choice
+    free, or there are not as many.
+    """
+    if not np.isfinite(plan.instructions):
+        return None
+    try:
+        return expect(freer_dance(dance.body, plan, seed=dance.seed, stances=dance.stances), steps=1)
+    except NoNextPosture:
+        return None
 
 
 def dance_folder(out: Path, *, force: bool = False) -> Path:

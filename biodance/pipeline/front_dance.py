@@ -81,7 +81,8 @@ def design_dance(
         ...
     biodance.errors.BiodanceError: The mass is 6.5 kg; a dance is designed for 30 to 200 kg. Correct it.
     """
-    from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.dance.problem.person import HEALTHY
+    from biodance.dance.problem.person_file import read_person
     from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import dancer, designed_for, make_dance
 
@@ -135,7 +136,8 @@ def verify_dance(
     True
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
+    from biodance.dance.problem.person import HEALTHY, fit_to_person
+    from biodance.dance.problem.person_file import read_person
     from biodance.dance.problem.plan import read_plan
     from biodance.dance.verify import verify
 

@@ -89,6 +89,12 @@ class Limit(ABC):
         """
         return None
 
+    def eased(self, angles: dict[str, float]) -> dict[str, float]:
+        """Return joint ``angles`` (rad, by the joint's name) of a known posture of a limb as near to them as this limit
+        lets them be; those of a limit that says nothing of limbs, as they are.
+        """
+        return angles
+
     def resized(self, length: float) -> "Limit":
         """Return the limit of a body that is ``length`` times as large: its numbers in m grow with it."""
         other = copy(self)

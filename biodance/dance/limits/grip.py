@@ -19,7 +19,7 @@ class Grip(Limit):
 
     def margins(self, state: State) -> Margins:
         """Return how much further each holding palm may be from its grip, (T, holding hands) m; none without a grip."""
-        holding = [side for side in (0, 1) if np.isfinite(state.stance.hands[side, 0])]
+        holding = [*state.stance.holding]
         if not holding:
             return unconcerned(state)
         palms = [palm(state.chain.body, SIDES[side]) for side in holding]

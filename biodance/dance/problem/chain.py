@@ -62,6 +62,16 @@ class Chain(Sendable):
         return right, left
 
     @cached_property
+    def arm_columns(self) -> tuple[list[int], list[int]]:
+        """Coordinates of the right and of the left arm, shoulder to elbow; none of a robot whose joints have other
+        names.
+        """
+        names = [joint.name for joint in self.body.joints]
+        arms = [tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow")) for side in SIDES]
+        right, left = ([ROOT + j for j, name in enumerate(names) if name.startswith(arm)] for arm in arms)
+        return right, left
+
+    @cached_property
     def upper(self) -> list[int]:
         """Coordinates of trunk and arms: every joint that is in no leg."""
         taken = {c for leg in self.leg_columns for c in leg}

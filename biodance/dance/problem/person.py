@@ -1,48 +1,51 @@
-"""What one person can and may do: reduced range, strength and speed, one side, no standing on one leg, only seated.
-
-    reason = "stroke in March, left side"      for the record
-    max_speed_deg_s = 120                      no joint turns faster
-    stand_alone_on = ["right"]                 legs on which the person may stand alone; [] = never; without it: both
-    seated = false                             true: only protocols on a stool
-    hold_frame = ["right"]                     hands that stay on the grips of a walking frame; without it: none
-
-    [range_deg]                                what a joint reaches, degrees
-    left_shoulder_flexion = [0, 70]
-    [range_share]                              or the share of the usual range, towards the upright posture
-    left = 0.7
-    [strength]                                 share of the usual strength
-    left_knee = 0.5
-    all = 0.8
-
-A key names joints from the coarse to the fine: "all"; "left"; "knee" (both sides); "left_knee"; "left_knee_flexion".
-Several that name the same joint act one after the other. Angles are positive in the anatomical direction of the name.
+"""What one person can and may do, and the body and the plan that are left: reduced range, strength and speed, one side,
+no standing on one leg, only seated, a frame. The file that says it: `person_file`.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.parts import JointLimits
-from biodance.dance.problem.plan import Plan, finite_number, table
+from biodance.dance.limits import Limit
+from biodance.dance.limits._arm_lift import LEAST_LIFT, ArmLift
+from biodance.dance.limits._foot_load import FootLoad
+from biodance.dance.problem.movements import names_joint
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import SEAT_TO_HIP, seat
 from biodance.errors import BiodanceError, UnknownName
-from biodance.library import read_toml
 from biodance.records import SIDES
 
-_KEYS = ("reason", "max_speed_deg_s", "stand_alone_on", "seated", "hold_frame", "range_deg", "range_share", "strength")
 Shares = tuple[tuple[str, float], ...]
+HALF = 0.55
+"""Share of the weight that a leg must bear at least of who stands on both: half, and some for leaning."""
+_SITTING = {"hip_flexion": math.radians(93.0), "knee_flexion": math.radians(82.0)}
+"""rad to which whoever sits on a stool bends (the word for it in the vocabulary, and 2 degrees)."""
+_ASKED = 58.0
+"""degrees that the word for an arm at rest takes: one that is lifted less comes too near the trunk when it errs."""
+_RESTING = {
+    "shoulder_flexion": (0.0, "An arm must be able to hang"),
+    "shoulder_adduction": (0.0, "An arm must be able to hang"),
+    "hip_rotation": (math.radians(5.0), "Whoever stands or sits upright turns the hips a little"),
+}
+"""rad to both sides of straight that nobody can do without, and why."""
+_FITS = math.radians(3.0)
+"""rad less at which the seat is soft enough."""
+_LEAST_RANGE = math.radians(6.0)
+"""rad: nobody holds a joint within less."""
 
 
 @dataclass(frozen=True)
 class PersonLimits:
     """Limits of one person beyond those of sex, age, mass and stature.
 
-    ``ranges`` (key, lower, upper) rad; ``range_shares``, ``strengths`` (key, share 0..1); ``max_speed`` rad/s;
-    ``stand_alone_on`` the legs on which the person may stand alone; ``seated`` True where standing is not possible;
-    ``holds`` the hands that stay on a frame; ``reason`` in words. Keys: see the module.
+    ``ranges`` (key, lower, upper) rad, infinite where nothing is said; ``range_shares``, ``strengths`` (key, share
+    0..1); ``max_speed`` rad/s; ``stand_alone_on`` the legs on which the person may stand alone; ``seated`` True where
+    standing is not possible; ``holds`` the hands that stay on a frame; ``reason`` in words; ``bearing`` (side, share of
+    the weight that this leg may bear); ``hands_low`` True where no hand may come over shoulder height; ``seat_height``
+    m, 0 any. Keys: see `person_file`.
     """
 
     ranges: tuple[tuple[str, float, float], ...] = ()
@@ -53,68 +56,23 @@ class PersonLimits:
     seated: bool = False
     reason: str = ""
     holds: tuple[str, ...] = ()
+    bearing: Shares = ()
+    hands_low: bool = False
+    seat_height: float = 0.0
+
+    @property
+    def alone(self) -> tuple[str, ...]:
+        """The legs on which the person may stand alone and that may bear all of the weight."""
+        return tuple(side for side in self.stand_alone_on if dict(self.bearing).get(side, 1.0) >= 1.0)
 
 
 HEALTHY = PersonLimits()
 """No limits beyond those of sex, age, mass and stature."""
 
 
-def read_person(path: str | Path) -> PersonLimits:
-    """Return the limits in a person's TOML file.
-
-    Raises
-    ------
-    UnknownName
-        A key or a leg does not exist. (Joints are looked up later, in the body.)
-    BiodanceError
-        The file cannot be read, or a value is not legal; the message names file, key, value and what would be legal.
-    """
-    path = Path(path)
-    raw = read_toml(path)
-    for key in raw:
-        if key not in _KEYS:
-            raise UnknownName.of(f"key of {path}", key, _KEYS)
-    ranges = []
-    for key, value in table(path, raw, "range_deg").items():
-        if not isinstance(value, list) or len(value) != 2:
-            raise BiodanceError(f"{path}: range_deg.{key} = {value!r}; expected [lower, upper] in degrees.")
-        low, high = (math.radians(finite_number(path, f"range_deg.{key}", one)) for one in value)
-        ranges.append((key, low, high))
-    legs, seated = raw.get("stand_alone_on", list(SIDES)), raw.get("seated", False)
-    if not isinstance(legs, list) or not isinstance(seated, bool):
-        raise BiodanceError(
-            f"{path}: stand_alone_on must be a list of legs and seated true or false, found {legs!r} and {seated!r}."
-        )
-    for leg in legs:
-        if leg not in SIDES:
-            raise UnknownName.of(f"leg in stand_alone_on of {path}", str(leg), SIDES)
-    hands = raw.get("hold_frame", [])
-    if not isinstance(hands, list) or any(hand not in SIDES for hand in hands):
-        raise BiodanceError(f'{path}: hold_frame = {hands!r}; expected a list of hands, "right" and "left".')
-    speed = (
-        math.radians(finite_number(path, "max_speed_deg_s", raw["max_speed_deg_s"]))
-        if "max_speed_deg_s" in raw
-        else math.inf
-    )
-    if not speed > 0:
-        raise BiodanceError(f"{path}: max_speed_deg_s = {raw['max_speed_deg_s']!r}; it must be positive.")
-    shares, strengths = (_shares(path, table(path, raw, name), name) for name in ("range_share", "strength"))
-    return PersonLimits(
-        tuple(ranges), shares, strengths, speed, tuple(legs), seated, str(raw.get("reason", "")), tuple(hands)
-    )
-
-
-def _shares(path: Path, raw: dict[str, object], name: str) -> Shares:
-    found = tuple((key, finite_number(path, f"{name}.{key}", value)) for key, value in raw.items())
-    for key, value in found:
-        if not 0 <= value <= 1:
-            raise BiodanceError(f"{path}: {name}.{key} = {value:g}; a share lies between 0 and 1.")
-    return found
-
-
 def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, Plan, tuple[str, ...]]:
-    """Return the body with the person's limits, the plan without what the person may not do, and what was left out, in
-    plain sentences.
+    """Return the body with the person's limits, the plan with those that are no joint's and without what the person may
+    not do, and what was left out or corrected, in plain sentences.
 
     Raises
     ------
@@ -124,53 +82,118 @@ def fit_to_person(body: Body, plan: Plan, person: PersonLimits) -> tuple[Body, P
         A range lies outside the joint's own, or nothing of the protocol is left; the message names the constraint that
         forbids it.
     """
-    if person.seated and not plan.seated:
-        raise BiodanceError(
-            f"Protocol {plan.name}: is danced standing and this person must sit (seated = true). Use --protocol chair."
-        )
+    _check_standing(plan, person)
     kept = tuple(block for block in plan.blocks if _allowed(block[0], person))
-    if not kept:
-        raise BiodanceError(
-            f"Protocol {plan.name}: stands on one leg only, and this person may stand alone on "
-            f"{' and '.join(person.stand_alone_on) or 'neither leg'} (stand_alone_on). Use another protocol."
-        )
-    notes = tuple(
+    notes = [
         f"The {count} postures in {stance.replace('_', ' ')} support are left out: the person may not stand alone on "
         f"that leg."
         for stance, count in plan.blocks
         if not _allowed(stance, person)
-    )
-    limits = limit_body(body, person)
-    if plan.seated:
-        limits, widened = _as_seated(body, limits, person)
-        notes += widened
-    plan = replace(plan, blocks=kept, alone=person.stand_alone_on, holds=person.holds)
-    return replace(body, limits=limits), plan, notes
-
-
-_SITTING = {"hip_flexion": math.radians(93.0), "knee_flexion": math.radians(82.0)}
-"""rad to which whoever sits on a stool bends (the word for it in the vocabulary, and 2 degrees)."""
-
-
-def _as_seated(body: Body, limits: JointLimits, person: PersonLimits) -> tuple[JointLimits, tuple[str, ...]]:
-    """Return the limits with what sitting takes, and what of ``person`` was therefore not applied, in sentences: a
-    share of every range says nothing of how far the hips of somebody bend who sits; a range does.
-    """
-    told = {j for key, _, _ in person.ranges for j in joints(body, key)}
-    upper, notes = limits.upper.copy(), list[str]()
-    for j, joint in enumerate(body.joints):
-        angle = min(_SITTING.get(joint.name.partition("_")[2], -math.inf), body.limits.upper[j])
-        if upper[j] < angle and j not in told:
-            upper[j] = angle
-            name = joint.name.replace("_", " ")
+    ]
+    limits, corrected = _possible(body, limit_body(body, person), plan, person)
+    notes += corrected
+    plan = replace(plan, blocks=kept, alone=person.alone, holds=person.holds, careful=person != HEALTHY)
+    if plan.seated and person.seat_height:
+        least = seat(body).seat - SEAT_TO_HIP
+        if person.seat_height < least:
             notes.append(
-                f"Whoever sits bends the {name} to {math.degrees(angle):.0f} degrees, so range_share is not kept there."
+                f"The seat must be {least:.2f} m high, or the feet would touch the ground; {person.seat_height:g} m is "
+                f"not kept."
             )
-    return replace(limits, upper=upper), tuple(notes)
+        plan = replace(plan, seat_height=max(least, person.seat_height))
+    own = replace(body, limits=limits)
+    plan = plan.with_limits(_own_limits(body, own, person))
+    hanging = _hanging(plan)
+    notes += [
+        f"The {side} arm hangs and is asked for nothing: it is lifted by less than {_ASKED:g} degrees."
+        for side in hanging
+    ]
+    return own, replace(plan, hanging=hanging), tuple(notes)
+
+
+def _hanging(plan: Plan) -> tuple[str, ...]:
+    """Return the arms that are lifted too little to be kept away from the trunk by people who copy imprecisely."""
+    lifts = [limit for limit in plan.limits if isinstance(limit, ArmLift)]
+    reach = {side: min([one.reach(side) for one in lifts], default=180.0) for side in SIDES}
+    return tuple(side for side in SIDES if reach[side] < _ASKED and side not in plan.holds)
+
+
+def _check_standing(plan: Plan, person: PersonLimits) -> None:
+    """Raise BiodanceError where the person cannot be on any of the feet of a plan."""
+    weak = [(side, share) for side, share in person.bearing if share < HALF]
+    if weak and not plan.seated:
+        raise BiodanceError(
+            f"Protocol {plan.name}: is danced standing, and the {weak[0][0]} leg may bear {weak[0][1]:g} of the weight "
+            f"(weight_bearing); on both feet it bears about half, {HALF:g} when leaning. Use --protocol chair."
+        )
+    if person.seated and not plan.seated:
+        raise BiodanceError(
+            f"Protocol {plan.name}: is danced standing and this person must sit (seated = true, or cannot = "
+            f'["stand"]). Use --protocol chair.'
+        )
+    if not any(_allowed(stance, person) for stance, _ in plan.blocks):
+        raise BiodanceError(
+            f"Protocol {plan.name}: stands on one leg only, and this person may stand alone on "
+            f"{' and '.join(person.alone) or 'neither leg'} (stand_alone_on). Use another protocol."
+        )
+
+
+def _allowed(stance: str, person: PersonLimits) -> bool:
+    return not stance.startswith("single_") or stance.removeprefix("single_") in person.alone
+
+
+def _own_limits(body: Body, own: Body, person: PersonLimits) -> list[Limit]:
+    """Return the limits of this person that are no joint's: how far arms are lifted (where ``own`` body reaches less
+    than any ``body``, whatever the joint angle by which), and what a foot bears.
+    """
+    lifts = dict[str, float]()
+    for side in SIDES:
+        names = [joint.name for joint in body.joints]
+        if f"{side}_shoulder_flexion" not in names or f"{side}_shoulder_adduction" not in names:
+            continue
+        f, a = names.index(f"{side}_shoulder_flexion"), names.index(f"{side}_shoulder_adduction")
+        forward, sideways = np.degrees([own.limits.upper[f], -own.limits.lower[a]])
+        less = own.limits.upper[f] < body.limits.upper[f], own.limits.lower[a] > body.limits.lower[a]
+        if any(less):
+            forward, sideways = (forward if less[0] else sideways), (sideways if less[1] else forward)
+            lifts |= {f"{side}_forward": max(LEAST_LIFT, forward), f"{side}_sideways": max(LEAST_LIFT, sideways)}
+    out = list[Limit]()
+    if lifts or person.hands_low:
+        out.append(ArmLift(**lifts, **({"hand": 90.0} if person.hands_low else {})))
+    if person.bearing:
+        out.append(FootLoad(**dict(person.bearing)))
+    return out
+
+
+def _possible(body: Body, limits: JointLimits, plan: Plan, person: PersonLimits) -> tuple[JointLimits, tuple[str, ...]]:
+    """Return the limits with what nobody can do without, and what of ``person`` was therefore not applied, in
+    sentences: a shoulder comes back to the hanging arm, every joint moves a little, hip and knee bend to sit.
+    """
+    lower, upper, own, notes = limits.lower.copy(), limits.upper.copy(), body.limits, list[str]()
+    for j, joint in enumerate(body.joints):
+        before, bare, why = (lower[j], upper[j]), joint.name.partition("_")[2], ""
+        sitting = min(_SITTING.get(bare, -math.inf), own.upper[j]) if plan.seated else -math.inf
+        if bare in _RESTING and not (lower[j] <= -_RESTING[bare][0] and _RESTING[bare][0] <= upper[j]):
+            around, why = _RESTING[bare]
+            lower[j], upper[j] = min(lower[j], 0.0 - around), max(upper[j], around)
+        if upper[j] < sitting - _FITS:
+            upper[j], why = sitting, "Whoever sits bends hips and knees"
+        if upper[j] - lower[j] < min(_LEAST_RANGE, own.upper[j] - own.lower[j]):
+            middle = np.clip(
+                (lower[j] + upper[j]) / 2, own.lower[j] + _LEAST_RANGE / 2, own.upper[j] - _LEAST_RANGE / 2
+            )
+            lower[j], upper[j] = min(lower[j], middle - _LEAST_RANGE / 2), max(upper[j], middle + _LEAST_RANGE / 2)
+            why = why or "Nobody holds a joint within less than 6 degrees"
+        if why:
+            given, found = (
+                f"{math.degrees(a):.0f} to {math.degrees(b):.0f}" for a, b in (before, (lower[j], upper[j]))
+            )
+            notes.append(f"{why}: {joint.name.replace('_', ' ')} reaches {found} degrees here instead of {given}.")
+    return replace(limits, lower=lower, upper=upper), tuple(notes)
 
 
 def limit_body(body: Body, person: PersonLimits) -> JointLimits:
-    """Return the limits of the body's joints with those of the person on top; raises as `fitted` does."""
+    """Return the limits of the body's joints with those of the person on top; raises as `fit_to_person` does."""
     limits = body.limits
     lower, upper, strength = limits.lower.copy(), limits.upper.copy(), np.ones(len(body.joints))
     for key, share in person.range_shares:
@@ -179,8 +202,10 @@ def limit_body(body: Body, person: PersonLimits) -> JointLimits:
             lower[j], upper[j] = rest + share * (lower[j] - rest), rest + share * (upper[j] - rest)
     for key, low, high in person.ranges:
         for j in joints(body, key):
-            _check_range(body, j, low, high)
-            lower[j], upper[j] = max(lower[j], low), min(upper[j], high)
+            if math.isfinite(low) and math.isfinite(high):
+                _check_range(body, j, low, high)
+            lower[j] = min(max(lower[j], low), limits.upper[j])
+            upper[j] = max(min(upper[j], high), limits.lower[j])
     for key, share in person.strengths:
         strength[joints(body, key)] *= share
     return JointLimits(
@@ -193,16 +218,11 @@ def limit_body(body: Body, person: PersonLimits) -> JointLimits:
 
 
 def joints(body: Body, key: str) -> list[int]:
-    """Return the indices of the joints that ``key`` names; UnknownName where it names none."""
+    """Return the indices of the joints that ``key`` names (`names_joint`); UnknownName where it names none."""
     names = [joint.name for joint in body.joints]
-    tests: tuple[Callable[[str], bool], ...] = (
-        lambda name: key == "all",
-        lambda name: f"{name}_".startswith(f"{key}_"),
-        lambda name: f"{name.removeprefix('right_').removeprefix('left_')}_".startswith(f"{key}_"),
-    )
-    found = [j for j, name in enumerate(names) if any(test(name) for test in tests)]
+    found = [j for j, name in enumerate(names) if names_joint(key, name)]
     if not found:
-        raise UnknownName.of("joint, side or group of joints", key, ("all", *SIDES, *names))
+        raise UnknownName.of("joint, side or group of joints", key, ("all", *SIDES, "arm", "leg", *names))
     return found
 
 
@@ -214,7 +234,3 @@ def _check_range(body: Body, joint: int, low: float, high: float) -> None:
             f"Limits: {body.joints[joint].name} from {given} has nothing in common with a healthy joint's {usual}. "
             f"Correct range_deg."
         )
-
-
-def _allowed(stance: str, person: PersonLimits) -> bool:
-    return not stance.startswith("single_") or stance.removeprefix("single_") in person.stand_alone_on

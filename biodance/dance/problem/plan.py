@@ -1,9 +1,8 @@
 """What a dance is asked to be: postures, feet, times, limits, weights; read from a protocol file. The person's limits
 are in the Body.
 
-A person's reduced range, strength or speed go into ``body.limits`` and a person who may not stand on one leg takes
-blocks out of the plan (`person.fitted`), so that whoever designs needs the two records only. The file is TOML; the
-shipped ones are in ``protocols/dances``:
+A person's reduced range, strength or speed go into ``body.limits``, and what the person may not do is taken out of the
+plan (`person.fit_to_person`): whoever designs needs the two records only. The file is TOML (``protocols/dances``):
 
     name = "short"
     description = "what it is for, one sentence"
@@ -60,7 +59,6 @@ from biodance.records import SIDES, Array
 
 _STANCES = ("parallel", "right_forward", "single_right", "single_left", "seated")
 """Both feet side by side, right foot in front, on the right leg, on the left leg (paper Table I), on a stool."""
-
 LEAST_WIDE, LEAST_FORWARD = 0.8, 0.05
 """Times the usual distance between the feet, and m by which one is in front: the least that are legal."""
 USUAL_PLATE = (0.40, 0.60)
@@ -86,7 +84,8 @@ class Plan:
     they tell of the joint centres; ``wide`` times the usual distance between the feet; ``whom`` for whom it is, in
     words; ``holds`` the hands that stay on the grips of a frame; ``ranges`` what joints may use: what is reached
     without effort, or all that a healthy joint allows (the paper); ``slower`` times that it takes as long as the
-    protocol says, whose seconds must be legal: of robots.
+    protocol says, whose seconds must be legal: of robots; ``seat_height`` m of a person's own stool, 0 any; ``careful``
+    of people with limits of their own: words that they can do nowhere are named; ``hanging`` arms.
     """
 
     name: str
@@ -110,6 +109,9 @@ class Plan:
     ranges: Range = "comfortable"
     whom: str = ""
     slower: float = 1.0
+    seat_height: float = 0.0
+    careful: bool = False
+    hanging: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = field(default_factory=family)
 
     def __post_init__(self) -> None:

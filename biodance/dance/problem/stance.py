@@ -27,8 +27,10 @@ STOOL = np.array([[-0.15, -0.2], [0.25, -0.2], [0.25, 0.2], [-0.15, 0.2]])
 """(4, 2) m, the legs of a stool from below the hips: a seat of 0.4 m by 0.4 m bears the thighs to their middle."""
 HANGING = 0.08
 """m between the ground and the soles of hanging legs on a stool."""
-_GRIP = (0.18, 0.28, 0.50)
-"""Grips of a walking frame: m ahead of the heels, m to the side, height over stature (crease of the wrist)."""
+SEAT_TO_HIP = 0.08
+"""m from a seat up to the hip centres of who sits on it: half a thigh."""
+_GRIP = (0.24, 0.30, 0.53)
+"""Grips of a walking frame: m ahead of the ankles, m to the side, height over stature (hands of half-bent arms)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class Stance(Sendable):
     the ground of what else bears weight: the legs of a stool; ``hands`` (2, 3) m grips that the right and the left hand
     hold, NaN = free; ``seat`` m height of the hip centres of a person on a stool, pelvis upright and still over the lab
     origin; 0 standing; ``over`` the one of two planted feet (0, 1) over which the weight is, so that the other could be
-    lifted; None anywhere.
+    lifted; None anywhere; ``hanging`` the arms (0 right, 1 left) that are asked for nothing.
     """
 
     name: str
@@ -53,9 +55,11 @@ class Stance(Sendable):
     seat: float = 0.0
     over: int | None = None
     hands: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
+    hanging: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        assign(self, planted=tuple(self.planted), props=self.props if np.size(self.props) else np.empty((0, 2)))
+        assign(self, planted=tuple(self.planted), hanging=tuple(self.hanging))
+        assign(self, props=self.props if np.size(self.props) else np.empty((0, 2)))
         freeze(self, "Stance", ankle=(2, 3), soles=(2, None, 3), hands=(2, 3), props=(None, 2))
 
     @cached_property
@@ -108,6 +112,16 @@ class Stance(Sendable):
         """The same feet, wherever above them the weight is."""
         return self if self.over is None else replace(self, over=None)
 
+    @property
+    def quiet(self) -> tuple[int, ...]:
+        """The arms (0 right, 1 left) that hold a grip or hang: nobody is asked to move them."""
+        return tuple(sorted({*self.holding, *self.hanging}))
+
+    @property
+    def holding(self) -> tuple[int, ...]:
+        """The hands (0 right, 1 left) that hold a grip."""
+        return tuple(side for side in (0, 1) if np.isfinite(self.hands[side, 0]))
+
     @cached_property
     def sole_centres(self) -> Array:
         """(2, 3) m middle of each sole on the ground."""
@@ -155,11 +169,14 @@ def holding(feet: Stance, body: Body, hands: tuple[str, ...]) -> Stance:
     return replace(feet, hands=grips)
 
 
-def seat(body: Body, *, share: float = 1.0) -> Stance:
-    """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground."""
+def seat(body: Body, *, share: float = 1.0, height: float = 0.0) -> Stance:
+    """Return the stance of a person on a stool, hips over the lab origin, feet hanging above the ground; ``height`` m
+    of its seat, 0: as low as the feet hang.
+    """
     feet = stance(body, "seated", planted=(), share=share)
     legs = [np.linalg.norm(body.joints[body.joint_index(f"{side}_ankle_dorsiflexion")].translation) for side in SIDES]
-    return replace(feet, props=STOOL, seat=float(max(legs) + feet.ankle[:, 2].max()) + HANGING)
+    hips = height + SEAT_TO_HIP if height else float(max(legs) + feet.ankle[:, 2].max()) + HANGING
+    return replace(feet, props=STOOL, seat=hips)
 
 
 def apart(body: Body, share: float, *, wide: float = 1.0) -> float:

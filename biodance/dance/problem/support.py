@@ -14,6 +14,7 @@ from biodance.dance.problem.footprint import feet_on_plate
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import SINGLE, Stance, holding, seat, stance
 from biodance.errors import BiodanceError
+from biodance.records import SIDES
 
 RIGHT, LEFT = 0, 1
 
@@ -41,9 +42,10 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
     for name, count in plan.blocks:
         if name in doubles and "left" in plan.alone:
             feet = _double(body, plan, name)
-        target = (
-            seat(body, share=plan.share) if name == "seated" else feet.on(*SINGLE[name]) if name in SINGLE else feet
-        )
+        if name == "seated":
+            target = _quiet(seat(body, share=plan.share, height=plan.seat_height), plan)
+        else:
+            target = feet.on(*SINGLE[name]) if name in SINGLE else feet
         out += [*(weight_shifts(out[-1], target) if out else ()), *[target] * count]
     if len(out[-1].planted) == 1:
         out.append(_over(out[-1], out[-1].planted[0]))
@@ -53,7 +55,11 @@ def support_sequence(body: Body, plan: Plan) -> tuple[Stance, ...]:
 def _double(body: Body, plan: Plan, name: str) -> Stance:
     wide, forward = feet_on_plate(body, plan)
     feet = stance(body, name, right=forward if name == "right_forward" else 0.0, share=plan.share, wide=wide)
-    return holding(feet, body, plan.holds)
+    return _quiet(holding(feet, body, plan.holds), plan)
+
+
+def _quiet(feet: Stance, plan: Plan) -> Stance:
+    return replace(feet, hanging=tuple(side for side in (RIGHT, LEFT) if SIDES[side] in plan.hanging))
 
 
 def _over(feet: Stance, side: int) -> Stance:

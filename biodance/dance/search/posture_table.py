@@ -15,16 +15,23 @@ from biodance.dance.dance import Dance
 from biodance.dance.limits import Limit
 from biodance.dance.performers import deviations_of_copies
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
 from biodance.dance.search.mirror import counterpart
 from biodance.dance.search.vocabulary import Vocabulary, Word, own_joint
-from biodance.records import Array
+from biodance.records import SIDES, Array
 
 _ROUNDS = 5
 """Corrections of the pelvis; each leaves about a fifth of the error."""
 _BACK = 0.03
 """m behind the middle of the support where people stand: over the arch of the foot."""
+_GRIPPED, _STEPS, _DAMPING = 2, 12, 1e-3
+"""Times that holding arms are bent and the pelvis is set anew, least-squares steps of each, and their damping, m²."""
+_ELBOW_OUT = tuple(np.radians([0.0, -60.0, 40.0, 60.0]))
+"""rad (shoulder flexion, adduction, rotation, elbow flexion) which a holding arm comes near to: away from the trunk."""
+_FROM_STOP = float(np.radians(3.0))
+"""rad that the joints of a holding arm keep from their stops."""
 _TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
 """Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
 
@@ -105,7 +112,28 @@ def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.int
                     knee[rows] = angle
                 elif (name := own_joint(part, joint)) in names:
                     x[rows, names[name]] = angle
+    for _ in range(_GRIPPED if stance.holding else 0):
+        x = _gripping(chain, stance, settled(chain, stance, x, knee))
     return settled(chain, stance, x, knee)
+
+
+def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
+    """Return coordinates ``x`` (S, n) with the holding arms bent so that the palms come to their grips, or as near as
+    their joints reach: by least squares, step by step.
+    """
+    x, limits = x.copy(), chain.body.limits
+    for side in stance.holding:
+        segment, local = palm(chain.body, SIDES[side])
+        arm = chain.arm_columns[side]
+        low, high = limits.lower[np.array(arm) - ROOT] + _FROM_STOP, limits.upper[np.array(arm) - ROOT] - _FROM_STOP
+        for _ in range(_STEPS):
+            place, slope = State(chain, stance, x, *np.zeros((2, *x.shape))).points([segment], local[None])
+            J, out = slope[:, 0][:, :, arm], np.array(_ELBOW_OUT) - x[:, arm]
+            inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + _DAMPING * np.eye(3))
+            left = stance.hands[side] - place[:, 0] - np.einsum("sij,sj->si", J, out)
+            step = np.einsum("sij,sj->si", inverse, left) + out
+            x[:, arm] = np.clip(x[:, arm] + step, np.minimum(low, high), np.maximum(low, high))
+    return x
 
 
 def _columns(chain: Chain) -> dict[str, int]:

@@ -119,6 +119,7 @@ class Reachability:
             return WordStep(table, s, MIRROR_CALL, mirror=True)
         before, feet = (np.zeros(self.work.chain.size), None) if last is None else (last.x, last.stance)
         said = instructions(body, before, table.x[s], feet, table.stance)
+        most += feet is None and bool(table.stance.holding)  # to take hold of the frame, before it begins
         return WordStep(table, s, said) if len(said) <= most else None
 
     def leads(self, table: PostureTable, s: int, goal: PostureTable, steps: int) -> bool:

@@ -8,13 +8,16 @@ is taken; as everybody dances the rest as before, repairing one place spoils no 
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import replace
-from itertools import islice
+from itertools import combinations, islice
 
+from biodance.dance.limits._arm_lift import ArmLift
 from biodance.dance.performers import PERFORMER_COUNT, PerformersResult, try_performers
+from biodance.dance.search.context import DesignContext
 from biodance.dance.search.course import Course
+from biodance.dance.search.no_next_posture import LEAST, NoNextPosture
 from biodance.dance.search.reachability import WordStep
-from biodance.dance.search.straight_moves import other_moves
-from biodance.dance.search.word_course import WordSearch
+from biodance.dance.search.straight_moves import AMPLE, ENOUGH, other_moves
+from biodance.dance.search.word_course import WordSearch, word_course
 
 _ROUNDS = 6
 """Times that all performers dance the whole dance at most."""
@@ -23,8 +26,67 @@ _OTHERS = 6
 _FEW = 40
 """Performers of a first look."""
 
+_MUCH = 1 / 3
+"""Share of the plan's postures with which nothing longer is looked for."""
+
 _Other = tuple[Course[WordStep], tuple[int, ...]]
 """A course, and the postures where it differs."""
+
+
+def safe_course(work: DesignContext) -> tuple[Course[WordStep], PerformersResult]:
+    """Return a course as all performers can dance it, and what they leave of the limits.
+
+    People who tire (a gentle plan) or whose arms stay near the body are first asked only for what leaves imprecise
+    people `AMPLE` room, others where a course with `ENOUGH` could not be repaired; both where less than a third of the
+    plan is left. If none is safe, the longest stretch of it is danced at which nobody comes too near a limit; if there
+    is none, the course as it is.
+
+    Raises
+    ------
+    NoNextPosture
+        There is no course.
+    """
+    found, missing = list[tuple[Course[WordStep], PerformersResult]](), list[NoNextPosture]()
+    plan = work.plan
+    near = plan.holds or plan.hanging or any(isinstance(limit, ArmLift) for limit in plan.limits)
+    for enough in (AMPLE, ENOUGH) if plan.gentle or near else (ENOUGH, AMPLE):
+        search = WordSearch(work, enough)
+        try:
+            found.append(repaired_course(search, word_course(search), work.workers))
+        except NoNextPosture as why:
+            missing.append(why)
+        else:
+            if found[-1][1].safe and len(found[-1][0].steps) >= _MUCH * plan.count:
+                return found[-1]
+    if not found:
+        raise missing[0]
+    if safe := [one for one in found if one[1].safe]:
+        return max(safe, key=lambda one: len(one[0].steps))
+    shorter = safe_stretch(*found[0])
+    return found[0] if shorter is None else repaired_course(WordSearch(work), shorter, work.workers)
+
+
+def safe_stretch(course: Course[WordStep], found: PerformersResult) -> Course[WordStep] | None:
+    """Return the longest part of a course at no posture of which somebody came too near a limit, from both feet to both
+    feet; None where not even two postures follow on each other.
+    """
+    bad, feet = {p for p, _ in found.bad}, course.stances
+    ends = [len(one.planted) != 1 and one.over is None for one in feet]
+    parts = [
+        (first, last)
+        for first, last in combinations(range(len(feet)), LEAST)
+        if ends[first] and ends[last] and not bad.intersection(range(first, last + 1))
+    ]
+    if not parts:
+        return None
+    first, last = max(parts, key=lambda part: part[1] - part[0])
+    limits = " and ".join(sorted({limit.replace("_", " ") for _, limit in found.bad}))
+    note = (
+        f"Left out: {len(feet) - (last + 1 - first)} of {len(feet)} postures, so that nobody who copies the "
+        f"dance imprecisely comes too near the limit on {limits}."
+    )
+    steps = replace(course.steps[first], mirror=False), *course.steps[first + 1 : last + 1]
+    return Course(steps, course.moves[first:last], (*course.notes, note))
 
 
 def repaired_course(

@@ -28,22 +28,22 @@ _STANDING = 0.2
 """s of standing still before and after a move that is looked at alone."""
 
 
-def straight_move(task: Task, stances: tuple[Stance, Stance]) -> tuple[Move, float]:
+def straight_move(task: Task, stances: tuple[Stance, Stance], enough: float = ENOUGH) -> tuple[Move, float]:
     """Return the move of ``task`` between postures on ``stances`` in which nothing goes out of its way that need not,
-    and by how many deviations imprecise people keep its limits (too few: it has the limit of which); if none keeps all
-    limits, the one that violates least.
+    and by how many deviations imprecise people keep its limits (fewer than ``enough``: it has the limit of which); if
+    none keeps all limits, the one that violates least.
     """
     tried, eased = [], {limit.name for limit in task.limits if limit.mended_by_slowness}
     for factor in _SLOWER:
         slow = replace(task, duration=factor * task.duration)
-        tried.append(_safest(slow, stances, (evaluate_move(slow, via)[0] for via in _vias(slow))))
+        tried.append(_safest(slow, stances, (evaluate_move(slow, via)[0] for via in _vias(slow)), enough))
         if tried[-1][0].violation == 0 or tried[-1][0].limit not in eased:
             break
     best = min(tried, key=lambda one: one[0].violation)
     if best[0].violation == 0 or task.stance.seat:
         return best
     slow = replace(task, duration=best[0].seconds)
-    return _safest(slow, stances, [_round_about(slow, best[0])])
+    return _safest(slow, stances, [_round_about(slow, best[0])], enough)
 
 
 def other_moves(task: Task, last: Move, *, slower: bool) -> Iterator[Move]:
@@ -64,10 +64,10 @@ def _vias(task: Task) -> list[Array]:
     return [task.straight(), *(_lifting(task, lift) for lift in lifts)]
 
 
-def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move]) -> tuple[Move, float]:
+def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move], enough: float) -> tuple[Move, float]:
     """Return the first move that keeps all limits and leaves imprecise people `AMPLE` deviations, or else the one that
-    leaves them most, with the limit of which it is too little, and how many; if none keeps all limits, the one that
-    violates least.
+    leaves them most, with the limit of which it is less than ``enough``, and how many; if none keeps all limits, the
+    one that violates least.
     """
     tried, best, most = list[Move](), None, -np.inf
     for move in moves:
@@ -76,7 +76,7 @@ def _safest(task: Task, stances: tuple[Stance, Stance], moves: Iterable[Move]) -
             alone = move.dance(task, stances, np.full(2, _STANDING))
             found, limit = deviations_of_copies(alone, task.limits, _STANDING + move.seconds * _SAMPLED)
             if best is None or found > most:
-                best, most = replace(move, limit=limit if found < ENOUGH else ""), found
+                best, most = replace(move, limit=limit if found < enough else ""), found
             if found > AMPLE:
                 break
     return (best, most) if best is not None else (min(tried, key=lambda move: move.violation), -np.inf)

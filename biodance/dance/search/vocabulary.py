@@ -38,7 +38,7 @@ _JOINTS = {"arm": ("shoulder", "elbow"), "trunk": ("trunk",)} | dict.fromkeys(
 _FITS = np.radians(25.0)
 """rad: a word that a person's range shortens by more is not asked of that person."""
 _CUT = np.radians(10.0)
-"""rad that the posture at rest may be cut short by a joint's range, and is still that posture."""
+"""rad by which a word may be cut short without saying so."""
 _STOP = np.radians(1.5)
 """rad that a word keeps from a joint's stop."""
 
@@ -66,6 +66,16 @@ class Word:
         angles = dict(self.angles)
         return angles.get(PELVIS_TURN, 0.0), angles.get(PELVIS_LEAN, 0.0), angles.get(PELVIS_TILT, 0.0)
 
+
+_HOLDING = Word(
+    "hold", "{} hands on the frame", (("shoulder_adduction", -0.3), ("elbow_flexion", 0.7)), "hold", rest=True
+)
+"""What an arm does that holds a frame: from these angles it is bent to its grip (`posture_table.posed`)."""
+
+_HANGING = Word(
+    "hang", "{} arms hanging", (("shoulder_adduction", -np.radians(30.0)), ("elbow_flexion", 0.2)), "hang", rest=True
+)
+"""What an arm does that is asked for nothing: beside the body, and as far from it as clothes need."""
 
 Vocabulary = dict[str, tuple[Word, ...]]
 """Group: its words, the one for rest first."""
@@ -123,10 +133,21 @@ def words_for(body: Body, plan: Plan, stance: Stance, words: Vocabulary, rng: np
     free = () if plan.gentle else free_words(rng)
     out: Vocabulary = {}
     for part, group in groups_of(stance).items():
+        if word := _quiet(stance, part):
+            out[part] = tuple(one for one in [_fitted(body, plan, part, word)] if one is not None)
+            continue
         kept = _asked(plan, stance, (*words[group], *(free if group == "arm" else ())))
-        fitted = [_fitted(body, part, word) for word in kept if stance.over is None or word.rest or group == "arm"]
+        fitted = [
+            _fitted(body, plan, part, word) for word in kept if stance.over is None or word.rest or group == "arm"
+        ]
         out[part] = tuple(word for word in fitted if word is not None)
     return out
+
+
+def _quiet(stance: Stance, part: str) -> Word | None:
+    """Return what an arm does that holds a frame or hangs, None of other parts of the body."""
+    arms = {f"{SIDES[side]}_arm": _HOLDING if side in stance.holding else _HANGING for side in stance.quiet}
+    return arms.get(part)
 
 
 def _asked(plan: Plan, stance: Stance, words: tuple[Word, ...]) -> list[Word]:
@@ -149,8 +170,8 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
     found: dict[str, dict[str, str]] = {}
     for stance in stances:
         for part, group in groups_of(stance).items():
-            for word in _asked(plan, stance, words[group]):
-                if joint := _short_of(body, part, word):
+            for word in [] if _quiet(stance, part) else _asked(plan, stance, words[group]):
+                if joint := _short_of(body, plan, part, word):
                     side = part.partition("_")[0]
                     text = singular(word.text.format(f"the {side}"))
                     found.setdefault(part, {})[text] = joint.replace("_", " ")
@@ -159,19 +180,6 @@ def words_left_out(body: Body, plan: Plan, stances: tuple[Stance, ...], words: V
         f"{', '.join(dict.fromkeys(texts.values()))}."
         for part, texts in found.items()
     )
-
-
-def rest_cut_short(body: Body, stance: Stance, words: Vocabulary) -> str:
-    """Return which joints of this body do not reach what the posture at rest on these feet takes, "" if all do."""
-    found = []
-    for part, group in groups_of(stance).items():
-        rest = words[group][0]
-        for joint, angle in rest.angles if part != "legs" else ():
-            reached = _near(body, part, joint, angle)
-            if abs(reached - angle) > _CUT:
-                name = own_joint(part, joint).replace("_", " ")
-                found.append(f"{name} reaches {np.degrees(reached):.0f} of {np.degrees(angle):.0f} degrees")
-    return " and ".join(found)
 
 
 def free_words(rng: np.random.Generator) -> tuple[Word, ...]:
@@ -192,16 +200,28 @@ def own_joint(part: str, joint: str) -> str:
     return f"{side}_{joint}" if side in SIDES else joint
 
 
-def _fitted(body: Body, part: str, word: Word) -> Word | None:
-    """Return the word within the ranges of this body, None where that would leave too little of it."""
+def _fitted(body: Body, plan: Plan, part: str, word: Word) -> Word | None:
+    """Return the word within the ranges of this body and the limits of the plan, None where that would leave too little
+    of it; of a word that is cut short the name says so.
+    """
     if part == "legs":
         return word
-    if not word.rest and _short_of(body, part, word):
+    if _short_of(body, plan, part, word):
         return None
-    named = dict(word.angles)
-    angles = dict.fromkeys(_joints_of(body, part), 0.0) | named
-    within = {joint: _near(body, part, joint, angle) for joint, angle in angles.items()}
+    named, within = dict(word.angles), _within(body, plan, part, word)
+    if not word.rest and any(abs(within[joint] - angle) > _CUT for joint, angle in named.items()):
+        name = f"{word.text}, as far as you may"
+        word = replace(word, key=f"{word.key}_in_part", text=name, mirror=f"{word.mirror}_in_part")
     return replace(word, angles=tuple((joint, angle) for joint, angle in within.items() if angle or joint in named))
+
+
+def _within(body: Body, plan: Plan, part: str, word: Word) -> dict[str, float]:
+    """Return the angles of all joints of a part, as near to a word as ranges and limits let them be."""
+    angles = dict.fromkeys(_joints_of(body, part), 0.0) | dict(word.angles)
+    near = {own_joint(part, joint): _near(body, part, joint, angle) for joint, angle in angles.items()}
+    for limit in plan.limits:
+        near = limit.eased(near)
+    return {joint: near[own_joint(part, joint)] for joint in angles}
 
 
 def _joints_of(body: Body, part: str) -> tuple[str, ...]:
@@ -212,13 +232,15 @@ def _joints_of(body: Body, part: str) -> tuple[str, ...]:
     return tuple(name for name in own if name.startswith(_JOINTS[group]))
 
 
-def _short_of(body: Body, part: str, word: Word) -> str:
-    """Return the joint whose range leaves too little of a word, "" if none does."""
+def _short_of(body: Body, plan: Plan, part: str, word: Word) -> str:
+    """Return the joint whose range leaves too little of a word, or the limb that may not go so far, "" if none does."""
     if part == "legs" or word.rest:
         return ""
-    short = (joint for joint, angle in word.angles if abs(_near(body, part, joint, angle) - angle) > _FITS)
-    joint = next(short, "")
-    return own_joint(part, joint) if joint else ""
+    for joint, angle in word.angles:
+        if abs(_near(body, part, joint, angle) - angle) > _FITS:
+            return own_joint(part, joint)
+    within = _within(body, plan, part, word)
+    return f"{part} as it may be lifted" if any(abs(within[j] - angle) > _FITS for j, angle in word.angles) else ""
 
 
 def _near(body: Body, part: str, joint: str, angle: float) -> float:

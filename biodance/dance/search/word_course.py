@@ -18,17 +18,17 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.stance import Stance, feet_in_move, stance_words
+from biodance.dance.problem.stance import Stance, feet_in_move
 from biodance.dance.problem.support import support_sequence
 from biodance.dance.search.context import DesignContext
 from biodance.dance.search.course import Course, move_task
 from biodance.dance.search.information import PostureInformation, update_posterior
 from biodance.dance.search.move import Move, Task, straight_via
+from biodance.dance.search.no_next_posture import LEAST, NoNextPosture, nearest_in_words, words_never_kept
 from biodance.dance.search.posture_table import PostureTable
 from biodance.dance.search.reachability import Reachability, WordStep, feet_key
 from biodance.dance.search.straight_moves import AMPLE, ENOUGH, straight_move
-from biodance.dance.search.vocabulary import rest_cut_short, words_left_out
-from biodance.errors import BiodanceError
+from biodance.dance.search.vocabulary import words_left_out
 from biodance.records import Array
 
 _INSTRUCTION = 0.5
@@ -45,16 +45,6 @@ _LOOKED_AT = 24
 """Postures that tell most standing still, whose moves are judged, too."""
 
 
-class NoNextPosture(BiodanceError):
-    """No posture follows on the feet ``stances[number]``; ``stance``, of what is danced, needs that change of feet."""
-
-    def __init__(self, message: str, stances: tuple[Stance, ...], number: int) -> None:
-        super().__init__(message)
-        before, after = stances[:number][-1:], [one for one in stances[number:] if one.over is None]
-        alone = [one for one in before if len(one.planted) == 1 and stances[number].over is not None]
-        self.stance = (alone or after or stances[:1])[0].name
-
-
 @dataclass(eq=False)
 class _Place:
     """A place in the search: the ``step`` and ``move`` that were taken to it, the ``posterior`` there, and what is
@@ -69,9 +59,12 @@ class _Place:
 
 @dataclass(eq=False)
 class WordSearch:
-    """The search for one dance; what was worked out is kept, so that another look costs little."""
+    """The search for one dance, whose postures and moves leave imprecise people ``enough`` deviations; what was worked
+    out is kept, so that another look costs little.
+    """
 
     work: DesignContext
+    enough: float = ENOUGH
     _held: dict[tuple[str, int], tuple[float, str]] = field(default_factory=dict)
     _moves: dict[tuple[bytes, bytes], tuple[Move, float]] = field(default_factory=dict)
     _standing: dict[str, Array] = field(default_factory=dict)
@@ -109,7 +102,7 @@ class WordSearch:
                 path.pop()
             else:
                 break
-        raise NoNextPosture(self._stuck(stances[farthest], farthest, why.get(farthest, {})), stances, farthest)
+        raise self._stuck(stances, farthest, why.get(farthest, {}))
 
     def _check_feet(self, stances: tuple[Stance, ...]) -> None:
         """Raise `NoNextPosture` where this body cannot change feet in any posture of trunk and legs."""
@@ -119,15 +112,23 @@ class WordSearch:
             was, now = (self.reachability.table(stance) for stance in pair)
             if not any(self.reachability.leads(was, int(s), now, 1) for s in np.unique(was.arms_at_rest)):
                 limits = [move.limit for move, _ in self._moves.values() if move.limit]
-                raise NoNextPosture(self._stuck(pair[1], number, Counter(limits[-1:])), stances, number)
+                raise self._stuck(stances, number, Counter(limits[-1:]))
+
+    def never_kept(self, course: Course[WordStep]) -> tuple[str, ...]:
+        """Return in sentences the words that a person with own limits can do on none of the feet of a course."""
+        if not self.work.plan.careful:
+            return ()
+        tables = {feet_key(one): self.reachability.table(one) for one in course.stances if one.over is None}
+        found = [words_never_kept(table, self.work.plan.limits) for table in tables.values()]
+        return tuple(sentence for one in found for sentence in one)
 
     def postures(self, stances: tuple[Stance, ...]) -> list[WordStep]:
         """Return one step for each of ``stances``, as `course` does, without a look at the moves between them."""
         steps, posterior = list[WordStep](), self.information.beforehand
-        for number, stance in enumerate(stances):
+        for number in range(len(stances)):
             step = next((one for one in self._ranked(steps, stances, posterior) if not self._kept(one)[1]), None)
             if step is None:
-                raise NoNextPosture(self._stuck(stance, number, {}), stances, number)
+                raise self._stuck(stances, number, {})
             posterior = self.posterior_after(posterior, steps, step)
             steps.append(step)
         return steps
@@ -164,17 +165,14 @@ class WordSearch:
                     doubtful.append((room, step, move))
             yield from ((step, move) for _, step, move in sorted(doubtful, key=lambda one: -one[0]))
 
-    def _stuck(self, stance: Stance, number: int, why: dict[str, int]) -> str:
-        if cut := rest_cut_short(self.work.chain.body, stance, self.reachability.words):
-            return (
-                f"This body cannot be {stance_words(stance)} as the dance asks: {cut}. Choose a protocol on other "
-                f"feet, or widen that range if the person reaches farther."
-            )
-        most = max(why, key=lambda name: why[name]).replace("_", " ") if why else "number of instructions"
-        return (
-            f"No posture {stance.name.replace('_', ' ')} can be reached from posture {number}: most of those within "
-            f"{self.work.plan.instructions:g} instructions exceed the limit on {most}. Widen that limit, allow more "
-            f"instructions, or leave this stance out of the protocol."
+    def _stuck(self, stances: tuple[Stance, ...], number: int, why: dict[str, int]) -> NoNextPosture:
+        """Return why there is no posture in place ``number``, of the limits that others broke counted in ``why``."""
+        table, plan = self.reachability.table(stances[number]), self.work.plan
+        if number == 0 or not why:
+            return NoNextPosture(nearest_in_words(table, plan.limits), stances, number)
+        most = max(why, key=lambda name: why[name]).replace("_", " ")
+        return NoNextPosture(
+            f"most of those within {plan.instructions:g} instructions exceed the limit on {most}", stances, number
         )
 
     def _ranked(self, steps: list[WordStep], stances: tuple[Stance, ...], posterior: Array) -> Iterator[WordStep]:
@@ -215,7 +213,7 @@ class WordSearch:
         """Return by how many deviations imprecise people keep a posture, and the limit that they break, "" if none."""
         if step.key not in self._held:
             found, limit = step.table.keeps(step.s, self.work.plan.limits)
-            self._held[step.key] = found, limit if found < ENOUGH else ""
+            self._held[step.key] = found, limit if found < self.enough else ""
         return self._held[step.key]
 
     def _can(self, last: WordStep, step: WordStep) -> bool:
@@ -228,7 +226,7 @@ class WordSearch:
     def _judged_move(self, last: WordStep, step: WordStep) -> tuple[Move, float]:
         key = (last.x.tobytes(), step.x.tobytes())
         if key not in self._moves:
-            self._moves[key] = straight_move(self.task(last, step), (last.stance, step.stance))
+            self._moves[key] = straight_move(self.task(last, step), (last.stance, step.stance), self.enough)
         return self._moves[key]
 
     def task(self, last: WordStep, step: WordStep) -> Task:
@@ -251,37 +249,46 @@ class WordSearch:
         return np.concatenate([still, self.information.of_ways(np.array([[last.x, step.x]]))[0]])
 
 
-def word_course(work: DesignContext) -> tuple[WordSearch, Course[WordStep]]:
-    """Return the search and the course that it found; feet on which this person has no posture are left out, and this
-    is said, as are words that the person cannot do.
+def word_course(search: WordSearch) -> Course[WordStep]:
+    """Return the course that a search finds; what this person cannot do of the plan is left out, and this is said:
+    words, feet on which there is no posture, and postures beyond those that follow on each other.
 
     Raises
     ------
     NoNextPosture
-        There is no posture on any of the feet.
+        There are not even two postures on any of the feet.
     """
-    plan, notes = work.plan, list[str]()
+    body, plan, notes = search.work.chain.body, search.work.plan, list[str]()
     while True:
-        search = WordSearch(replace(work, plan=plan))
         try:
-            course = search.course(support_sequence(work.chain.body, plan))
-            lacking = words_left_out(work.chain.body, plan, course.stances, search.reachability.words)
-            return search, replace(course, notes=(*notes, *lacking))
+            course = search.course(support_sequence(body, plan))
         except NoNextPosture as why:
-            blocks = tuple(block for block in plan.blocks if block[0] != why.stance)
-            if not blocks or len(blocks) == len(plan.blocks):
+            blocks = why.possible(plan.blocks)
+            if sum(count for _, count in blocks) < LEAST:
                 raise
-            notes.append(f"Left out: all postures {why.stance.replace('_', ' ')}. {why}")
+            notes.append(why.note(plan.blocks))
             plan = replace(plan, blocks=blocks)
+        else:
+            lacking = (
+                *words_left_out(body, plan, course.stances, search.reachability.words),
+                *search.never_kept(course),
+            )
+            return replace(course, notes=tuple(dict.fromkeys((*notes, *lacking))))
 
 
-def freer_dance(body: Body, plan: Plan, *, seed: int = 0) -> Dance:
+def freer_dance(body: Body, plan: Plan, *, seed: int = 0, stances: tuple[Stance, ...] = ()) -> Dance:
     """Return the dance of as many postures of the same words on the same feet, chosen freely: no limit on instructions,
-    no ``simplicity``. Its postures keep the limits and suit imprecise people; its moves go straight and nobody has
-    looked at them, so that it only tells what it costs that a dance can be followed.
+    no ``simplicity``; ``stances`` the feet, by default those of the plan. Its postures keep the limits and suit
+    imprecise people; its moves go straight and nobody has looked at them, so that it only tells what it costs that a
+    dance can be followed.
+
+    Raises
+    ------
+    NoNextPosture
+        There are not as many different ones.
     """
     free = replace(plan, instructions=np.inf, simplicity=0.0)
-    stances = support_sequence(body, free)
+    stances = stances or support_sequence(body, free)
     steps = WordSearch(DesignContext.alone(body, free, seed)).postures(stances)
     x, hold = np.array([step.x for step in steps]), np.full(len(steps), plan.hold)
     via, move = straight_via(x[:-1], x[1:]), np.full(len(x) - 1, plan.move)
