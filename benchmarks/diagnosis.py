@@ -12,6 +12,7 @@ the date of the run. Real sessions stand in real_sessions.toml; faults written i
 
 import argparse
 import os
+import shutil
 import tempfile
 import time
 import tomllib
@@ -97,10 +98,12 @@ class Job(NamedTuple):
     visit: Callable[[Path], tuple[SessionResult, Told]]
 
 
-def real(name: str, _: Path) -> tuple[SessionResult, Told]:
-    """Return a real session, and what is known to be wrong in it."""
+def real(name: str, folder: Path) -> tuple[SessionResult, Told]:
+    """Return a real session, of one file in a folder of its own, and what is known to be wrong in it."""
     place = Path(os.environ["BIODANCE_DATA"]) / name
-    place = place if place.is_dir() else place.with_suffix(".c3d")
+    if not place.is_dir():
+        shutil.copy(place.with_suffix(".c3d"), folder)
+        place = folder
     return biodance.examine(biodance.read_session(place)), Told(beside=frozenset(REAL[name]))
 
 
