@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
-from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.problem import Problem
 from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, Transient, effects
@@ -124,8 +124,10 @@ def _differences(problem: Problem, effect: Effect, silent: Array) -> list[Array]
     return [*first.T, *second[:, bent].T]
 
 
-def local_basis(problem: Problem, effect: Transient) -> ByTrial | None:
-    """Return the columns of a cause that comes and goes, each trial its own; None where the cause has none."""
+def local_basis(problem: Problem, effect: Transient) -> Array | None:
+    """Return the columns (r, k) of the plates' rows of a cause that comes and goes, each trial its own; None where the
+    cause has none.
+    """
     blocks = []
     for index, case in enumerate(problem.cases):
         samples = effect.local(case)
@@ -133,7 +135,7 @@ def local_basis(problem: Problem, effect: Transient) -> ByTrial | None:
             return None
         block = problem.spectrum.of_trial(index, samples)
         blocks.append(block.reshape(6 * len(block), block.shape[2]))
-    return ByTrial.of(blocks)
+    return np.asarray(block_diag(*blocks))
 
 
 def changes(problem: Problem, effect: Effect, theta: Array) -> Array:

@@ -1,13 +1,12 @@
 """The problem under its tolerances, with no cause: whitened rows, and columns of all that is no fault."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.human.skeleton import kind_of
-from biodance.diagnosis.by_trial import ByTrial
 from biodance.diagnosis.candidates import SCALE, Candidate, candidates
 from biodance.diagnosis.evidence import LinearPosterior, linear_posterior
 from biodance.diagnosis.problem import Problem
@@ -38,15 +37,6 @@ class Model:
     def white(self, rows: Array, *, out: Array | None = None) -> Array:
         """Return whitened ``rows`` (r, n), in ``out`` (which may be ``rows``) or a new array."""
         return white(self.problem, self.tolerances, rows, out=out)
-
-    def white_by_trial(self, columns: ByTrial) -> ByTrial:
-        """Return the whitened ``columns`` of the plates' rows, of which every trial has its own."""
-        band, mass = self.problem.spectrum.band, _body_mass(self.problem)
-        parts = (
-            replace(p, values=whitened(p.values, band[p.rows.start // 6 : p.rows.stop // 6], (), mass, self.tolerances))
-            for p in columns.parts
-        )
-        return replace(columns, parts=tuple(parts))
 
 
 def white(problem: Problem, tolerances: Tolerances, rows: Array, *, out: Array | None = None) -> Array:

@@ -16,7 +16,6 @@ from biodance.observations import (
     ObservableCause,
     Observation,
     SeenTrial,
-    corrected,
     observe,
     observers,
     possible_causes,
@@ -123,11 +122,6 @@ class ObservedEvidence:
         size = {name: abs(c.step * self.sensitivities[name][index]) for name, c in self.causes.items()}
         best = max(size, key=lambda name: size[name], default=("", ""))
         return best if size.get(best, 0.0) * _FAULT > _UNRESPONSIVE * self.observations[index].expected_sd else ("", "")
-
-    def detects(self, cause: tuple[str, str]) -> Array:
-        """Return (n,) bool: observations that each detect the usual fault of a cause at one standard deviation."""
-        expected = np.array([one.expected_sd for one in self.observations])
-        return np.asarray(np.abs(self.causes[cause].step * _FAULT * self.sensitivities[cause]) >= expected)
 
     def detected_by(self, cause: tuple[str, str], *, least: float = 1.0) -> tuple[str, ...]:
         """Return the observers that detect the usual fault of a cause at ``least`` standard deviations, over all their
@@ -245,28 +239,6 @@ def _reversed(
                     one = after.get(found[i].key)
                     value[i] = one.value - one.expected if one else np.nan
     return out
-
-
-def undo_causes(evidence: ObservedEvidence, sizes: Mapping[tuple[str, str], float]) -> tuple[Array, Array]:
-    """Return the change of each observation (n,) when causes of the given ``sizes`` are undone in the recording, NaN
-    where the observation is then missing, and the sensitivities (n, p) in the corrected recording. They differ
-    from those of the original one: a step that begins 30 ms earlier covers another part of the step.
-    """
-    added = np.full(len(evidence.observations), np.nan)
-    slopes = np.zeros((added.size, len(sizes)))
-    for seen in evidence.recorded:
-        right = seen
-        for names, size in sizes.items():
-            right = corrected(right, *names, size)
-        before, after = ({one.key: one for one in observe(one)} for one in (seen, right))
-        here = [i for i, o in enumerate(evidence.observations) if o.key in after and o.key in before]
-        for i in here:
-            was, now = (some[evidence.observations[i].key] for some in (before, after))
-            added[i] = now.value - now.expected - was.value + was.expected
-        own = [after[evidence.observations[i].key] for i in here]
-        for k, names in enumerate(sizes):
-            slopes[here, k] = sensitivities(right, own, *names, evidence.causes[names].parameter)
-    return added, slopes
 
 
 def _correlate_strides(found: tuple[Observation, ...]) -> tuple[Observation, ...]:

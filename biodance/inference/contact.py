@@ -83,8 +83,9 @@ def _columns(rows: Rows, effect: Transient) -> Array | None:
     own = local_basis(rows.problem, effect)
     if own is None:
         return None
-    simulated = rows.white(own.whole(rows.simulated))
-    return np.concatenate([simulated, np.zeros((len(rows.y) - rows.simulated, own.width))])
+    simulated = np.zeros((rows.simulated, own.shape[1]))
+    simulated[: len(own)] = own
+    return np.concatenate([rows.white(simulated), np.zeros((len(rows.y) - rows.simulated, own.shape[1]))])
 
 
 def _touch_of(search: Search, base: Hypothesis, effect: Transient) -> _Touch | None:

@@ -114,9 +114,7 @@ class Effect(Checked):
 
     @property
     def unlike(self) -> float:
-        """Share of its size (`told_size`) by which its wrench may be unlike its model, where that is more than for
-        every cause.
-        """
+        """Share of its size by which its wrench may be unlike its model, where that is more than for every cause."""
         return 0.0
 
     def columns(self, case: Case) -> Array:
@@ -149,12 +147,6 @@ class Effect(Checked):
         parameter that they do not show; None where they say nothing.
         """
         return None
-
-    def told_size(self, theta: Array) -> Array:
-        """Return (p,) the part of the size ``theta`` (p,) that says how large a cause is, without what only corrects
-        it; by default all.
-        """
-        return theta
 
     def measured(self, theta: Array, *cases: Case) -> Array:
         """Return the size (p,) of a cause that was named with ``theta`` (p,): where the markers of all ``cases`` show

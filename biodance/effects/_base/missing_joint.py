@@ -84,10 +84,6 @@ class MissingJoint(Effect, ABC):
         angle = self.shown(*cases)[0]
         return np.array([angle, theta.sum() - angle])
 
-    def told_size(self, theta: Array) -> Array:
-        """Return the angle alone."""
-        return np.array([theta[0], 0.0])
-
     @property
     def unlike(self) -> float:
         """How much more or less than the angle shown the wrench may show: so poorly is it known where the joint lies
