@@ -5,6 +5,7 @@ The limits, and where they come from, are `biodance.settings.CheckLimits`.
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -157,6 +158,17 @@ def weigh(session: Session, standing: QuietStanding | None) -> Weighing | None:
     whole = [(one.trial, one.value, one.sd) for one in strides if not one.what.endswith(", alone")]
     told = [(one.trial.name, one.newton.mass, one.newton.mass_sd) for one in seen if one.newton]
     return _median(whole, WeighedBy.STRIDES) or _median(told, WeighedBy.NEWTON)
+
+
+def with_weighed_mass(session: Session) -> Session:
+    """Return a session whose subject has the mass that the plates show while somebody moves on them, where nobody
+    declared one or stood still: by whole strides, or by the force against the trunk's acceleration.
+    """
+    found = None if np.isfinite(session.subject.mass) else weigh(session, None)
+    if found is None:
+        return session
+    said = f"{found.mass:.1f} ± {found.sd:.1f} kg were weighed by {found.by.value} in {', '.join(found.trials)}."
+    return replace(session, subject=replace(session.subject, mass=found.mass), notes=(*session.notes, said))
 
 
 def _median(found: list[tuple[str, float, float]], by: WeighedBy) -> Weighing | None:

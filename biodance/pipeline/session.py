@@ -10,7 +10,7 @@ from biodance.errors import SessionRefused
 from biodance.lab.corrections import PlateCorrection, corrected_trial
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
-from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh
+from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh, with_weighed_mass
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
@@ -82,6 +82,7 @@ def examine(
     """
     reference_person(session.settings.table, session.subject)
     session = replace(session, trials=tuple(corrected_trial(trial, corrections) for trial in session.trials))
+    session = with_weighed_mass(session)
     steps: list[Step] = []
     read = []
     for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):

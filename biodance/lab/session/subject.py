@@ -137,8 +137,7 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
         return mass
     if math.isnan(stature) or any(trial.plates for trial in trials):
         notes.append(
-            "The body mass is not known: not declared, and nobody stands still on the plates. Set mass_kg in "
-            "session.toml."
+            "The body mass was not declared, and nobody stands still on the plates. Set mass_kg in session.toml."
         )
         return mass
     mass = round(_MIDDLE_INDEX * stature**2, 1)
