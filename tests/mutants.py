@@ -1,9 +1,9 @@
 """Break important lines one at a time and see whether the tests notice: a mutant that no test kills is a line that
 nobody guards.
 
-    python -m benchmarks mutants [NAME ...] [--jobs 1] [--out build/mutants] [--again]
+    python tests/mutants.py [NAME ...] [--jobs 1] [--out build/mutants] [--again]
 
-The mutants stand in `benchmarks/mutants.toml`: the exact snippet of one file, what it becomes, the tests that must
+The mutants stand in `tests/mutants.toml`: the exact snippet of one file, what it becomes, the tests that must
 fail. Each job works in its own temporary copy of the checkout, which itself is never touched. The named tests are run
 unbroken first (those that fail there kill nothing), then once per mutant, stopped by the first failure. Results are
 kept in ``--out``, so that a run that was interrupted goes on where it stopped; a mutant whose entry, file or tests have
@@ -30,7 +30,7 @@ from queue import SimpleQueue
 from typing import Literal
 
 CHECKOUT = Path(__file__).resolve().parents[1]
-TABLE = CHECKOUT / "benchmarks" / "mutants.toml"
+TABLE = CHECKOUT / "tests" / "mutants.toml"
 SAFETY_SECONDS = 10.0
 """s, start of Python included, within which a mutant of the safety of dances must be killed."""
 PATIENCE = 600.0
@@ -83,7 +83,7 @@ def broken_text(mutant: Mutant, text: str) -> str:
     if count != 1 or mutant.old == mutant.new:
         raise ValueError(
             f"mutant {mutant.name}: its snippet occurs {count} times in {mutant.file}, must be once and must change. "
-            "Correct benchmarks/mutants.toml."
+            "Correct tests/mutants.toml."
         )
     return text.replace(mutant.old, mutant.new)
 
@@ -248,3 +248,7 @@ def main() -> int:
     bad = [one.name for one in asked if not is_good(one, outcomes[one.name])]
     print(f"{len(asked) - len(bad)} of {len(asked)} killed" + (f"; NOT, or too late: {', '.join(bad)}" if bad else ""))
     return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
