@@ -81,7 +81,7 @@ def rows(
     group = np.repeat(np.arange(len(GROUPS)), width)
     X = rng.normal(size=(count, group.size))
     block = np.concatenate([np.arange(plates) % blocks, np.full(markers, 6 * len(BANDS)), np.full(observations, -1)])
-    empty = Tolerances({}, np.zeros((0, 6, 6)), np.zeros((0, 6)), np.zeros((0, 6)), 10.0)
+    empty = Tolerances({}, np.zeros((0, 6, 6)), np.zeros((0, 6)), 10.0)
     return DrawnRows(None, empty, None, X, rng.normal(size=count), group, block, GROUPS, columns=causes or {})
 
 

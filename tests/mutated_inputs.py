@@ -107,7 +107,7 @@ def _said(path: Path) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     tolerances = lab.tolerances
     numbers = {f"correction {k}": np.array([one.value, one.sd]) for k, one in enumerate(lab.corrections)}
     if tolerances is not None:
-        numbers |= {"noise": tolerances.noise, "energy": tolerances.energy, "sd": tolerances.energy_sd}
+        numbers |= {"noise": tolerances.noise, "movement": tolerances.movement}
         numbers |= {f"size {key}": np.array(value) for key, value in tolerances.sizes.items()}
     return numbers, ()
 

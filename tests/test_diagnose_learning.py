@@ -1,5 +1,7 @@
 """What sessions without fault have in common is learned and taken off; what differs between them is a size."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,8 @@ KEYS = ("delay", "delay", "sag a", "sag a", "offset")
 MEANS = ("delay left", "delay right", "sag a", "sag a", "offset")
 TRUE_MEAN = np.array([1.0, -1.0, -2.0, -2.0, 0.0])
 TRUE_SIZE = np.array([0.1, 0.1, 0.5, 0.5, 1.0])
+MOVED = np.arange(1.0, 6 * BANDS + 1).reshape(BANDS, 6)
+"""N², N²·m²: mean square of a coefficient that a session needs."""
 
 
 def nulls(count: int) -> list[Null]:
@@ -21,13 +25,13 @@ def nulls(count: int) -> list[Null]:
     for _ in range(count):
         columns = rng.normal(size=(6 * BAND.size, len(KEYS)))
         theta = TRUE_MEAN + TRUE_SIZE * rng.normal(size=len(KEYS))
-        found.append(Null(columns @ theta + rng.normal(size=len(columns)), columns, KEYS, BAND, (), 70.0, MEANS))
+        found.append(Null(columns @ theta + rng.normal(size=len(columns)), columns, KEYS, BAND, (), 70.0, MOVED, MEANS))
     return found
 
 
 def learned(count: int) -> Tolerances:
     flat = np.ones((BANDS, 6))
-    start = Tolerances(dict.fromkeys(KEYS, 1.0), np.tile(np.eye(6), (BANDS, 1, 1)), flat, flat, 10.0)
+    start = Tolerances(dict.fromkeys(KEYS, 1.0), np.tile(np.eye(6), (BANDS, 1, 1)), flat, 10.0)
     return learn_tolerances(nulls(count), start, rounds=8)
 
 
@@ -46,11 +50,10 @@ def test_a_mean_is_believed_to_a_third_of_itself() -> None:
     assert found.size("sag a") == pytest.approx(np.hypot(0.5, 2 / 3), rel=0.2)
 
 
-def test_energies_are_those_of_sessions_that_fit() -> None:
-    found = learned(30)
-    assert found.energy.shape == (BANDS, 6)
-    np.testing.assert_allclose(found.energy.mean(), 0.9, atol=0.1)
-    assert (found.energy_sd > 0).all()
+def test_the_movement_is_that_of_the_sessions_beside_what_was_known() -> None:
+    np.testing.assert_allclose(learned(30).movement, MOVED)
+    start = replace(learned(3), movement=2 * MOVED)
+    np.testing.assert_allclose(learn_tolerances(nulls(10), start, rounds=1, worth=30.0).movement, 1.75 * MOVED)
 
 
 def test_two_values_agree_on_nothing() -> None:

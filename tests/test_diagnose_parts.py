@@ -178,11 +178,20 @@ def test_learning_finds_the_sizes_that_made_the_nulls() -> None:
         columns = rng.normal(size=(6 * band.size, 8))
         keys = ("slide a",) * 5 + ("gain b",) * 3
         theta = np.array([truth[key] for key in keys]) * rng.normal(size=8)
-        nulls.append(Null(columns @ theta + 1.5 * rng.normal(size=len(columns)), columns, keys, band, (), 70.0))
+        nulls.append(
+            Null(
+                columns @ theta + 1.5 * rng.normal(size=len(columns)),
+                columns,
+                keys,
+                band,
+                (),
+                70.0,
+                np.ones((bands, 6)),
+            )
+        )
     start = Tolerances(
         {"slide a": 1.0, "gain b": 1.0},
         np.tile(np.eye(6), (bands, 1, 1)),
-        np.ones((bands, 6)),
         np.ones((bands, 6)),
         10.0,
     )

@@ -141,7 +141,7 @@ def test_a_correction_that_no_plate_needs_is_refused(tmp_path: Path, line: str, 
         ("[norms.x]\nvalue = 0\nsd = []", r"norms\.x\.sd = \[\]"),
         ("[norms.x]\nvalue = 0\nsd = -1.0", r"norms\.x\.sd = -1\.0"),
         ("[corection]", r"\[corection\] is nothing"),
-        ('[tolerances]\norigin = "x"\nthreshold = 1\nnoise = [[1]]\nenergy = []\nenergy_sd = []', "noise"),
+        ('[tolerances]\norigin = "x"\nthreshold = 1\nnoise = [[1]]\nmovement = []', "noise"),
         ('[normal."gait knee_flexion"]\nunit = "deg"\npeople = 0\nmean = [1, 2]\nsd = [1, 2]', "people = 0"),
     ],
 )

@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosed_sessions import body, known, motion, windows
+from diagnosed_sessions import NOISE, body, known, motion, windows
 from inferred_sessions import inferred
 
 from biodance.body.tables.error_sizes import error_size
+from biodance.diagnosis.own_tolerances import own_tolerances
+from biodance.diagnosis.problem import problem
+from biodance.diagnosis.spectrum import needed
 from biodance.records import Markers, Plate, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import (
@@ -18,9 +21,10 @@ from biodance.uncertainty.session_noise import (
     of_zeros,
     plate_noise,
     white_noise,
+    with_movement,
     with_own_noise,
 )
-from biodance.uncertainty.tolerances import InstrumentNoise
+from biodance.uncertainty.tolerances import REFERENCE_PERSON, InstrumentNoise
 
 # 5 ---- noise from the session
 
@@ -98,3 +102,45 @@ def test_own_noise_is_added_beyond_what_was_learned_and_limits_follow() -> None:
     np.testing.assert_allclose(wider.noise - known().noise, more, atol=1e-12)
     seen = [inferred(body(), windows(1), tolerances=one, effects=("added_mass",)).diagnosis for one in (known(), wider)]
     assert min(row.limit for row in seen[1].limits) > min(row.limit for row in seen[0].limits)
+
+
+def test_what_a_movement_needs_is_its_power_by_band_for_a_reference_person() -> None:
+    """By Parseval's theorem the coefficients of a run hold the squares of its samples."""
+    put = problem(body(), windows(1, trials=2))
+    found, mass = needed(put.cases, put.spectrum), float(body().sip.mass.sum())
+    count = np.bincount(put.spectrum.band, minlength=len(BANDS))
+    (about,) = {tuple(put.spectrum.layout.about)}
+    whole = 0.0
+    for case, picks in zip(put.cases, put.spectrum.picks, strict=True):
+        for pick in picks:
+            whole += np.sum(case.predicted[pick, 0] ** 2)
+    assert about
+    kept = float(count @ found[:, 0]) * (mass / REFERENCE_PERSON) ** 2
+    assert 0.97 * whole < kept <= whole * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("faster", [0.5, 1.0, 3.0])
+def test_noise_grows_with_what_a_movement_needs_and_never_shrinks(faster: float) -> None:
+    usual = replace(known(), movement=np.arange(1.0, 6 * len(BANDS) + 1).reshape(-1, 6))
+    found = with_movement(usual, faster**2 * usual.movement)
+    more = np.full((len(BANDS), 6), max(1.0, faster))
+    more[0, 2] = 1.0  # the mean vertical force is weight, however fast
+    np.testing.assert_allclose(found.noise, usual.noise * more[:, :, None] * more[:, None, :])
+
+
+def test_a_faster_movement_is_held_against_its_own_noise() -> None:
+    """Eight times the error that the tolerances know, of a person who needs eight times as much as anybody they were
+    learned on: no unknown cause, and one where the noise does not grow.
+    """
+    rng, some = np.random.default_rng(5), []
+    for window in windows(1, trials=3):
+        plates = tuple(
+            replace(p, wrench=Wrench(p.wrench.time, p.wrench.value + 8 * NOISE * rng.normal(size=p.wrench.value.shape)))
+            for p in window.trial.plates
+        )
+        some.append(replace(window, trial=replace(window.trial, plates=plates)))
+    put = problem(body(), tuple(some))
+    slow = replace(known(), movement=needed(put.cases, put.spectrum) / 64)
+    own = own_tolerances(body(), tuple(some), known=slow).tolerances
+    as_is, grown = (inferred(body(), tuple(some), tolerances=one, effects=("plate_gain",)) for one in (slow, own))
+    assert grown.posterior.unknown < 0.5 < as_is.posterior.unknown

@@ -15,6 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from biodance.diagnosis.candidates import Candidate
 from biodance.diagnosis.model import marker_keys, nuisances, shown_left_out
 from biodance.diagnosis.problem import Problem
+from biodance.diagnosis.spectrum import needed
 from biodance.records import Array
 from biodance.uncertainty.learning import Moments, maximise, moments_of, noise_of, sizes_of
 from biodance.uncertainty.tolerances import BEFORE, REFERENCE_PERSON, Tolerances, whitened
@@ -24,7 +25,8 @@ from biodance.uncertainty.tolerances import BEFORE, REFERENCE_PERSON, Tolerances
 class Null:
     """One session without fault: ``target`` (r,); ``columns`` (r, K) in unit size with their ``keys`` (K), "" for the
     parameters' prior (unit normal), and ``mean_keys`` (K), "" for columns without a mean; ``band`` (m,) of the 6 m
-    wrench rows; ``marker_keys`` of the rows that follow; ``mass`` kg.
+    wrench rows; ``marker_keys`` of the rows that follow; ``mass`` kg; ``movement`` (B, 6) mean square of a coefficient
+    of the wrench that it needs, at `REFERENCE_PERSON`.
     """
 
     target: Array
@@ -33,6 +35,7 @@ class Null:
     band: NDArray[np.intp]
     marker_keys: tuple[str, ...]
     mass: float
+    movement: Array
     mean_keys: tuple[str, ...] = ()
 
 
@@ -43,15 +46,17 @@ def null_of(problem: Problem, causes: tuple[Candidate, ...]) -> Null:
     mass = float(problem.cases[0].body.sip.mass.sum())
     columns = np.concatenate(known.parts, axis=1) * known.scale
     every: Array = np.concatenate([problem.sip, columns], axis=1).astype(np.float32)  # type: ignore[assignment]
+    where = problem.spectrum
+    movement = needed(problem.cases, where)
     return Null(
-        problem.target, every, own + known.keys, problem.spectrum.band, marker_keys(problem), mass, own + known.means
+        problem.target, every, own + known.keys, where.band, marker_keys(problem), mass, movement, own + known.means
     )
 
 
 def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 10, worth: float = 0.0) -> Tolerances:
     """Return the sizes, means and noise under which the null sessions are most probable after ``rounds`` of expectation
-    maximisation, and the energies that they leave. Only what has a size in ``start`` is learned; ``start`` is believed
-    like ``worth`` sessions more.
+    maximisation, and the movement that they were learned on. Only what has a size in ``start`` is learned; ``start`` is
+    believed like ``worth`` sessions more.
     """
     sessions = tuple(nulls)
 
@@ -59,13 +64,9 @@ def learn_tolerances(nulls: Iterable[Null], start: Tolerances, *, rounds: int = 
         return _beside(start, worth, _improved(sessions, known), len(sessions))
 
     found = maximise(start, improved, lambda known: known.noise, rounds=rounds)
-    left = np.array([_energy(null, found) for null in sessions])
-    spread = left.std(axis=0, ddof=1) if len(sessions) > 1 else found.energy_sd
     share = worth / (worth + len(sessions))
-    mean = (1 - share) * left.mean(axis=0) + share * start.energy
-    apart = share * (1 - share) * (left.mean(axis=0) - start.energy) ** 2
-    variance = (1 - share) * spread**2 + share * start.energy_sd**2 + apart
-    return replace(found, energy=mean, energy_sd=np.sqrt(variance))
+    moved = np.mean([null.movement for null in sessions], axis=0)
+    return replace(found, movement=(1 - share) * moved + share * start.movement)
 
 
 def _beside(start: Tolerances, worth: float, learned: Tolerances, count: int) -> Tolerances:
@@ -143,10 +144,3 @@ def _improved(sessions: tuple[Null, ...], found: Tolerances) -> Tolerances:
     means, sizes = sizes_of(rows)
     learned = {key: size for key, size in sizes.items() if not key.endswith(BEFORE)}
     return replace(found, sizes={**found.sizes, **learned}, noise=noise_of(total), means=means)
-
-
-def _energy(null: Null, found: Tolerances) -> Array:
-    """Return (B, 6): mean square of the whitened residual that a session leaves, per band and channel."""
-    left = _posterior(null, found).left[:, None]
-    square = whitened(left, null.band, null.marker_keys, null.mass, found)[: 6 * null.band.size].reshape(-1, 6) ** 2
-    return np.array([square[null.band == b].mean(axis=0) for b in range(len(found.noise))])

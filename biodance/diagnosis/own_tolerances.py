@@ -8,11 +8,18 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.diagnosis.problem import TrialWindow
-from biodance.diagnosis.spectrum import spectrum, thinned
+from biodance.diagnosis.spectrum import needed, spectrum, thinned
 from biodance.identification.statistics import standing_point
 from biodance.records import Array, Trial
 from biodance.uncertainty.bands import BANDS
-from biodance.uncertainty.session_noise import added_noise, of_marker_errors, of_zeros, with_own_noise, with_zeros
+from biodance.uncertainty.session_noise import (
+    added_noise,
+    of_marker_errors,
+    of_zeros,
+    with_movement,
+    with_own_noise,
+    with_zeros,
+)
 from biodance.uncertainty.skin_unrest import SkinUnrest, skin_unrest
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
@@ -53,8 +60,8 @@ def own_tolerances(
 ) -> SessionTolerances:
     """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
     recordings: with markers that move more on the body than where they were learned, with the noise of their own
-    cameras and plates as ``recorded`` shows it, with the unrest of a person who stands still where standing is looked
-    at, and with trial means no surer than a plate's zero.
+    cameras and plates as ``recorded`` shows it, with that of a movement that needs more force, with the unrest of a
+    person who stands still where standing is looked at, and with trial means no surer than a plate's zero.
     """
     found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
     postures = np.array([window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size])[
@@ -63,6 +70,10 @@ def own_tolerances(
     about = standing_point(tuple(window.fit for window in chosen))
     if recorded and postures.size:
         found = with_own_noise(found, added_noise(body, recorded, postures, about, known=found.instruments), mass)
+    moving = tuple(window for window in chosen if window.trial.role != "static" and window.seconds > 0)
+    if moving:
+        cases, uses = zip(*(thinned(one.case(body, body.sip.phi), one.use) for one in moving), strict=True)
+        found = with_movement(found, needed(cases, spectrum(cases, uses, about)))
     factor = soft_tissue(chosen) / found.instruments.distance
     if factor > MORE:
         found = widened_by(found, factor)

@@ -16,6 +16,7 @@ from biodance.errors import TrialRefused
 from biodance.records import Array, Markers, Motion, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
 _RATE = 50.0
 """Hz at which trials are looked at: derivatives of columns are still good to 7 % at the upper edge."""
@@ -58,6 +59,16 @@ class Spectrum:
             kept = bands.of(pick.size) >= 0
             parts.append(bands.coefficients(self.layout.shift @ samples[pick])[kept])
         return np.concatenate(parts) if parts else np.empty((0, 6, samples.shape[2]))
+
+
+def needed(cases: tuple[Case, ...], where: Spectrum) -> Array:
+    """Return (B, 6) N², N²·m²: mean square of a coefficient of the wrench that the movement of ``cases`` needs, at
+    `REFERENCE_PERSON`; 0 in a band without any.
+    """
+    heavier = float(cases[0].body.sip.mass.sum()) / REFERENCE_PERSON
+    rows = where.rows(case.predicted[:, :, None] for case in cases)[:, :, 0] / heavier
+    square = [np.bincount(where.band, rows[:, c] ** 2, len(BANDS)) for c in range(rows.shape[1])]
+    return np.stack(square, axis=1) / np.maximum(np.bincount(where.band, minlength=len(BANDS)), 1)[:, None]
 
 
 def spectrum(

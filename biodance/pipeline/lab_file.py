@@ -98,8 +98,7 @@ class _Instruments(_Table):
 class _Tolerances(_Table):
     origin: _Words
     threshold: Annotated[float, Field(ge=0, le=1e4)]
-    energy: list[_Squares] = Field(max_length=100)
-    energy_sd: list[_Squares] = Field(max_length=100)
+    movement: list[_Squares] = Field(max_length=100)
     noise: list[Annotated[list[_Row], Field(min_length=6, max_length=6)]] = Field(max_length=100)
     sizes: dict[str, Annotated[float, Field(ge=0, le=1e6)]] = {}
     means: dict[str, Finite] = {}

@@ -16,7 +16,7 @@ from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
 from biodance.motion.kinematics import Poses, place_jacobian, poses
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Array, Markers, Motion, Plate, Trial
+from biodance.records import CHANNELS, Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.noise import Noise
@@ -175,6 +175,22 @@ def with_zeros(known: Tolerances, zeros: Array, mass: float) -> Tolerances:
     """
     found = with_own_noise(known, zeros, mass)
     return replace(found, zeros=found.noise - known.noise)
+
+
+def with_movement(known: Tolerances, needed: Array) -> Tolerances:
+    """Return the tolerances with noise as it is where the movement needs forces of mean square ``needed`` (B, 6) per
+    coefficient at `REFERENCE_PERSON`.
+
+    The error of a simulated force is that of accelerations, and these err by a share of themselves: who walks, runs or
+    jumps leaves so many times more as the movement needs more in that band than the movement that the noise was learned
+    on (s_b^2 = mean over channels of needed / learned, at least 1). A mean force is weight, and a mean level moment
+    where it stands, whatever the movement: there the other means count, and the vertical force keeps its noise.
+    """
+    ratio = needed / known.movement
+    level = ratio[0, [CHANNELS.index(name) for name in ("Fx", "Fy", "Mz")]]
+    more = np.sqrt(np.maximum(1.0, np.append(level.mean(), ratio[1:].mean(axis=1))))[:, None] * np.ones(len(CHANNELS))
+    more[0, CHANNELS.index("Fz")] = 1.0
+    return replace(known, noise=known.noise * more[:, :, None] * more[:, None, :])
 
 
 def with_own_noise(known: Tolerances, added: Array, mass: float) -> Tolerances:

@@ -73,20 +73,19 @@ class InstrumentNoise:
 class Tolerances:
     """``sizes`` standard deviation by key: an effect and its target (``plate_gain Fz``), a group of elementary errors
     (``slide thigh``) or a marker's segment (``marker thigh``), in the unit of its column; ``noise`` (B, 6, 6)
-    covariance of one coefficient at `REFERENCE_PERSON`; ``energy``, ``energy_sd`` (B, 6) mean square of the whitened
-    residual in null sessions and its standard deviation; ``threshold`` of the evidence (natural logarithm) that no
-    more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a nuisance,
-    by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by effect:
-    share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite like
-    its model; ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share
+    covariance of one coefficient at `REFERENCE_PERSON`; ``movement`` (B, 6) mean square of a coefficient of the wrench
+    that the null sessions' movement needs, at `REFERENCE_PERSON`; ``threshold`` of the evidence (natural logarithm)
+    that no more than a few null sessions reach; ``origin`` in words; ``means`` what every null session shows of a
+    nuisance, by `mean_key` or group, in the unit of its column (flesh sags downwards in everybody); ``accuracy`` by
+    effect: share of its size by which a named cause errs beyond its own standard deviation, because no fault is quite
+    like its model; ``norms`` by kind of observation (`Observation.kind`): what a laboratory's own sessions share
     beyond what is expected everywhere, and its standard deviation; ``zeros`` (B, 6, 6) the part of ``noise`` that is
     the plates' zero, an error like the other sizes: it hides causes, and no noise does.
     """
 
     sizes: Mapping[str, float]
     noise: Array
-    energy: Array
-    energy_sd: Array
+    movement: Array
     threshold: float
     origin: str = ""
     means: Mapping[str, float] = field(default_factory=dict)
@@ -100,7 +99,7 @@ class Tolerances:
         tables = ("sizes", "means", "accuracy", "norms")
         assign(self, **{name: MappingProxyType(dict(getattr(self, name))) for name in tables})
         assign(self, zeros=np.broadcast_to(self.zeros, self.noise.shape))
-        freeze(self, "Tolerances", noise=(bands, 6, 6), zeros=(bands, 6, 6), energy=(bands, 6), energy_sd=(bands, 6))
+        freeze(self, "Tolerances", noise=(bands, 6, 6), zeros=(bands, 6, 6), movement=(bands, 6))
 
     def size(self, key: str) -> float:
         """Return the standard deviation of ``key``; 0 for one that was never learned: it is then no nuisance. A joint
@@ -182,12 +181,10 @@ def read_tolerances(text: str) -> Tolerances:
 
 def tolerances_of(raw: Mapping[str, Any]) -> Tolerances:
     """Return the tolerances from the tables of a TOML file."""
-    noise, energy, energy_sd = (np.array(raw[name]) for name in ("noise", "energy", "energy_sd"))
     return Tolerances(
         raw.get("sizes", {}),
-        noise,
-        energy,
-        energy_sd,
+        np.array(raw["noise"]),
+        np.array(raw["movement"]),
         raw["threshold"],
         raw["origin"],
         raw.get("means", {}),
@@ -215,9 +212,7 @@ def to_toml(found: Tolerances, *, under: str = "") -> str:
     prefix = f"{under}." if under else ""
     head = [f"[{under}]"] if under else []
     lines = [*head, f'origin = "{found.origin}"', f"threshold = {found.threshold:.4g}"]
-    for name in ("energy", "energy_sd"):
-        rows = [f"  [{', '.join(f'{x:.4g}' for x in row)}]," for row in getattr(found, name)]
-        lines += [f"{name} = [", *rows, "]"]
+    lines += ["movement = [", *(f"  [{', '.join(f'{x:.4g}' for x in row)}]," for row in found.movement), "]"]
     lines.append("noise = [")
     for band in found.noise:
         lines += ["  [", *(f"    [{', '.join(f'{x:.5g}' for x in row)}]," for row in band), "  ],"]
