@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from biodance.display import cause_in_words
-from biodance.report.wording import format_number, size_seen, sized, small
+from biodance.report.wording import changed, format_number, size_seen, sized, small
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -156,7 +156,9 @@ class RowFormat(Formatter):
         if isinstance(value, str):
             return cause_in_words(value) if format_spec == "name" else value
         if format_spec == "size":
-            return sized(value, self.row["unit"])
+            return "–" if value is None else sized(value, self.row["unit"])
+        if format_spec == "change":
+            return "–" if value is None else changed(value, self.row["unit"])
         spec = _SPEC.fullmatch(format_spec)
         if value is None or spec is None:
             return "–" if value is None else small(value) if format_spec == "p" else format(value, format_spec)
