@@ -115,6 +115,10 @@ class KeyKind:
 
 _LEVER: Mapping[str, float] = {"hip": 0.3, "knee": 0.3, "ankle": 0.15}
 """m, about how far from its joint the markers lie that tell how a segment turns."""
+_SKIN: Mapping[str, float] = {"pelvis": 0.12, "trunk": 0.2}
+"""m, about how far from its middle the four markers of a segment lie whose skin goes with the limbs."""
+_LIMB_TURNS = 1.0
+"""rad, about what a hip or a shoulder goes through in a cycle."""
 EVENT_SIZE = 0.009
 """s by which strikes differ from those that another program found in the same files (docs/benchmarks/movement.md)."""
 
@@ -130,7 +134,8 @@ def placement_sd(of: KeyKind) -> float:
     - An angle (deg) is one frame against the laboratory (pelvis, foot progression), n = 1, or one against another, n =
       2. Turned frames shift it by turn sqrt(n), the rotation of the hip also by ``axis_turn``, and mix the other angles
       of its joint into it by turn sqrt(n) beside; a joint centre that lies elsewhere drifts by 2 sin(span / 2) centre,
-      which turns a segment by that over the lever of its markers. A range has no shift.
+      which turns a segment by that over the lever of its markers. Skin over pelvis and trunk goes with the limbs by
+      ``slide``, each of four markers by itself. A range has no shift.
     - A moment (N·m/kg) changes by the weight of 1 kg times centre at the most, a power (W/kg) by that times ``rate``.
     - A stride's length changes by marker, a step's length and width, of two feet, by sqrt(2) marker, a speed by marker
       times ``rate``. Stance (% of the stride) and step time change by `EVENT_SIZE`, double support by sqrt(2) of it;
@@ -161,6 +166,8 @@ def _of_angle(of: KeyKind) -> float:
     if joint in _LEVER:
         drift = 2 * np.sin(np.radians(of.span) / 2) * joint_size("joint_centre", joint)
         parts.append(float(np.degrees(drift / _LEVER[joint])))
+    if joint in _SKIN:
+        parts.append(float(np.degrees(error_size("slide", "marker") * _LIMB_TURNS / (2 * _SKIN[joint]))))
     if of.key != "range":
         parts.append(float(np.degrees(turn)))
         if of.quantity == "hip_rotation":

@@ -82,11 +82,13 @@ def placement_words() -> str:
     turn, axis = error_size("frame_turn", "any"), error_size("axis_turn", "knee medial marker", state="before")
     hip, knee, ankle = (millimetres(joint_size("joint_centre", joint), 0) for joint in ("hip", "knee", "ankle"))
     marker, event = millimetres(error_size("soft_tissue", "marker"), 0), millimetres(EVENT_SIZE, 0)
+    slide = millimetres(error_size("slide", "marker"), 0)
     return (
         f"a segment's frame turns by {np.degrees(turn):.0f} degrees (judgement), that of the thigh also by "
         f"{np.degrees(axis):.0f} degrees with the axis between the epicondyles (Della Croce 1999); the centres of hip, "
         f"knee and ankle move by {hip}, {knee} and {ankle} mm (Harrington 2007; judgement); a heel's place at a strike "
-        f"by {marker} mm (Leardini 2005); a strike by {event} ms"
+        f"by {marker} mm, skin over pelvis and trunk by {slide} mm per radian of the limbs (Leardini 2005); a "
+        f"strike by {event} ms"
     )
 
 
