@@ -7,8 +7,7 @@ from scipy.special import ndtr
 
 from biodance.errors import BiodanceError
 from biodance.identification.knowledge import SIGMAS, Known
-from biodance.identification.sessions import Difference
-from biodance.pipeline.front import compare_sessions
+from biodance.identification.sessions import Difference, differences
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import Weighing
 from biodance.pipeline.visit_quantity import ComparedQuantity
@@ -26,7 +25,8 @@ def mass_quantities(
 ) -> tuple[list[ComparedQuantity], list[str]]:
     """Return the masses that the first and the last visit have in common, and why others are not compared.
 
-    ``refusals`` why a visit says nothing of the body, "" where it does.
+    ``refusals`` why a visit says nothing of the body, "" where it does. Those of the segments are what
+    `biodance.compare_sessions` returns.
     """
     found, notes = [], [why for why in (refusals[0], refusals[-1]) if why]
     weighed = [one for _, one in visits]
@@ -37,7 +37,7 @@ def mass_quantities(
         return found, [f"The masses of the segments are not compared: {why}" for why in notes]
     tell("comparing the bodies")
     try:
-        changes = compare_sessions(first, last).later.changes
+        changes = differences(first.identification, last.identification)
     except BiodanceError as why:
         return found, [f"The masses of the segments are not compared: {why}"]
     masses = [_by_segment(one) for one, _ in visits]

@@ -119,8 +119,20 @@ _SKIN: Mapping[str, float] = {"pelvis": 0.12, "trunk": 0.2}
 """m, about how far from its middle the four markers of a segment lie whose skin goes with the limbs."""
 _LIMB_TURNS = 1.0
 """rad, about what a hip or a shoulder goes through in a cycle."""
-EVENT_SIZE = 0.009
+_EVENT = 0.009
 """s by which strikes differ from those that another program found in the same files (docs/benchmarks/movement.md)."""
+
+
+def placement_sizes() -> Mapping[str, float]:
+    """Return the standard deviations with which `placement_sd` counts, by name: m, rad, m/rad, s."""
+    return {
+        "frame": error_size("frame_turn", "any"),
+        "knee axis": error_size("axis_turn", "knee medial marker", state="before"),
+        **{joint: joint_size("joint_centre", joint) for joint in _LEVER},
+        "marker": error_size("soft_tissue", "marker"),
+        "skin": error_size("slide", "marker"),
+        "event": _EVENT,
+    }
 
 
 def placement_sd(of: KeyKind) -> float:
@@ -138,38 +150,39 @@ def placement_sd(of: KeyKind) -> float:
       ``slide``, each of four markers by itself. A range has no shift.
     - A moment (N·m/kg) changes by the weight of 1 kg times centre at the most, a power (W/kg) by that times ``rate``.
     - A stride's length changes by marker, a step's length and width, of two feet, by sqrt(2) marker, a speed by marker
-      times ``rate``. Stance (% of the stride) and step time change by `EVENT_SIZE`, double support by sqrt(2) of it;
+      times ``rate``. Stance (% of the stride) and step time change by `_EVENT`, double support by sqrt(2) of it;
       stride time and cadence, from one strike of a foot to its next, by nothing.
     """
     if of.unit == "deg":
         return _of_angle(of)
     if of.unit in ("N·m/kg", "W/kg"):
         joint = of.quantity.partition("_")[0]
-        return _G * joint_size("joint_centre", joint) * (of.rate if of.unit == "W/kg" else 1.0)
-    marker, two = error_size("soft_tissue", "marker"), float(np.sqrt(2))
+        return _G * placement_sizes()[joint] * (of.rate if of.unit == "W/kg" else 1.0)
+    marker, two = placement_sizes()["marker"], float(np.sqrt(2))
     sizes = {
         "stride_length": marker,
         "speed": marker * of.rate,
         "step_length": two * marker,
         "step_width": two * marker,
-        "step_time": EVENT_SIZE,
-        "stance": 100 * EVENT_SIZE * of.rate,
-        "double_support": 100 * two * EVENT_SIZE * of.rate,
+        "step_time": _EVENT,
+        "stance": 100 * _EVENT * of.rate,
+        "double_support": 100 * two * _EVENT * of.rate,
     }
     return sizes.get(of.quantity, 0.0)
 
 
 def _of_angle(of: KeyKind) -> float:
     joint = of.quantity.partition("_")[0]
-    turn = error_size("frame_turn", "any") * float(np.sqrt(1 if joint in ("pelvis", "foot") else 2))
+    size = placement_sizes()
+    turn = size["frame"] * float(np.sqrt(1 if joint in ("pelvis", "foot") else 2))
     parts = [turn * of.beside]
     if joint in _LEVER:
-        drift = 2 * np.sin(np.radians(of.span) / 2) * joint_size("joint_centre", joint)
+        drift = 2 * np.sin(np.radians(of.span) / 2) * size[joint]
         parts.append(float(np.degrees(drift / _LEVER[joint])))
     if joint in _SKIN:
-        parts.append(float(np.degrees(error_size("slide", "marker") * _LIMB_TURNS / (2 * _SKIN[joint]))))
+        parts.append(float(np.degrees(size["skin"] * _LIMB_TURNS / (2 * _SKIN[joint]))))
     if of.key != "range":
         parts.append(float(np.degrees(turn)))
         if of.quantity == "hip_rotation":
-            parts.append(float(np.degrees(error_size("axis_turn", "knee medial marker", state="before"))))
+            parts.append(float(np.degrees(size["knee axis"])))
     return float(np.linalg.norm(parts))

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
 from biodance.cycles.key_values import ANGLE_PANELS, LOAD_PANELS
@@ -25,7 +24,7 @@ from biodance.report.tables.visits import (
     visits_document,
 )
 from biodance.report.wording import millimetres, moment
-from biodance.uncertainty.visits import EVENT_SIZE
+from biodance.uncertainty.visits import placement_sizes
 from biodance.version import __version__
 
 COMPARE_PAGE = "compare.html"
@@ -79,16 +78,16 @@ def _figures(found: VisitComparison) -> list[tuple[str, str, str]]:
 
 def placement_words() -> str:
     """Return what placing the markers anew is taken to add, in words, from the table of sizes."""
-    turn, axis = error_size("frame_turn", "any"), error_size("axis_turn", "knee medial marker", state="before")
-    hip, knee, ankle = (millimetres(joint_size("joint_centre", joint), 0) for joint in ("hip", "knee", "ankle"))
-    marker, event = millimetres(error_size("soft_tissue", "marker"), 0), millimetres(EVENT_SIZE, 0)
-    slide = millimetres(error_size("slide", "marker"), 0)
+    size = placement_sizes()
+    turn, axis = (f"{np.degrees(size[name]):.0f} degrees" for name in ("frame", "knee axis"))
+    hip, knee, ankle, marker, slide, event = (
+        millimetres(size[name], 0) for name in ("hip", "knee", "ankle", "marker", "skin", "event")
+    )
     return (
-        f"a segment's frame turns by {np.degrees(turn):.0f} degrees (judgement), that of the thigh also by "
-        f"{np.degrees(axis):.0f} degrees with the axis between the epicondyles (Della Croce 1999); the centres of hip, "
-        f"knee and ankle move by {hip}, {knee} and {ankle} mm (Harrington 2007; judgement); a heel's place at a strike "
-        f"by {marker} mm, skin over pelvis and trunk by {slide} mm per radian of the limbs (Leardini 2005); a "
-        f"strike by {event} ms"
+        f"a segment's frame turns by {turn} (judgement), that of the thigh also by {axis} with the axis between the "
+        f"epicondyles (Della Croce 1999); the centres of hip, knee and ankle move by {hip}, {knee} and {ankle} mm "
+        f"(Harrington 2007; judgement); a heel's place at a strike by {marker} mm, skin over pelvis and trunk by "
+        f"{slide} mm per radian of the limbs (Leardini 2005); a strike by {event} ms"
     )
 
 
