@@ -104,7 +104,8 @@ def read_visits(folders: Sequence[str | Path], *, tell: Callable[[str], None] = 
         There are fewer than two, two are one visit or hold the same recording, or they declare another sex or stature.
     """
     if len(folders) < 2:
-        raise SessionRefused(f"{len(folders)} visit was given. Give two or more visits of one person, earliest first.")
+        given = "Only one visit was given" if folders else "No visit was given"
+        raise SessionRefused(f"{given}. Give two or more visits of one person, the earliest first.")
     places = [Path(one).resolve() for one in folders]
     for k, place in enumerate(places):
         if place in places[:k]:

@@ -131,9 +131,9 @@ class RowFormat(Formatter):
     """How the values of a ``row`` are written for people, by what stands behind the colon.
 
     ``2 kg`` with two decimals and unit, ``mm0`` m in whole millimetres, ``ms1`` s in milliseconds, ``%1`` a share in
-    per cent, ``deg1`` rad in degrees; ``size`` with the unit of the row, ``seen`` the size of a cause, ``p`` a
-    probability; ``name`` a name as words; several values one by one, or their ``count``; what is not known as "–",
-    without its unit.
+    per cent, ``deg1`` rad in degrees; ``size`` with the unit of the row, ``change`` with its sign, too; ``seen`` the
+    size of a cause, ``p`` a probability; ``name`` a name as words; several values one by one, or their ``count``; what
+    is not known as "–", without its unit.
     """
 
     row: Row

@@ -9,14 +9,14 @@ from biodance.pipeline.visit_quantity import ComparedQuantity
 from biodance.pipeline.visits import VisitComparison
 from biodance.report.tables.schema import Row, Schema, table_of
 from biodance.report.tables.session import PROVENANCE_ROW
-from biodance.report.wording import changed
+from biodance.report.wording import changed, sized
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 QUANTITY_ROW = Schema(
     "name kind quantity key side unit values ci95 counts change change_ci95 p placement_sd changed why",
-    shown="quantity: {told} | by visit: {values:size} | change: {change:change} | 95 % interval: {interval} | "
+    shown="quantity: {told} | by visit: {by_visit} | change: {change:change} | 95 % interval: {interval} | "
     "cycles: {counted}",
 )
 """A quantity in all visits; ``changed`` beyond chance (false discovery rate 5 %)."""
@@ -49,7 +49,9 @@ def comparison_sentence(found: VisitComparison) -> str:
     if not found.tested:
         return "Nothing can be told to have changed: no quantity has an interval in the first and the last visit."
     if not found.changed:
-        return "Nothing changed beyond its uncertainty."
+        untested = len(found.quantities) - found.tested
+        few = f" {untested} of {len(found.quantities)} quantities could not be tested." if untested else ""
+        return f"Nothing changed beyond its uncertainty.{few}"
     one, count = found.changed[0], len(found.changed)
     assert one.change_ci95 is not None
     return (
@@ -67,7 +69,17 @@ def quantity_in_words(one: ComparedQuantity) -> str:
 
 
 def _interval(interval: tuple[float, float] | None, unit: str) -> str:
-    return "–" if interval is None else " to ".join(changed(end, unit) for end in interval)
+    """Return both ends, the unit once: ``+142 to +186 mm``."""
+    if interval is None:
+        return "–"
+    low, high = (changed(end, unit) for end in interval)
+    return f"{low.partition(' ')[0]} to {high}"
+
+
+def _by_visit(one: ComparedQuantity) -> str:
+    """Return all values, the unit once: ``1057, 1052, 1221 mm``."""
+    said = ["–" if value is None else sized(value, one.unit) for value in one.values]
+    return ", ".join([*(text.partition(" ")[0] for text in said[:-1]), said[-1]])
 
 
 def shown_quantities(found: VisitComparison) -> list[Row]:
@@ -76,6 +88,7 @@ def shown_quantities(found: VisitComparison) -> list[Row]:
         QUANTITY_ROW.row(one)
         | {
             "told": quantity_in_words(one),
+            "by_visit": _by_visit(one),
             "interval": one.why or _interval(one.change_ci95, one.unit),
             "counted": ", ".join(map(str, one.counts)) if any(one.counts) else "–",
         }
