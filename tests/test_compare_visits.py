@@ -166,6 +166,8 @@ def test_the_command_writes_prints_and_refuses(visits, tmp_path: Path, capsys: p
         assert sentence in capsys.readouterr().err
     assert run(["compare", str(first), str(faster), "--out", str(out)]) == 2
     assert "nothing is overwritten" in capsys.readouterr().err
+    assert run(["compare", str(first), str(faster), "--out", str(out), "--force"]) in (0, 1)
+    capsys.readouterr()
     assert run(["compare", str(first), str(faster), "--out", str(faster)]) == 2
     assert "results are never written beside them" in capsys.readouterr().err
 
@@ -235,6 +237,21 @@ def test_visits_without_common_cycles_have_nothing_in_common() -> None:
     rng = np.random.default_rng(3)
     none = SessionMovement("other", (), "table", 70.0, {})
     assert list(cycle_quantities([walked(rng, count=5), none])) == []
+
+
+def test_visits_with_nothing_in_common_are_refused(
+    visits, compared: dict[str, VisitComparison], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = iter(compared["same"].visits)
+
+    def still(*_):
+        one = next(seen)
+        moved = replace(one.moved, trials=())
+        return replace(one, moved=moved, identified=None, result=replace(one.result, weighed=None), unweighed="No fit.")
+
+    monkeypatch.setattr("biodance.pipeline.visits._examined", still)
+    with pytest.raises(SessionRefused, match="have no quantity in common"):
+        compare_visits(read_visits([visits["first"], visits["same"]]))
 
 
 def test_a_middle_visit_may_lack_a_quantity() -> None:

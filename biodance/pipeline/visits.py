@@ -215,6 +215,8 @@ def _examined(session: Session, name: str, tell: Callable[[str], None]) -> Exami
     identified, unweighed = None, ""
     try:
         identified = identification_of(result)
+        if identified.identification.status == "failed":
+            identified, unweighed = None, f"{name}: {identified.identification.cause}"
     except SessionRefused as refused:
         unweighed = str(refused)
     date = visit_words(session.folder, [one.name for one in session.trials])["date"]
