@@ -212,16 +212,21 @@ def _examined(session: Session, name: str, tell: Callable[[str], None]) -> Exami
     result, found = diagnosed_and_corrected(examine(session, tell=tell_visit), tell=tell_visit)
     result = as_diagnosed(result, found.diagnosis) if found else result
     said = (*found.diagnosis.attention, *corrected_attention(result)) if found else session_attention(result)
-    identified, unweighed = None, ""
-    try:
-        identified = identification_of(result)
-        if identified.identification.status == "failed":
-            identified, unweighed = None, f"{name}: {identified.identification.cause}"
-    except SessionRefused as refused:
-        unweighed = str(refused)
+    identified, unweighed = _body_told(result, name)
     date = visit_words(session.folder, [one.name for one in session.trials])["date"]
     acted = tuple(one for one in said if one.level != "note")
     return ExaminedVisit(name, date, result, session_movement(result, tell=tell_visit), identified, unweighed, acted)
+
+
+def _body_told(result: SessionResult, name: str) -> tuple[SessionIdentification | None, str]:
+    """Return what a visit says of the body, or why it says nothing."""
+    try:
+        found = identification_of(result)
+    except SessionRefused as refused:
+        return None, str(refused)
+    if found.identification.status == "failed":
+        return None, f"{name}: {found.identification.cause}"
+    return found, ""
 
 
 def _refuse_other_legs(first: ExaminedVisit, later: ExaminedVisit) -> None:
