@@ -234,6 +234,7 @@ NAMED_ELSEWHERE = {
     "biodance.uncertainty.caution": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.sources": "joint_centre, a row of the table of error sizes",
     "biodance.uncertainty.tolerances": "joint_centre, a row of the table of error sizes",
+    "biodance.uncertainty.visits": "joint_centre, a row of the table of error sizes",
     "biodance.report.tables.identification": "added_mass, a key of the documents that programs read",
     "biodance.report.tables.session": "added_mass, a key of the documents that programs read",
 }

@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from biodance.cli import archive, dance, diagnose, files, session, virtual
+from biodance.cli import archive, compare, dance, diagnose, files, session, virtual
 from biodance.cli.app import DONE, NOT_DONE, STOPPED, app, say
 
 __all__ = [
     "app",
     "archive",
+    "compare",
     "dance",
     "diagnose",
     "files",

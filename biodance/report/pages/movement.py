@@ -7,6 +7,7 @@ import numpy as np
 
 from biodance.cycles.curves import CurveGroup, NormalCurve
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
+from biodance.cycles.key_values import ANGLE_PANELS, LOAD_PANELS
 from biodance.cycles.movement import TrialMovement
 from biodance.display import GREY, spaced
 from biodance.identification.knowledge import SIGMAS
@@ -24,16 +25,8 @@ _THIN = 0.4
 """px of one repetition."""
 _MOST = 12
 """Repetitions of a side that are drawn; the mean is over all."""
-_LEAST = {"deg": 10.0, "N·m/kg": 0.2, "W/kg": 0.5, "m": 0.05}
+LEAST_SPANS = {"deg": 10.0, "N·m/kg": 0.2, "W/kg": 0.5, "m": 0.05}
 """What an axis spans at least, by unit."""
-ANGLE_PANELS = (
-    *("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation", "hip_flexion", "hip_adduction", "hip_rotation"),
-    *("knee_flexion", "ankle_dorsiflexion", "foot_progression", "trunk_flexion", "trunk_bending", "trunk_rotation"),
-)
-LOAD_PANELS = (
-    *("hip_flexion_moment", "knee_flexion_moment", "ankle_dorsiflexion_moment", "hip_adduction_moment"),
-    *("hip_power", "knee_power", "ankle_power"),
-)
 POSITIVE: Mapping[str, str] = {
     "pelvis_tilt": "forwards +",
     "pelvis_obliquity": "own side up +",
@@ -51,7 +44,7 @@ _BOTH: Mapping[str, str] = {
     "trunk_rotation": "to the left +",
 }
 """The same where both sides move alike."""
-_AXES = {"gait": "% of the gait cycle", "squat": "% of the squat", "sit_to_stand": "% of the rise"}
+CYCLE_AXES = {"gait": "% of the gait cycle", "squat": "% of the squat", "sit_to_stand": "% of the rise"}
 
 
 def movement_figure(
@@ -71,7 +64,7 @@ def movement_figure(
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (kind, quantity, same[0].unit)]
             usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
             curves = [*usual, *_curves(same)]
-            cells.append([Strip(_title(same[0]), curves, least=_LEAST.get(same[0].unit, 0.0))])
+            cells.append([Strip(curve_title(same[0]), curves, least=LEAST_SPANS.get(same[0].unit, 0.0))])
     if not cells:
         return ""
     loads = quantities == LOAD_PANELS
@@ -79,10 +72,11 @@ def movement_figure(
     band = "95 %, inertial parameters" if loads else "± 1 sd, repetitions"
     if any(n.kind == kind for n in normal):
         band += "; grey: ± 1 sd, people"
-    return CurveFigure(PERCENT, cells, about, label=_AXES[kind], band=band).html()
+    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band=band).html()
 
 
-def _title(group: CurveGroup) -> str:
+def curve_title(group: CurveGroup) -> str:
+    """Return what a panel of curves shows: quantity, unit, and which way is positive where the name does not say it."""
     name = spaced(group.quantity)
     sense = (POSITIVE if group.kind == "gait" else {**POSITIVE, **_BOTH}).get(group.quantity)
     return f"{name} ({group.unit}{f', {sense}' if sense else ''})"
@@ -101,7 +95,7 @@ def _curves(groups: Sequence[CurveGroup]) -> list[Curve]:
     return curves
 
 
-_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair"}
+CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair"}
 _DIGITS = {"m": 3, "m/s": 2, "s": 2, "%": 1, "steps/min": 0}
 
 
@@ -134,10 +128,10 @@ def movement_section(moved: SessionMovement) -> str:
 
 
 def _part(one: TrialMovement, normal: Sequence[NormalCurve]) -> MovementPart:
-    kinds = [kind for kind in _KINDS if any(cycle.kind == kind for cycle in one.cycles)]
+    kinds = [kind for kind in CYCLE_KINDS if any(cycle.kind == kind for cycle in one.cycles)]
     figures = [
         (
-            _KINDS[kind],
+            CYCLE_KINDS[kind],
             movement_figure(one, kind, ANGLE_PANELS, normal),
             movement_figure(one, kind, LOAD_PANELS, normal),
         )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from biodance.display import cause_in_words
-from biodance.report.wording import format_number, size_seen, sized, small
+from biodance.report.wording import changed, format_number, size_seen, sized, small
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -131,9 +131,9 @@ class RowFormat(Formatter):
     """How the values of a ``row`` are written for people, by what stands behind the colon.
 
     ``2 kg`` with two decimals and unit, ``mm0`` m in whole millimetres, ``ms1`` s in milliseconds, ``%1`` a share in
-    per cent, ``deg1`` rad in degrees; ``size`` with the unit of the row, ``seen`` the size of a cause, ``p`` a
-    probability; ``name`` a name as words; several values one by one, or their ``count``; what is not known as "–",
-    without its unit.
+    per cent, ``deg1`` rad in degrees; ``size`` with the unit of the row, ``change`` with its sign, too; ``seen`` the
+    size of a cause, ``p`` a probability; ``name`` a name as words; several values one by one, or their ``count``; what
+    is not known as "–", without its unit.
     """
 
     row: Row
@@ -156,7 +156,9 @@ class RowFormat(Formatter):
         if isinstance(value, str):
             return cause_in_words(value) if format_spec == "name" else value
         if format_spec == "size":
-            return sized(value, self.row["unit"])
+            return "–" if value is None else sized(value, self.row["unit"])
+        if format_spec == "change":
+            return "–" if value is None else changed(value, self.row["unit"])
         spec = _SPEC.fullmatch(format_spec)
         if value is None or spec is None:
             return "–" if value is None else small(value) if format_spec == "p" else format(value, format_spec)
