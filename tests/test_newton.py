@@ -13,7 +13,7 @@ from biodance.effects.time_delay import TimeDelay
 from biodance.lab.session.read import read_session
 from biodance.motion.newton import newton_of
 from biodance.observations import observe, recording
-from biodance.pipeline.checks import WeighedBy, weigh
+from biodance.pipeline.checks import WeighedBy, weigh, with_weighed_mass
 from biodance.records import Wrench
 
 CLEAN = {
@@ -105,6 +105,25 @@ def test_squats_alone_weigh_by_newton():
     found = weigh(replace(session(), trials=session().trials[1:]), None)
     assert found.by is WeighedBy.NEWTON
     assert found.mass == pytest.approx(62.0, abs=3 * found.sd)
+
+
+def test_who_declared_no_mass_and_never_stands_still_is_weighed_while_moving():
+    squats = replace(session(), trials=session().trials[1:])
+    unknown = replace(squats, subject=replace(squats.subject, mass=float("nan"), guessed=("mass",)))
+    found = with_weighed_mass(unknown)
+    assert found.subject.mass == weigh(unknown, None).mass == pytest.approx(62.0, rel=0.02)
+    assert "kg were weighed by the force against the trunk in" in found.notes[-1]
+    assert with_weighed_mass(squats) is squats
+    nobody = replace(unknown, trials=tuple(replace(one, plates=()) for one in unknown.trials))
+    assert with_weighed_mass(nobody) is nobody
+
+
+@pytest.mark.parametrize(("folder", "mass"), [("gait10", 72.6), ("raj_walk", 85.0), ("raj_run", 72.84)])
+def test_real_people_without_a_mass_are_weighed(folder, mass, data):
+    """A walk, another one, a run; the masses as their publishers give them, of raj_walk by the strides."""
+    found = with_weighed_mass(read_session(data / "opensim_models" / folder)).subject
+    assert found.mass == pytest.approx(mass, rel=0.006)
+    assert "mass" in found.guessed
 
 
 def test_every_flight_is_a_zero_of_every_channel(data):
