@@ -24,6 +24,7 @@ from biodance.report.laboratory import lab_file_text, write_lab_file
 from biodance.uncertainty.tolerances import InstrumentNoise, shipped
 
 BAND = np.repeat(np.arange(len(shipped().noise)), 12)
+MOVED = np.ones((len(shipped().noise), 6))
 LOUD, NEVER = "plate_offset Fx", "clock_drift"
 TRUE = 4.0
 
@@ -33,7 +34,7 @@ def null(seed: int) -> Null:
     chance = np.random.default_rng(seed)
     columns = np.concatenate([chance.normal(size=(6 * BAND.size, 10)), np.zeros((6 * BAND.size, 1))], axis=1)
     rows = columns @ np.append(TRUE * chance.normal(size=10), 0.0) + 0.3 * chance.normal(size=len(columns))
-    return Null(rows, columns, (LOUD,) * 10 + (NEVER,), BAND, (), 70.0, ("",) * 11)
+    return Null(rows, columns, (LOUD,) * 10 + (NEVER,), BAND, (), 70.0, MOVED, ("",) * 11)
 
 
 @pytest.fixture(scope="module")
