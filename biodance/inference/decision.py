@@ -204,10 +204,11 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
 
 
 def _is_large(rows: Rows, one: NamedCause) -> bool:
-    """Return whether a cause is large enough to be told: the size that is told matters, it is larger than laboratories
-    have without calling it a fault (by a standard deviation), and what it changes in this session's wrench matters.
+    """Return whether a cause is large enough to be told: it matters by all rows and by the size that is told, is larger
+    than laboratories have without calling it a fault (by a standard deviation), and what it changes in this session's
+    wrench matters.
     """
-    if not matters(one.effect, _told_size(rows, one)):
+    if not all(matters(one.effect, size) for size in (one.theta, _told_size(rows, one))):
         return False
     if one.course:
         return True
