@@ -109,12 +109,10 @@ def test_what_a_movement_needs_is_its_power_by_band_for_a_reference_person() -> 
     put = problem(body(), windows(1, trials=2))
     found, mass = needed(put.cases, put.spectrum), float(body().sip.mass.sum())
     count = np.bincount(put.spectrum.band, minlength=len(BANDS))
-    (about,) = {tuple(put.spectrum.layout.about)}
-    whole = 0.0
-    for case, picks in zip(put.cases, put.spectrum.picks, strict=True):
-        for pick in picks:
-            whole += np.sum(case.predicted[pick, 0] ** 2)
-    assert about
+    runs = [
+        case.predicted[pick, 0] for case, picks in zip(put.cases, put.spectrum.picks, strict=True) for pick in picks
+    ]
+    whole = sum(float(one @ one) for one in runs)
     kept = float(count @ found[:, 0]) * (mass / REFERENCE_PERSON) ** 2
     assert 0.97 * whole < kept <= whole * (1 + 1e-9)
 

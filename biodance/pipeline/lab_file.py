@@ -78,7 +78,7 @@ def lab_text(earlier: tuple[PlateCorrection, ...], accepted: tuple[PlateCorrecti
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 Finite = Annotated[float, Field(ge=-1e12, le=1e12)]
 _Row = Annotated[list[Finite], Field(min_length=6, max_length=6)]
-_Squares = Annotated[list[Annotated[float, Field(ge=0, le=1e12)]], Field(min_length=6, max_length=6)]
+_Squares = Annotated[list[Annotated[float, Field(gt=0, le=1e12)]], Field(min_length=6, max_length=6)]
 _Words = Annotated[str, Field(max_length=10_000)]
 _PerCent = Annotated[list[float], Field(min_length=2, max_length=101)]
 

@@ -14,7 +14,7 @@ from biodance.pipeline.checks import mass_check, standing_check, trial_checks, w
 from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
-from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
+from biodance.pipeline.trial import Prepared, attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
 from biodance.records import Session
 from biodance.threads import one_thread
@@ -27,6 +27,29 @@ def stopped_before(result: SessionResult, what: str) -> SessionResult:
 
 def _stop(what: str) -> Step:
     return Step("stop", "refused", f"Not done: the run was stopped by Ctrl-C before {what}.")
+
+
+def _prepared(session: Session, tell: Callable[[str], None]) -> tuple[Prepared, ...]:
+    """Return the trials prepared, static ones first."""
+    read = []
+    for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
+        tell(f"preparing {trial.name}, {k} of {len(session.trials)}")
+        read.append(prepare_trial(trial))
+    return tuple(read)
+
+
+def _examined(
+    read: tuple[Prepared, ...], body: Body | None, mass: float, tell: Callable[[str], None]
+) -> tuple[TrialResult, ...]:
+    """Return the trials tracked and compared, with their checks; those that Ctrl-C left undone say so."""
+    results: list[TrialResult] = []
+    try:
+        for k, one in enumerate(read, 1):
+            tell(f"tracking {one.trial.name}, {k} of {len(read)}")
+            results.append(examine_trial(one, body, mass=mass))
+    except KeyboardInterrupt:
+        results += [TrialResult(one.trial, (*one.steps, _stop("this trial")), one.gaps) for one in read[len(results) :]]
+    return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
 
 
 @one_thread()
@@ -84,12 +107,9 @@ def examine(
     session = replace(session, trials=tuple(corrected_trial(trial, corrections) for trial in session.trials))
     session = with_weighed_mass(session)
     steps: list[Step] = []
-    read = []
-    for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
-        tell(f"preparing {trial.name}, {k} of {len(session.trials)}")
-        read.append(prepare_trial(trial))
+    read = _prepared(session, tell)
     tell("scaling the body")
-    body, source = body_of(session.subject, tuple(read), session.settings, steps)
+    body, source = body_of(session.subject, read, session.settings, steps)
     if body is not None and reference is not None:
         refuse_another_reference(reference.identification.body, body, session.subject.mass, reference.name)
     prior = None
@@ -97,15 +117,8 @@ def examine(
         body, prior, source = starting_from(known, body, session.subject.mass, source)
     plain, shown = body, ShownJoints()
     if body is not None:
-        body, shown = shown_joints(body, tuple(read), steps)
-    results: list[TrialResult] = []
-    try:
-        for k, one in enumerate(read, 1):
-            tell(f"tracking {one.trial.name}, {k} of {len(read)}")
-            results.append(examine_trial(one, body, mass=session.subject.mass))
-    except KeyboardInterrupt:
-        results += [TrialResult(one.trial, (*one.steps, _stop("this trial")), one.gaps) for one in read[len(results) :]]
-    done = tuple(replace(result, checks=tuple(trial_checks(result, session.subject.mass))) for result in results)
+        body, shown = shown_joints(body, read, steps)
+    done = _examined(read, body, session.subject.mass, tell)
     if body is not None and plain is not None:
         body, shown = with_forces(shown, plain, body, done)
     standing = best_standing(done)

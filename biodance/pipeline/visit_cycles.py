@@ -6,7 +6,7 @@ import numpy as np
 
 from biodance.cycles.key_values import KeyValue, key_values, leading_foot, stride_values
 from biodance.pipeline.movement import SessionMovement
-from biodance.pipeline.visit_quantity import ComparedQuantity
+from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
 from biodance.uncertainty.visits import (
     FEWEST_STRIDES,
     KeyKind,
@@ -63,5 +63,5 @@ def _compared(about: _About, seen: Sequence[Sequence[KeyValue]]) -> ComparedQuan
         ci95=tuple(mean.interval if mean else None for mean in means),
         counts=tuple(map(len, seen)),
         change=change.value, change_ci95=change.interval, p=change.p, placement_sd=placement_sd(_kind(seen[-1])),
-        why=f"fewer than {FEWEST_STRIDES} cycles in a visit" if few else "",
+        why=Untested.FEW_CYCLES if few else Untested.NO,
     )  # fmt: skip

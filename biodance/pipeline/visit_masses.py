@@ -10,7 +10,7 @@ from biodance.identification.knowledge import SIGMAS, Known
 from biodance.identification.sessions import Difference, differences
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.trial_result import Weighing
-from biodance.pipeline.visit_quantity import ComparedQuantity
+from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
 from biodance.records import side_in_name
 
 BODY_KIND = "body"
@@ -70,5 +70,5 @@ def _segment(one: Difference, known: Sequence[Known | None]) -> ComparedQuantity
         values=tuple(row.value if row else None for row in known),
         ci95=tuple(row.interval if row else None for row in known),
         counts=(0,) * len(known), change=one.value, change_ci95=one.interval if one.known else None,
-        p=one.p if one.known else None, why="" if one.known else "not known from these visits",
+        p=one.p if one.known else None, why=Untested.NO if one.known else Untested.NOT_KNOWN,
     )  # fmt: skip

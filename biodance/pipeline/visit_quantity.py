@@ -1,6 +1,15 @@
 """One quantity of several visits."""
 
 from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Untested(StrEnum):
+    """Why a change has no interval."""
+
+    NO = ""
+    FEW_CYCLES = "few cycles"
+    NOT_KNOWN = "not known"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -10,7 +19,7 @@ class ComparedQuantity:
 
     ``values`` in ``unit``, one a visit (None = not known there), each with its 95 % interval ``ci95`` and over how many
     cycles (``counts``; 0 of a mass). ``change``, the last less the first, with ``change_ci95`` and ``p`` of one at
-    least as large if nothing had changed; None where too little is known, ``why`` says what. ``placement_sd`` what
+    least as large if nothing had changed; None where too little is known, ``why`` says of what. ``placement_sd`` what
     placing the markers adds in the last visit (None = no part of it). ``changed`` beyond chance.
     """
 
@@ -26,7 +35,7 @@ class ComparedQuantity:
     change_ci95: tuple[float, float] | None
     p: float | None
     placement_sd: float | None = None
-    why: str = ""
+    why: Untested = Untested.NO
     changed: bool = False
 
     @property

@@ -8,6 +8,7 @@ from biodance import display
 from biodance.cycles.curves import CurveGroup, group_curves
 from biodance.errors import SessionRefused
 from biodance.lab.session.read import read_session, visit_words
+from biodance.lab.session.recordings import ANOTHER_STATURE
 from biodance.pipeline.attention import corrected_attention, session_attention
 from biodance.pipeline.body import refuse_another_reference
 from biodance.pipeline.diagnosis import diagnosed_and_corrected
@@ -18,13 +19,10 @@ from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
 from biodance.pipeline.visit_cycles import cycle_quantities
 from biodance.pipeline.visit_masses import mass_quantities
-from biodance.pipeline.visit_quantity import ComparedQuantity
+from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
 from biodance.records import Session
 from biodance.records.attention import Attention
 from biodance.uncertainty.visits import FEWEST_STRIDES, beyond_chance
-
-ANOTHER_STATURE = 0.04
-"""Share of the stature by which nobody differs from an earlier visit: more is another person, or one who grew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +141,7 @@ def _refuse_another(first: Session, later: Session) -> None:
             f"{names} are of two persons: {words[one.sex]} and {words[other.sex]} are declared. Give visits of one "
             "person, or put the sex right in session.toml."
         )
-    if "stature" in said and abs(other.stature / one.stature - 1) > ANOTHER_STATURE:
+    if "stature" in said and not 1 / ANOTHER_STATURE < other.stature / one.stature < ANOTHER_STATURE:
         raise SessionRefused(
             f"{names} are of two persons, or of one who has grown: {one.stature:.2f} m and {other.stature:.2f} m are "
             "declared. Give visits of one person, or put height_m right in session.toml."
@@ -238,7 +236,7 @@ def _refuse_other_legs(first: ExaminedVisit, later: ExaminedVisit) -> None:
 def _notes(visits: Sequence[ExaminedVisit], found: Sequence[ComparedQuantity]) -> list[str]:
     """Return what a person should know of the intervals."""
     notes = []
-    if few := [one for one in found if one.why.startswith("fewer")]:
+    if few := [one for one in found if one.why is Untested.FEW_CYCLES]:
         notes.append(
             f"{len(few)} quantities have fewer than {FEWEST_STRIDES} cycles in the first or the last visit: they have "
             "no interval and are never told to have changed."

@@ -41,17 +41,26 @@ def moment(created: str) -> str:
 
 def sized(value: float, unit: str) -> str:
     """Return a number with its unit as a person says it, with three significant digits at most: 0.02 m is 20 mm."""
-    factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 4 if unit == "kg·m²" else 2))
-    if value == float("inf"):
-        return "no size"
-    shown = factor * value
-    large = math.floor(math.log10(abs(shown))) if shown and math.isfinite(shown) else 0
-    return f"{format_number(shown, max(0, min(digits, 2 - large)))} {name}".strip()
+    return "no size" if value == float("inf") else " ".join(filter(None, _shown(value, unit)))
 
 
 def changed(value: float, unit: str) -> str:
     """Return a difference as a person says it, with its sign: 0.016 m is +16 mm."""
     return f"{'+' if value > 0 else ''}{sized(value, unit)}"
+
+
+def sized_together(values: Iterable[float | None], unit: str, between: str, *, signed: bool = False) -> str:
+    """Return numbers with their unit once, a dash for None: ``1057, –, 1221 mm``, ``signed`` ``+142 to +186 mm``."""
+    found = ["–" if one is None else f"{'+' * (signed and one > 0)}{_shown(one, unit)[0]}" for one in values]
+    return f"{between.join(found)} {_shown(0.0, unit)[1]}".strip()
+
+
+def _shown(value: float, unit: str) -> tuple[str, str]:
+    """Return a number and its unit as a person says them."""
+    factor, name, digits = SHOWN_UNITS.get(unit, (1.0, unit, 4 if unit == "kg·m²" else 2))
+    shown = factor * value
+    large = math.floor(math.log10(abs(shown))) if shown and math.isfinite(shown) else 0
+    return format_number(shown, max(0, min(digits, 2 - large))), name
 
 
 def small(value: float) -> str:

@@ -190,7 +190,9 @@ def _beside(file: Path, readers: Chosen[Reader]) -> Path | None:
         return None
 
 
-_PEOPLE = ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m", 1.04))
+ANOTHER_STATURE = 1.04
+"""Ratio of two statures from which on they are of two people, or of one who grew."""
+_PEOPLE = ((declared_mass, "mass", "kg", 1.1), (declared_stature, "stature", "m", ANOTHER_STATURE))
 """What files declare of a person: reader, name, unit, and from which ratio on it is somebody else's."""
 
 

@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING
 
 from biodance.display import spaced
 from biodance.pipeline.provenance import now, provenance
-from biodance.pipeline.visit_quantity import ComparedQuantity
+from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
 from biodance.pipeline.visits import VisitComparison
 from biodance.report.tables.schema import Row, Schema, table_of
 from biodance.report.tables.session import PROVENANCE_ROW
-from biodance.report.wording import changed, sized
+from biodance.report.wording import changed, sized_together
+from biodance.uncertainty.visits import FEWEST_STRIDES
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -20,6 +21,11 @@ QUANTITY_ROW = Schema(
     "cycles: {counted}",
 )
 """A quantity in all visits; ``changed`` beyond chance (false discovery rate 5 %)."""
+_UNTESTED = {
+    Untested.NO: "",
+    Untested.FEW_CYCLES: f"fewer than {FEWEST_STRIDES} cycles in a visit",
+    Untested.NOT_KNOWN: "not known from these visits",
+}
 _VISIT = Schema("session=name date trials=#moved.trials")
 VISIT_ATTENTION = Schema("level text trial about")
 
@@ -72,14 +78,7 @@ def _interval(interval: tuple[float, float] | None, unit: str) -> str:
     """Return both ends, the unit once: ``+142 to +186 mm``."""
     if interval is None:
         return "–"
-    low, high = (changed(end, unit) for end in interval)
-    return f"{low.partition(' ')[0]} to {high}"
-
-
-def _by_visit(one: ComparedQuantity) -> str:
-    """Return all values, the unit once: ``1057, 1052, 1221 mm``."""
-    said = ["–" if value is None else sized(value, one.unit) for value in one.values]
-    return ", ".join([*(text.partition(" ")[0] for text in said[:-1]), said[-1]])
+    return sized_together(interval, unit, " to ", signed=True)
 
 
 def shown_quantities(found: VisitComparison) -> list[Row]:
@@ -88,8 +87,8 @@ def shown_quantities(found: VisitComparison) -> list[Row]:
         QUANTITY_ROW.row(one)
         | {
             "told": quantity_in_words(one),
-            "by_visit": _by_visit(one),
-            "interval": one.why or _interval(one.change_ci95, one.unit),
+            "by_visit": sized_together(one.values, one.unit, ", "),
+            "interval": _UNTESTED[one.why] or _interval(one.change_ci95, one.unit),
             "counted": ", ".join(map(str, one.counts)) if any(one.counts) else "–",
         }
         for one in found.quantities
@@ -109,7 +108,7 @@ def quantities_frame(found: VisitComparison) -> "DataFrame":
             row |= {f"value_{k}": value, f"low_{k}": low, f"high_{k}": high, f"cycles_{k}": cycles}
         low, high = one.change_ci95 or (math.nan, math.nan)
         row |= {"change": one.change, "change_low": low, "change_high": high, "p": one.p}
-        rows.append(row | {"changed": one.changed, "why": one.why})
+        rows.append(row | {"changed": one.changed, "why": one.why.value})
     return table_of(rows, columns)
 
 
