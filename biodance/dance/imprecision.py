@@ -3,8 +3,8 @@
 A performer's joints err by smooth noise and the tempo wanders. Whoever stands corrects: the pelvis keeps the centre of
 mass where the dance has it, but for the sway; what hurried or crooked limbs do to the zero-moment point is not
 corrected. Planted feet stay where they are, and a leg errs the more the farther it is lifted; an arm that holds a frame
-or hangs errs with the trunk only. The virtual laboratory
-performs dances by other code.
+or hangs errs with the trunk only: that a hanging arm swings and touches its own body is not judged. The virtual
+laboratory performs dances by other code.
 """
 
 from collections.abc import Sequence
@@ -171,6 +171,7 @@ class PlannedDance:
         """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
         centre of mass off by its ``sway`` m (T, 2).
         """
+        error = error.copy()
         for side in self.stances[0].quiet:  # the frame holds the hand where it is, or the arm hangs
             error[:, 3 + np.array(self.chain.arm_columns[side]) - ROOT] = 0.0
         x, rows = self._off(when, error, sway, how)
