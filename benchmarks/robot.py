@@ -31,7 +31,7 @@ from biodance.dance.dance import Dance
 from biodance.dance.playback import _STEP, SETTLE, _Driver, _floor_wrench, floor_model, planned_torques
 from biodance.dance.rehearsal import bearing
 from biodance.dance.robot import person_sized, shrunk
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import CHANNELS, Array, Sip
 from biodance.spatial import point_mass
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Subject, Trial, Wrench
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")

@@ -11,7 +11,7 @@ from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import mismatch, temper
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Subject
 from biodance.uncertainty.caution import widened_prior
 

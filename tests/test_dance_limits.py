@@ -14,7 +14,7 @@ from biodance.dance.problem.nlp import NonlinearProgramme, free_coordinates
 from biodance.dance.problem.stance import Stance, stance
 from biodance.dance.problem.state import State
 from biodance.dance.search.posture import Exciting, initial_guess
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 
 BLOCKS = excitation_blocks(BODY)
 STEP = 1e-6

@@ -14,7 +14,7 @@ from biodance.body.robot.hoap3 import hoap3
 from biodance.dance.dance import Dance
 from biodance.dance.scoring import PerformanceScore, score_performance
 from biodance.errors import BiodanceError
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Motion
 from biodance.uncertainty.caution import widened_prior
 

@@ -13,7 +13,7 @@ from biodance.dance.problem.splines import rest_to_rest
 from biodance.dance.search.information import SAMPLE_ERROR, SAMPLE_RATE, PostureInformation, learned, update_posterior
 from biodance.dance.search.optimised_course import affordable
 from biodance.identification.posterior import prior_factor
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))

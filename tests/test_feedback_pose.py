@@ -13,7 +13,7 @@ from small_dances import small_dance
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import MovementInformation, expect, movement_information
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array, Motion
 from biodance.report.feedback import write
 from biodance.report.feedback.write import follow_scene

@@ -20,8 +20,7 @@ from biodance.body.solids import segment_solids
 from biodance.cli.virtual import _simulated_anew
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.plain_text import write_new
-from biodance.lab.session.manifest import file_hash
-from biodance.lab.session.results_folder import whole_folder
+from biodance.lab.session.results_folder import file_hash, whole_folder
 from biodance.lab.session.write import write_registered
 from biodance.pipeline.program_folders import write_bids_folder, write_opensim_folder
 from biodance.pipeline.trial_result import TrialResult

@@ -13,7 +13,7 @@ from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residual
 from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.statistics import standing_point
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Sip
 
 FAST = (

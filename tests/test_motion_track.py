@@ -9,7 +9,7 @@ from marker_trials import noisy_dance, points
 from standing_markers import PERSON
 
 from biodance.body.human.human import human
-from biodance.body.human.limits import with_tracking_limits
+from biodance.body.human.skeleton import with_tracking_limits
 from biodance.errors import TrialRefused
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses

@@ -10,8 +10,14 @@ from biodance.cli import run as command
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.plain_text import write_new
 from biodance.lab.session import results_folder as rooms
-from biodance.lab.session.manifest import check_results, file_hash, read_manifest, refuse_mixture
-from biodance.lab.session.results_folder import inputs_of, results_folder
+from biodance.lab.session.results_folder import (
+    check_results,
+    file_hash,
+    inputs_of,
+    read_manifest,
+    refuse_mixture,
+    results_folder,
+)
 
 
 @pytest.fixture

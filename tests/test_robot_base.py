@@ -13,9 +13,9 @@ from robot_recordings import FEET, SOLE_OVER_ANKLE, danced, drawing, real_robot
 from biodance.body.body import Body
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import SessionRefused, TrialRefused
-from biodance.lab.robot.recording import read_robot_recording
-from biodance.motion.base_seen import base_of_markers
-from biodance.motion.regressor import predict_wrench
+from biodance.lab.robot import read_robot_recording
+from biodance.motion.dynamics import predict_wrench
+from biodance.motion.grounded import base_of_markers
 from biodance.pipeline.robot_trials import bring_together
 from biodance.records import Array, Markers
 

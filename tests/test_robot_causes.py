@@ -11,8 +11,7 @@ from biodance.body.body import Body
 from biodance.body.robot.urdf import read_urdf
 from biodance.diagnosis.robot import robot_causes
 from biodance.identification.robot import RobotMotion, robot_fit
-from biodance.motion.clocks import PlateFit, from_plate
-from biodance.motion.grounded import ground
+from biodance.motion.grounded import PlateFit, from_plate, ground
 from biodance.pipeline.robot_words import cause_words
 from biodance.records import Array
 

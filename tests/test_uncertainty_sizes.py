@@ -10,8 +10,7 @@ from diagnosed_sessions import body, known, windows
 
 import biodance
 from biodance.body.parts import JointError
-from biodance.body.tables.anthropometry import read_table
-from biodance.body.tables.error_sizes import error_rows, error_size, joint_size
+from biodance.body.tables.anthropometry import error_rows, error_size, joint_size, read_table
 from biodance.diagnosis.candidates import candidates
 from biodance.diagnosis.model import nuisances
 from biodance.diagnosis.problem import problem
@@ -29,11 +28,11 @@ SAYS_A_SIZE = re.compile(
 CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position", "clock_drift", "joint_centre")
 ELSEWHERE = {
     "body/human/scaling.py:TILT": "deg, a warning's threshold",
-    "body/human/limits.py:HAND_TURN": "a joint's range",
+    "body/human/skeleton.py:HAND_TURN": "a joint's range",
     "virtual_lab/recording/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
-    "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
-    "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
-    "body/robot/prior.py:_COM_SD": "robots",
+    "body/robot/similarity.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
+    "body/robot/similarity.py:RELATIVE_INERTIA_SD": "robots",
+    "body/robot/similarity.py:_COM_SD": "robots",
     "body/robot/hoap3.py:_COM_SD": "robots",
     "uncertainty/session_noise.py:_GAIN": "of a difference filter",
     "identification/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",

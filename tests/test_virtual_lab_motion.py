@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biodance.body.parts import GRAVITY
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.legs import Leg, soft_limit
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import SIDES, Subject
 from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.performance import perform

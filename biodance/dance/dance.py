@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
-from biodance.body.body import Body
-from biodance.body.body_file import body_text, parse_body
+from biodance.body.body import Body, body_text, parse_body
 from biodance.dance.file_entries import LARGEST, possible_array, read_words
 from biodance.dance.margin import Margin
 from biodance.dance.problem.chain import Chain

@@ -17,9 +17,8 @@ from biodance.body.body import Body
 from biodance.body.export import mjcf
 from biodance.dance.limits.floor import LowParts
 from biodance.errors import BiodanceError, MissingLibrary
-from biodance.motion.dynamics import distribute, joint_torques
+from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Wrench
 from biodance.spatial import quaternion_matrix, wrench_of_force
 

@@ -16,7 +16,7 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import JUDGED_RATE, MovementEvidence, movement_evidence, removed_shares, typical_noise
 from biodance.errors import BiodanceError
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion
 from biodance.uncertainty.noise import Noise
 

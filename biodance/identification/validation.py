@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
-from biodance.motion.regressor import Agreement, compare, predict_wrench
+from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.records import Array, Wrench
 from biodance.spatial import wrench_about_point
 

@@ -56,7 +56,7 @@ def write_new(path: Path, content: bytes) -> Path:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        take_name(part, path)
+        _take_name(part, path)
     except FileExistsError:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
     except OSError as error:
@@ -74,7 +74,7 @@ def refuse_present(path: Path) -> None:
         raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
 
 
-def take_name(part: Path, path: Path) -> None:
+def _take_name(part: Path, path: Path) -> None:
     """Give a finished file its name in one step; FileExistsError where another file has it."""
     try:
         os.link(part, path)

@@ -15,9 +15,9 @@ import numpy as np
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.sets import MarkerSet, wearing
-from biodance.lab.plates.told import Told, as_told
+from biodance.lab.markers.signals import unseen_at_origin
+from biodance.lab.plates.corners import Told, as_told
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
 from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
@@ -59,7 +59,7 @@ def _abrupt(steps: Array, start: int, stop: int) -> bool:
     )
 
 
-def without_origin(trial: Trial) -> Trial:
+def _without_origin(trial: Trial) -> Trial:
     """Return the trial with markers unseen where they lie on the lab's origin, and how many samples in its history."""
     if trial.markers is None:
         return trial
@@ -197,7 +197,7 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = without_frozen(without_origin(_read(reader, path, role, subject, told)))
+        trial = without_frozen(_without_origin(_read(reader, path, role, subject, told)))
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise

@@ -12,13 +12,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.prepare import prepare
-from biodance.motion.contact.contact import feet_on_ground
-from biodance.motion.contact.footing import footing
-from biodance.motion.contact.soles import soles_from_markers
-from biodance.motion.contact.support import carried_elsewhere
+from biodance.lab.prepare import LowPass, low_pass, prepare
+from biodance.motion.contact import carried_elsewhere, feet_on_ground
+from biodance.motion.soles import footing, soles_from_markers
 from biodance.records import Array, Mask, Trial, Wrench, runs
 
 TELLS = 0.7
@@ -82,13 +79,13 @@ class Trunk:
         return found
 
     def beside(self, total: Wrench, *, gravity: float, sway: float) -> "LagAndMass | None":
-        """Return what Newton tells of the ``total`` wrench of all plates, see `lag_and_mass`; the last ones are kept: a
-        plate that is moved or turned changes no vertical force.
+        """Return what Newton tells of the ``total`` wrench of all plates, see `_lag_and_mass`; the last ones are kept:
+        a plate that is moved or turned changes no vertical force.
         """
         vertical = total.force[:, 2]
         key = float(total.time[0]), vertical.size, hash(vertical.tobytes())
         if key not in self._known:
-            self._known[key] = lag_and_mass(self, total.time, vertical, gravity=gravity, sway=sway)
+            self._known[key] = _lag_and_mass(self, total.time, vertical, gravity=gravity, sway=sway)
         return self._known[key]
 
 
@@ -172,13 +169,9 @@ def _covered(trial: Trial, mass: float) -> Mask:
     return np.asarray(~beside & ~carried_elsewhere(trial, weight=feet.weight))
 
 
-def lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, sway: float) -> LagAndMass | None:
+def _lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, sway: float) -> LagAndMass | None:
     """Return what Newton tells of the vertical force (S,) N of all plates at times (S,) s; None where less than a
     quarter of a second without a break is covered, or the force is too short to be filtered.
-
-    The lag is that of the largest correlation of force and acceleration. The mass is the force over g plus the
-    acceleration, both with weights that begin and end smoothly, so that no velocity of one instant is needed; somebody
-    whose force swings by less than ``sway`` of it stands, and weighs whatever the correlation.
     """
     known = np.isfinite(vertical)
     rate = 1 / float(np.median(np.diff(time))) if time.size > 1 else 0.0
@@ -240,7 +233,7 @@ def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
 
 
 def slopes_of(trunk: Trunk, told: LagAndMass, total: Wrench, changes: Array, *, gravity: float) -> tuple[Array, Array]:
-    """Return the derivatives of lag and mass of `lag_and_mass` with respect to the sizes (d,) of ``changes`` (S, d) N
+    """Return the derivatives of lag and mass of `_lag_and_mass` with respect to the sizes (d,) of ``changes`` (S, d) N
     of the total vertical force; 0 of what is not told.
 
     The lag is the top of the parabola through three correlations: its derivative is that of the three. The mass changes

@@ -24,7 +24,7 @@ NEED = 0.020
 """m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
 _ONCE_WIDER = 0.015
 """m: the same for a body that was found too stiff elsewhere."""
-NEARER = 0.9
+_NEARER = 0.9
 """A joint is taken if the markers left out lie nearer than this share of their distance without it."""
 _FRAMES, _TRIALS = 48, 6
 """Frames of all trials together that are looked at, and trials, evenly chosen."""
@@ -99,7 +99,7 @@ def with_shown_joints(
             for pair in _tried(name, more, some, before, _ONCE_WIDER if gains else NEED)
         ]
         more, best = min(tried, key=lambda pair: pair[1].with_it / pair[1].without, default=(body, None))
-        if best is None or best.with_it >= NEARER * best.without:
+        if best is None or best.with_it >= _NEARER * best.without:
             return body, (*gains, *(gain for _, gain in tried))
         body, gains = more, [*gains, replace(best, taken=True)]
         left.remove(best.name)

@@ -23,7 +23,7 @@ class _HasName(Protocol):
     def name(self) -> str: ...
 
 
-Named = TypeVar("Named", bound=_HasName)
+_Named = TypeVar("_Named", bound=_HasName)
 
 
 def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> Array:
@@ -101,7 +101,7 @@ def rate_of(time: Array) -> float:
     return float((time.size - 1) / (time[-1] - time[0])) if time.size > 1 else float("nan")
 
 
-def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
+def by_name(trials: Iterable[_Named], name: str, kind: str) -> _Named:
     """Return the first of ``trials`` of that ``name``; UnknownName lists all names where there is none of the
     ``kind``.
     """

@@ -17,9 +17,8 @@ from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.effects import Case
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.plates.faults import DELAY, POSITION, ROTATION
-from biodance.motion.contact.contact import Contact
-from biodance.motion.contact.over import inside
-from biodance.motion.contact.soles import Soles
+from biodance.motion.contact import Contact
+from biodance.motion.soles import Soles, inside
 from biodance.observations import ONSET, FootPath
 from biodance.observations.foot_across import ACROSS_PHASES
 from biodance.observations.foot_along import ALONG_PHASES

@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.anthropometry import error_size
 from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import TrialRefused
-from biodance.motion.contact.belts import dilate, speeds
-from biodance.motion.contact.contact import Contact, ground_contact
-from biodance.motion.contact.soles import Soles, soles_from_body
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.contact import Contact, dilate, ground_contact, speeds
+from biodance.motion.dynamics import predict_wrench
+from biodance.motion.soles import Soles, soles_from_body
 from biodance.records import Array, Mask, Motion, Trial, runs
 from biodance.registration.evidence import PoseEvidence, feet_pull, plate_steps, together, wrench_pull
 from biodance.registration.pose import Forces, FramePose, with_forces_at

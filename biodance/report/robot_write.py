@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biodance.body.body_file import body_text
+from biodance.body.body import body_text
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.saved_results import BODY_FILE

@@ -12,7 +12,7 @@ from zlib import crc32
 
 import numpy as np
 
-from biodance.body.tables.error_sizes import error_rows
+from biodance.body.tables.anthropometry import error_rows
 from biodance.records import Array
 
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body
-from biodance.body.body_file import body_text
+from biodance.body.body import Body, body_text
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, excitation_blocks
 from biodance.dance.problem.plan import Plan

@@ -19,7 +19,7 @@ from biodance.errors import FileRefused
 C3D_BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
 _PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
-_SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
+_SCALES, _RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
 _RESAVE_IT = "export the trial again from the recording software."
@@ -110,7 +110,7 @@ def read_header(content: bytes, where: str) -> Header:
             f"{where}: the header puts the data into block {words[8]}, but the file has only "
             f"{len(content) // C3D_BLOCK} blocks: it is damaged or was cut off. {RESAVE}"
         )
-    if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
+    if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or _RATES[0] < rate < _RATES[1])):
         raise FileRefused(
             f"{where}: read as {_PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of "
             f"{rate:g} Hz, which no lab has: it is damaged or its processor type is wrong. {RESAVE}"

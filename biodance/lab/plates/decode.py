@@ -41,6 +41,9 @@ _DEAD, _LONG = 1.5, 0.5
 _FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
+FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle included
+
+
 @dataclass(frozen=True)
 class Decisions:
     """What was decided about a plate, step by step: from session.toml, corners, origin, units, gaps, what the load
@@ -118,7 +121,7 @@ class _Geometry(NamedTuple):
     origin_said: tuple[str, ...]
 
 
-class DecodedPlates(NamedTuple):
+class _DecodedPlates(NamedTuple):
     """The ``readings`` of the plates of a file, the reason by number why others are ``refused``, and what a person
     should look at.
     """
@@ -130,7 +133,7 @@ class DecodedPlates(NamedTuple):
 
 def decode_plates(
     raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
-) -> DecodedPlates:
+) -> _DecodedPlates:
     """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
 
     Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
@@ -165,22 +168,22 @@ def decode_plates(
     done, lost = _decode_each(raw, placed, refused)
     used = [column for reading in done for column in reading.plate.channels]
     if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
-        return DecodedPlates(done, lost, ())
+        return _DecodedPlates(done, lost, ())
     gain, share = raw.layout.gain[used], _weight_share(done, mass)
     if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
-        return DecodedPlates(done, lost, ())
+        return _DecodedPlates(done, lost, ())
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
     plain, lost_plain = _decode_each(stored, placed, refused)
     whole = _weight_share(plain, mass)
     if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
-        return DecodedPlates(done, lost, ())
+        return _DecodedPlates(done, lost, ())
     said = (
         f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
         f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
         f"ANALOG:SCALE, or export the file again."
     )
-    return DecodedPlates(plain, lost_plain, (said,))
+    return _DecodedPlates(plain, lost_plain, (said,))
 
 
 def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
@@ -230,11 +233,7 @@ def _decode_each(
 
 
 def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReading:
-    """Return the reading of one plate; TrialRefused where no sample is known.
-
-    ``sensor = W(k * C (channels - zero))`` with the SI units k, the calibration matrix C and the formula W of the TYPE
-    (`sensor_wrench`).
-    """
+    """Return the reading of one plate; TrialRefused where no sample is known."""
 
     def in_si(samples: Array) -> Array:
         output = samples if plate.calibration is None else samples @ plate.calibration.T
@@ -439,3 +438,8 @@ def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
     total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
     loaded = total >= _SOMEBODY_ON * total.max()
     return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
+
+
+def left_out_said(number: int, why: TrialRefused | str) -> str:
+    """Return the sentence that a plate is not used."""
+    return f"Plate {number} was left out, and what it carried is missing from the total: {why}"

@@ -11,7 +11,7 @@ from statistics import median
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.markers.still import is_still, movement
+from biodance.lab.markers.upright import is_still, movement
 from biodance.lab.plain_text import COMMAS_READ
 from biodance.lab.read import read_head, sniffed
 from biodance.lab.readers import Reader, extensions

@@ -49,7 +49,7 @@ def balls(body: Body) -> Balls:
     return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
 
 
-def ball_quaternion(angles: Array, sign: Array) -> Array:
+def _ball_quaternion(angles: Array, sign: Array) -> Array:
     """Return the quaternion (4, G, B) of Cardan angles (3, G, B) rad."""
     half = 0.5 * sign * angles
     (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
@@ -69,12 +69,8 @@ def _unit(quaternion: Array) -> Array:
     return np.moveaxis(unit_quaternion(np.moveaxis(quaternion, 0, -1)), -1, 0)
 
 
-def ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
-    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
-
-    Every rotation has two sets of Cardan angles (and any number of full turns): that closer to ``near`` (3, G, B) is
-    taken.
-    """
+def _ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
+    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B)."""
     x, y, z, w = quaternion
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
     one = np.stack(
@@ -139,7 +135,7 @@ class Chart:
         """
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
-        ball = continued(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
+        ball = continued(_ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
         return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
 
     def split(self, stacked: Array) -> Smooth:
@@ -154,7 +150,7 @@ class Chart:
         """
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        ball = ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))
+        ball = _ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))
         for k in range(3):
             angles[self.joints.first + k] = ball[k]
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles

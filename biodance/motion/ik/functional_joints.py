@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.anthropometry import error_size
 from biodance.errors import TrialRefused
-from biodance.motion.ik.elsewhere import elsewhere
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
     beside_sliding_skin,
+    elsewhere,
     evaluate_joints,
     fit_joints,
     spread_postures,
@@ -35,11 +35,11 @@ from biodance.motion.ik.joint_unknowns import (
     centre_sd,
     doubted,
     excited,
+    knees_elsewhere,
     own_centre,
     own_turn,
     own_unknowns,
 )
-from biodance.motion.ik.knee_markers import knees_elsewhere
 from biodance.motion.kinematics import chains, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
@@ -51,7 +51,7 @@ _ALIKE = 8.0
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
 s less than 1 s moves joints by decimetres.
 """
-NO_FIXED_POINT = ("shoulder", "trunk")
+_NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
 deviations, which are then those of 12 virtual dances.
 """
@@ -64,7 +64,7 @@ sessions, 0.044 in one with exchanged head markers, metres where a recording wen
 
 
 @dataclass(frozen=True, eq=False)
-class FunctionalJoints:
+class _FunctionalJoints:
     """``scaling`` with the joints where the movement puts them; joint -> ``moved`` m; hinge -> ``turned`` rad;
     ``errors`` of the joints that moved; ``kept`` the joints that the movement does not show; ``rms`` m, weighted marker
     distance before and after; ``notes`` say all this in plain sentences.
@@ -80,7 +80,7 @@ class FunctionalJoints:
 
 
 @one_thread()
-def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> FunctionalJoints:
+def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _FunctionalJoints:
     """Return ``scaling`` with joint centres and hinge axes from the moving ``trials`` (labels as in the marker set).
 
     A joint that these contradict is placed by them alone; a marker that has moved since the static trial does not
@@ -198,7 +198,7 @@ def _told(
     shown: NDArray[np.bool_],
     spared: Mapping[str, tuple[str, float]],
     refused: Mapping[str, float],
-) -> FunctionalJoints:
+) -> _FunctionalJoints:
     """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
     far that would lie with them; ``refused`` how far joints would go that were kept.
     """
@@ -240,7 +240,7 @@ def _told(
     notes += knees_elsewhere(scaling.centres, found.theta, found.information, shown, known=(*wrong, *spared))
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
-    return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+    return _FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
 
 
 def _outside(joint: str, far: float) -> str:
@@ -270,8 +270,7 @@ def _moved_since(joint: str, marker: str, far: float) -> str:
 def _reach(joint: str, theta: Array, covariance: Array) -> tuple[float, float]:
     """Return how far (m) a joint that the movement contradicts lies from the static trial's place, and the standard
     deviation of that: what the movement says of it (the posterior of the unknowns ``theta`` (37,) with ``covariance``
-    (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off. The placing is
-    more cautious: along a bone, where a movement shows little, it leaves half of a knee's error where it was.
+    (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off.
     """
     own, before = own_centre(joint), centre_sd(joint, contradicted=True)
     told = np.linalg.inv(covariance[own, own])
@@ -291,4 +290,4 @@ def _centre_sd(joint: str, deviation: Array) -> float:
 def fixed_point(joint: str) -> float:
     """Return what no fixed point can give of a joint's centre, m per axis."""
     kind = joint.split("_")[-1]
-    return error_size("fixed_point", kind, state="after") if kind in NO_FIXED_POINT else 0.0
+    return error_size("fixed_point", kind, state="after") if kind in _NO_FIXED_POINT else 0.0

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from biodance.cycles.curves import CurveGroup
+from biodance.cycles.curves import ANGLE_PANELS, LOAD_PANELS, CurveGroup
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.key_values import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED
 from biodance.pipeline.visits import VisitComparison
 from biodance.report.figures.curves import Curve, CurveFigure, Strip

@@ -14,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.lab.markers.sets import MarkerSet, landmark
-from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.corners import NOTHING_TOLD, Told, ToldPlate, plate_axes
 from biodance.lab.plates.decode import find_baseline
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
-from biodance.lab.plates.told import NOTHING_TOLD, Told, ToldPlate
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Wrench
 from biodance.settings import COP_FORCE, STANDARD_GRAVITY
 from biodance.spatial import wrench_about_origin
@@ -39,7 +38,7 @@ _PRESSED = 0.58
 """Share of the way from heel to toe marker at which the pressure of somebody who stands lies: 12 people of 4
 laboratories on plates of known place, 13 mm before the middle, sd 13 mm along the feet and 8 mm across.
 """
-PLACE_SD = 0.013
+_PLACE_SD = 0.013
 """m along the feet, the same 12 people: what their way of leaning leaves open."""
 
 
@@ -51,7 +50,7 @@ class Load(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TablePlates:
+class _TablePlates:
     """The plates of a table, what was decided, and what a person should look at."""
 
     plates: tuple[Plate, ...] = ()
@@ -98,7 +97,7 @@ def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
 
 def table_plates(
     loads: Sequence[Load], time: Array, turn: Array, markers: Markers, worn: MarkerSet | None, told: Told
-) -> TablePlates:
+) -> _TablePlates:
     """Return the plates of a table in the lab frame, ground on subject.
 
     ``loads`` on ``time`` (T,) s, with the wrench in the axes of the file; ``turn`` (3, 3) lab_R_file; ``markers`` (m,
@@ -116,11 +115,11 @@ def table_plates(
         placed += done.plates
         history += done.history
         if done.warnings:
-            return TablePlates(tuple(placed), tuple(history), done.warnings)
+            return _TablePlates(tuple(placed), tuple(history), done.warnings)
     plates = sorted((_told(plate, told.plates.get(plate.name, NOTHING_TOLD)) for plate in placed), key=_number)
     idle = [f"{n}: {', '.join(keys)}" for n, keys in _idle(told).items()]
     warnings = [f"{one} of session.toml can be followed in C3D files only." for one in idle]
-    return TablePlates(tuple(plates), tuple(history), tuple(warnings))
+    return _TablePlates(tuple(plates), tuple(history), tuple(warnings))
 
 
 def _idle(told: Told) -> Mapping[str, list[str]]:
@@ -206,7 +205,7 @@ def _pressure(value: Array) -> Array:
     return np.where((np.abs(vertical) >= COP_FORCE)[:, None], cop, np.nan)
 
 
-def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> TablePlates:
+def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> _TablePlates:
     """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
     turned = [np.hstack([load.value[:, :3] @ turn.T, load.value[:, 3:] @ turn.T]) for _, load in free]
     zeroed = [_zeroed(value, time) for value in turned]
@@ -214,7 +213,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     total = np.sum([value for value, _ in signed], axis=0)
     shift = None if feet is None else _shift(total, time, feet)
     if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
-        return TablePlates(warnings=(_lacking([n for n, _ in free], feet, shift),))
+        return _TablePlates(warnings=(_lacking([n for n, _ in free], feet, shift),))
     own = float(np.linalg.norm(shift)) > _UNDER
     at, about = (np.array([*shift, 0.0]), _put(shift)) if own else (np.zeros(3), _ABOUT_THE_ORIGIN)
     plates, history = [], []
@@ -228,7 +227,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
         corners = _around(np.concatenate([cop, feet.middle]) if own and feet is not None else cop)
         name, put = f"plate{number}", shift if own else None
         plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
-    return TablePlates(tuple(plates), tuple(history))
+    return _TablePlates(tuple(plates), tuple(history))
 
 
 _ABOUT_THE_ORIGIN = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."
@@ -240,7 +239,7 @@ def _put(shift: Array) -> str:
         f"Place: the table does not say it. The moments are not about the lab's origin (the pressure would lie "
         f"{np.linalg.norm(shift):.2f} m beside the feet), so they are about the plate's own point, which was put at "
         f"({shift[0]:.3f}, {shift[1]:.3f}, 0) m, where the pressure lies under the feet as people stand: known "
-        f"to {1000 * PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
+        f"to {1000 * _PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
     )
 
 
