@@ -195,7 +195,9 @@ def parts_as_segments(body: Body) -> Body:
         _, origin = body.place_on_segment(body.segment_joint[count + k])
         whole, own = boxes[part.segment], np.zeros((2, 3))
         if part.share[0] > _TRACE:
-            own, boxes[part.segment] = _parted(whole, origin[1], above=bool(part.share[2] > 0))
+            low, high = np.array(whole), np.array(whole)
+            low[1, 1] = high[0, 1] = np.clip(origin[1], *whole[:, 1])
+            own, boxes[part.segment] = (high, low) if part.share[2] > 0 else (low, high)
             own = own - origin
         boxes.append(own)
         rooms.append(own)
@@ -226,13 +228,6 @@ def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
     left = np.linalg.lstsq(PSEUDO_INERTIA, less.ravel(), rcond=None)[0]
     phi[rows[0]] += own - left
     phi[rows[1]] = np.linalg.solve(moved, left)
-
-
-def _parted(box: Array, height: float, *, above: bool) -> tuple[Array, Array]:
-    """Return the two pieces (2, 3) m of a ``box`` cut at ``height`` along y, the one ``above`` (or below) first."""
-    low, high = np.array(box), np.array(box)
-    low[1, 1] = high[0, 1] = np.clip(height, *box[:, 1])
-    return (high, low) if above else (low, high)
 
 
 def _room_for(body: Body, cut: Cut) -> Body:

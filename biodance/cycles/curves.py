@@ -128,8 +128,14 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     frame = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
     middle, mirror = "middle" if cycle.side == "both" else cycle.side, -1.0 if cycle.side == "left" else 1.0
     known = np.where(motion.determined, 1.0, np.nan)
+    rotation = frame @ pose.rotation[:, 0]
+    turn = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
+    over = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
+    tilt = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
     for name, angle in zip(
-        ("tilt", "obliquity", "rotation"), _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True
+        ("tilt", "obliquity", "rotation"),
+        (-np.degrees(tilt), -mirror * np.degrees(over), mirror * np.degrees(turn)),
+        strict=True,
     ):
         yield _over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
     heel, toe = heel_and_toe(body, soles.outline)
@@ -155,16 +161,6 @@ def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
     way = path[-1] - path[0]
     chosen = way if np.linalg.norm(way) > _TRAVELS and way @ faces > 0 else faces
     return np.asarray(chosen / np.linalg.norm(chosen))
-
-
-def _pelvis(rotation: Array, mirror: float) -> tuple[Array, Array, Array]:
-    """Return tilt, obliquity and rotation (T,) deg of the pelvis (T, 3, 3) in the frame forward, up, right; ``mirror``
-    -1 for the left side.
-    """
-    turn = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
-    over = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
-    tilt = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
-    return -np.degrees(tilt), -mirror * np.degrees(over), mirror * np.degrees(turn)
 
 
 _FEWEST_PEOPLE = 3

@@ -341,7 +341,9 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
             continue
         if seated[first:stop].any():
             leaves = first + int(np.flatnonzero(seated[first:stop])[-1])
-            instants = time[[_still_before(centre, motion, leaves), after[0], leaves]]
+            speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
+            rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
+            instants = time[[int(rest[-1]) if rest.size else 0, after[0], leaves]]
             cycles.append(Cycle(trial, "sit_to_stand", "both", *instants.tolist()))
         elif before.size:
             cycles.append(Cycle(trial, "squat", "both", *time[[before[-1], after[0], lowest]].tolist()))
@@ -355,15 +357,6 @@ def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
     ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
     behind = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1)
     return np.asarray(behind > _SEATED)
-
-
-def _still_before(centre: Array, motion: Motion, leaves: int) -> int:
-    """Return the last frame before ``leaves`` at which the centre of mass was at rest; the first of the trial without
-    one.
-    """
-    speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
-    rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
-    return int(rest[-1]) if rest.size else 0
 
 
 _BELT = 0.15

@@ -202,18 +202,14 @@ def ground_table(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
     """
     columns, values = [], []
     for segment, wrench in feet.items():
-        point = np.broadcast_to(_mean_place(wrench), (wrench.time.size, 3))
+        cop = wrench.cop(height=0.0, threshold=COP_FORCE)
+        known = np.isfinite(cop).all(axis=1)
+        middle = cop[known].mean(axis=0) if known.any() else np.zeros(3)
+        point = np.broadcast_to(middle, (wrench.time.size, 3))
         torque = wrench_about_point(wrench.value, point)[:, 3:]
         columns += [f"{segment}_{part}{axis}" for part in ("force_v", "force_p", "torque_") for axis in _AXES]
         values += [part @ Y_UP_TO_Z_UP for part in (wrench.force, point, torque)]
     return TimeTable(name, tuple(columns), next(iter(feet.values())).time, np.hstack(values))
-
-
-def _mean_place(wrench: Wrench) -> Array:
-    """Return the mean centre of pressure (3,) m on the floor z = 0; the origin where the foot carries nothing."""
-    cop = wrench.cop(height=0.0, threshold=COP_FORCE)
-    known = np.isfinite(cop).all(axis=1)
-    return np.asarray(cop[known].mean(axis=0)) if known.any() else np.zeros(3)
 
 
 def external_loads(segments: tuple[str, ...], *, data_file: str) -> str:

@@ -50,7 +50,9 @@ class BaseSeen:
         if self.position is not None:
             return self.rotation, self.position
         up = np.einsum("tij,tkj,k->ti", rotation, self.rotation, np.array([0.0, 0.0, 1.0]))
-        turn = _onto_vertical(up)
+        axis = cross(up, np.array([0.0, 0.0, 1.0]))  # of the smallest turn that brings `up` upright
+        K = skew(axis)
+        turn = np.asarray(np.eye(3) + K + K @ K / (1 + up[:, 2])[:, None, None])
         return turn @ rotation, foot + np.einsum("tij,tj->ti", turn, position - foot)
 
 
@@ -91,13 +93,6 @@ def base_of_inclinations(roll: Array, pitch: Array) -> BaseSeen:
     base's own axes (heading, then pitch, then roll).
     """
     return BaseSeen(elementary_rotation("y", pitch) @ elementary_rotation("x", roll) @ UPRIGHT)
-
-
-def _onto_vertical(up: Array) -> Array:
-    """Return the smallest turns (T, 3, 3) that bring unit vectors ``up`` (T, 3) upright."""
-    axis = cross(up, np.array([0.0, 0.0, 1.0]))
-    K = skew(axis)
-    return np.asarray(np.eye(3) + K + K @ K / (1 + up[:, 2])[:, None, None])
 
 
 UNDER = (0.02, 0.008)

@@ -101,36 +101,28 @@ def _moving(chart: Chart, near: Array, at: Smooth, first: Smooth, second: Smooth
 
 def _slow(chart: Chart, rough: Array, rate: float, settings: LowPass) -> tuple[Smooth, Smooth, Smooth]:
     """Return low-passed postures ``rough`` (nq, T) in the coordinates of ``chart``, and their two first derivatives."""
-    even, span = _continued_at_the_ends(chart.smooth(rough).stacked(), rate, settings)
-    filtered = chart.split(low_pass(even.T, rate, settings).T)
-    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle).stacked()
-    del filtered  # what is derived needs the memory
-    first, second = _derivatives(np.arange(even.shape[1]) / rate, even)
-    return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
-
-
-def _continued_at_the_ends(values: Array, rate: float, settings: LowPass) -> tuple[Array, slice]:
-    """Return ``values`` (m, T) continued at both ends so that their second derivative is mirrored there, and where (T)
-    they lie in it.
-    """
+    # The ends are continued with their acceleration mirrored: point reflection, as of forces, would make it zero there,
+    # which costs a walker half the body weight in the last frames.
+    values = chart.smooth(rough).stacked()
     period = settings.shortest(rate)
     count = min(_PERIODS * period, values.shape[1] - 1)
     before, behind = (_beyond(side, period, count) for side in (values, values[:, ::-1]))
-    return np.hstack([before[:, ::-1], values, behind]), slice(count, count + values.shape[1])
+    even, span = np.hstack([before[:, ::-1], values, behind]), slice(count, count + values.shape[1])
+    filtered = chart.split(low_pass(even.T, rate, settings).T)
+    even = Smooth(filtered.place, continued(filtered.root), continued(filtered.ball), filtered.angle).stacked()
+    del values, before, behind, filtered  # what is derived needs the memory
+    time = np.arange(even.shape[1]) / rate
+    free = np.zeros(len(even))
+    ends = [(3, free), (4, free)]
+    spline = make_interp_spline(time, even.T, k=_DEGREE, bc_type=(ends, ends))
+    first, second = spline(time, nu=1).T, spline(time, nu=2).T
+    return chart.split(even[:, span]), chart.split(first[:, span]), chart.split(second[:, span])
 
 
 def _beyond(values: Array, period: int, count: int) -> Array:
     """Return ``count`` samples (m, count) that come before ``values`` (m, T), the nearest first."""
     slope = np.polynomial.polynomial.polyfit(np.arange(min(period, values.shape[1])), values[:, :period].T, 3)[1]
     return values[:, 1 : count + 1] - 2 * slope[:, None] * np.arange(1, count + 1)
-
-
-def _derivatives(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return the first and second derivatives (m, T) of the quintic spline through ``values`` (m, T), ends free."""
-    free = np.zeros(len(values))
-    ends = [(3, free), (4, free)]
-    spline = make_interp_spline(time, values.T, k=_DEGREE, bc_type=(ends, ends))
-    return spline(time, nu=1).T, spline(time, nu=2).T
 
 
 def _check(time: Array, q: Array, settings: LowPass) -> None:

@@ -167,7 +167,9 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
     velocity = [float(row["velocity_rad_s"]) for row in table.rows]
     torque = np.array([row_numbers(row, f"torque_min_{word}_Nm torque_max_{word}_Nm") for row in table.rows])
     anderson = read_table("human", "anderson_2007")
-    torque *= subject.mass / _REFERENCE_MASS[subject.sex] * _age_factor(anderson, subject)
+    young = replace(subject, age=25.0)
+    ratios = [_coefficient(anderson, subject, *one) / _coefficient(anderson, young, *one) for one in _ANDERSON]
+    torque *= subject.mass / _REFERENCE_MASS[subject.sex] * float(np.mean(ratios))
     names = [row["joint"].split("_", 1)[1] for row in table.rows]
     for (joint, direction), (movement, sign) in _ANDERSON.items():
         peak = peak_torque(anderson, subject, joint, direction)
@@ -180,13 +182,6 @@ def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimi
 def peak_torque(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
     """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear between 25, 60 and 70 years."""
     return _coefficient(anderson, subject, joint, direction) * subject.mass * STANDARD_GRAVITY * subject.stature
-
-
-def _age_factor(anderson: AnthropometricTable, subject: Subject) -> float:
-    """Return the strength at the subject's age against 18-25 years, mean over Anderson's torques of the sex."""
-    young = replace(subject, age=25.0)
-    ratios = [_coefficient(anderson, subject, *one) / _coefficient(anderson, young, *one) for one in _ANDERSON]
-    return float(np.mean(ratios))
 
 
 def _coefficient(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:

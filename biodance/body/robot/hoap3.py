@@ -49,12 +49,13 @@ def hoap3() -> Body:
     columns = "x_min y_min z_min x_max y_max z_max"
     boxes = np.array([row_numbers(row, columns) for row in corners]).reshape(-1, 2, 3)
     phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
     return Body(
         "HOAP-3",
         _SEGMENTS,
         joints,
         Sip(_SEGMENTS, phi, robot_covariance(lumps, [_COM_SD] * len(lumps))),
-        _limits(rows),
+        JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque),
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         boxes,
@@ -114,11 +115,6 @@ def _lump(row: TableRow, turn: Array) -> RigidInertia:
     xx, yy, zz, xy, xz, yz = row_numbers(row, "Ixx Iyy Izz Ixy Ixz Iyz")
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return turn_inertia(RigidInertia(mass, np.array(com), inertia), turn.T)
-
-
-def _limits(rows: list[TableRow]) -> JointLimits:
-    low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
-    return JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque)
 
 
 def _sole(side: str) -> Foot:

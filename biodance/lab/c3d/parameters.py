@@ -244,7 +244,9 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
         raise damaged
     raw = section[first:end]
     if kind == -1:
-        return _texts(raw, shape), end
+        width = shape[0] if shape else 1
+        rows = [raw[i : i + width] for i in range(0, len(raw), width)] if width else []
+        return [_text(row) for row in rows], end
     if kind == 1:
         numbers: NDArray[Any] = np.frombuffer(raw, dtype=np.int8).astype(np.int64)
     elif kind == 2:
@@ -254,13 +256,6 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
     numbers = numbers.reshape(shape or (1,), order="F")
     numbers.setflags(write=False)
     return numbers, end
-
-
-def _texts(raw: bytes, shape: tuple[int, ...]) -> list[str]:
-    """Return the strings of a character array whose first dimension is the length of each."""
-    width = shape[0] if shape else 1
-    rows = [raw[i : i + width] for i in range(0, len(raw), width)] if width else []
-    return [_text(row) for row in rows]
 
 
 def _text(row: bytes) -> str:

@@ -84,7 +84,8 @@ def faulty_markers(markers: Markers) -> tuple[FaultyMarker, ...]:
     clean = np.where(frozen[:, :, None], np.nan, markers.xyz)
     found = [_faulty(label, MarkerFault.FROZEN, frozen[:, k], float("nan")) for k, label in enumerate(markers.names)]
     step = 1 / markers.rate if markers.time.size > 1 else np.nan
-    for k in np.flatnonzero(_suspects(clean, step)):
+    off = [_off_its_way(clean, frames)[0].max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
+    for k in np.flatnonzero(np.max(off, axis=0) > _limit(step)):
         jumps, size = _spikes(clean[:, k], step)
         found.append(_faulty(markers.names[k], MarkerFault.SPIKE, jumps, size))
     return tuple(one for one in found if one.spans)
@@ -173,12 +174,6 @@ def _off_its_way(xyz: Array, frames: int) -> tuple[Array, Array]:
 def _limit(step: float) -> float:
     """Return how far (m) a marker must be off its way, for frames every ``step`` s."""
     return max(_OFF, _FASTER * step**2)
-
-
-def _suspects(xyz: Array, step: float) -> Mask:
-    """Return (K,) which markers are off their way anywhere."""
-    off = [_off_its_way(xyz, frames)[0].max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
-    return np.asarray(np.max(off, axis=0) > _limit(step))
 
 
 def _spikes(path: Array, step: float) -> tuple[Mask, float]:

@@ -168,7 +168,10 @@ def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:
     """Return the instants (S,) s at which rows of markers (S, K, 3) m with ``stamps`` (S,) s were seen, on the grid of
     the cameras, and a sentence on it; the stamps and "" where their steps are even, or no grid is told.
     """
-    rows = _without_holes(stamps)
+    holes = np.flatnonzero(np.diff(stamps) > 10 * np.median(np.diff(stamps))) + 1
+    edges = [0, *holes.tolist(), stamps.size]
+    longest = int(np.argmax(np.diff(edges)))
+    rows = slice(edges[longest], edges[longest + 1])
     paths = _paths(xyz[rows]) if time_axis(stamps, where="").sampled and rows.stop - rows.start >= _FEWEST else None
     grid = None if paths is None else _on_grid(stamps[rows], paths)
     if grid is None:
@@ -181,14 +184,6 @@ def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:
         f"The rows were stamped when they arrived: what all markers share of their errors puts them on the frames of "
         f"cameras at {rate:.5g} Hz, {off:.2g} ms (RMS) from their stamps, and these instants were taken."
     )
-
-
-def _without_holes(stamps: Array) -> slice:
-    """Return the longest run of rows without a hole of more than ten steps."""
-    holes = np.flatnonzero(np.diff(stamps) > 10 * np.median(np.diff(stamps))) + 1
-    edges = [0, *holes.tolist(), stamps.size]
-    longest = int(np.argmax(np.diff(edges)))
-    return slice(edges[longest], edges[longest + 1])
 
 
 def _paths(xyz: Array) -> Array | None:

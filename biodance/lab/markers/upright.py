@@ -99,15 +99,11 @@ def steady_mass(
     """Return the mass in kg that a wrench carries in its longest quiet part, by default within 3 % for 0.4 s; None
     without one.
     """
-    quiet = _longest_steady(_blocks(wrench.force[:, 2], wrench.rate), rules or StandingRules())
-    return float(quiet.mean() / gravity) if quiet is not None else None
-
-
-def _blocks(vertical: Array, rate: float) -> Array:
-    """Return the vertical force averaged over blocks of 0.05 s."""
-    size = max(1, round(_BLOCK * rate)) if np.isfinite(rate) else 1
+    vertical = wrench.force[:, 2]
+    size = max(1, round(_BLOCK * wrench.rate)) if np.isfinite(wrench.rate) else 1
     count = vertical.size // size
-    return vertical[: count * size].reshape(count, size).mean(axis=1)
+    quiet = _longest_steady(vertical[: count * size].reshape(count, size).mean(axis=1), rules or StandingRules())
+    return float(quiet.mean() / gravity) if quiet is not None else None
 
 
 def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:

@@ -224,7 +224,9 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
             history.append(f"plate{number} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out.")
             continue
         decisions = (f"Columns {load.columns}, along the axes of the markers.", empty, said, about)
-        corners = _around(np.concatenate([cop, feet.middle]) if own and feet is not None else cop)
+        points = np.concatenate([cop, feet.middle]) if own and feet is not None else cop
+        (x0, y0), (x1, y1) = np.nanmin(points, axis=0) - _MARGIN, np.nanmax(points, axis=0) + _MARGIN
+        corners = np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
         name, put = f"plate{number}", shift if own else None
         plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
     return _TablePlates(tuple(plates), tuple(history))
@@ -255,12 +257,6 @@ def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
     told = np.isfinite(beside).all(axis=1)
     best = told & feet.standing if (told & feet.standing).any() else told
     return np.asarray(np.median(beside[best], axis=0)) if best.any() else None
-
-
-def _around(points: Array) -> Array:
-    """Return the corners (4, 3) m around points (n, 2) on the floor, counter-clockwise seen from above."""
-    (x0, y0), (x1, y1) = np.nanmin(points, axis=0) - _MARGIN, np.nanmax(points, axis=0) + _MARGIN
-    return np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
 
 
 def _lacking(numbers: Sequence[int], feet: _Feet | None, shift: Array | None) -> str:

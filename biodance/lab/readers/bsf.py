@@ -98,7 +98,10 @@ def _parse_bsf(content: bytes, path: Path) -> _BsfContent:
             )
         block = data[:, first[i] : first[i] + 6].astype(float)
         factor = _counts_to_pounds(header, i + 1, path) if version == 100 else np.ones(6)
-        plates.append(_plate(header, block * factor * _IMPERIAL))
+        model = bytes(header["model"]).split(b"\0")[0].decode("latin-1").strip()
+        size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
+        offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
+        plates.append(_BsfPlate(model, int(header["serial"]), size, offset, distance, block * factor * _IMPERIAL))
     return _BsfContent(version, float(rate), main, tuple(plates), sum(channels[int(main["plates"]) :]))
 
 
@@ -181,13 +184,6 @@ def _counts_to_pounds(header: Any, number: int, path: Path) -> Array:
             f"calibration in NetForce and save again."
         )
     return _MICROVOLT / product
-
-
-def _plate(header: Any, load: Array) -> _BsfPlate:
-    model = bytes(header["model"]).split(b"\0")[0].decode("latin-1").strip()
-    size = (float(header["width"]) * INCH, float(header["length"]) * INCH)
-    offset, distance = header["offset"].astype(float) * INCH, header["distance"].astype(float) * INCH
-    return _BsfPlate(model, int(header["serial"]), size, offset, distance, load)
 
 
 _LIGHTEST, _HEAVIEST = 10.0, 300.0  # kg

@@ -49,14 +49,6 @@ def balls(body: Body) -> Balls:
     return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
 
 
-def _ball_quaternion(angles: Array, sign: Array) -> Array:
-    """Return the quaternion (4, G, B) of Cardan angles (3, G, B) rad."""
-    half = 0.5 * sign * angles
-    (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
-    c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
-    return np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23])
-
-
 def continued(quaternion: Array) -> Array:
     """Return unit quaternions (4, ..., B), components first, of ``quaternion`` (4, ..., B) without jumps of sign along
     the last axis.
@@ -135,7 +127,10 @@ class Chart:
         """
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
-        ball = continued(_ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
+        half = 0.5 * self.joints.sign * self.joints.angles_of(angles)
+        (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
+        c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
+        ball = continued(np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23]))
         return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
 
     def split(self, stacked: Array) -> Smooth:

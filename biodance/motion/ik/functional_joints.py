@@ -95,7 +95,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
-    shows = _marker_distance(scaling, postures, fresh) < _NO_POSTURE
+    body = scaling.with_centres(scaling.centres)[0]
+    place = poses(body, fresh.q).points(list(body.markers.segment), body.markers.position)
+    shows = np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)) < _NO_POSTURE
     if not shows.any():
         raise TrialRefused(_NOBODY)
     if not shows.all():
@@ -116,7 +118,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _Functiona
         if wrong.marker:
             joint = _pulled(scaling, found, wrong.marker)
             spared[joint] = wrong.marker, float(np.linalg.norm(found.theta[own_centre(joint)]))
-            postures = _without(postures, wrong.marker)
+            xyz = np.array(postures.xyz)
+            xyz[:, postures.names.index(wrong.marker)] = np.nan
+            postures = replace(postures, xyz=xyz)
         else:
             scaling = replace(scaling, centres=doubted(scaling.centres, (*scaling.centres.contradicted, wrong.joint)))
             shown[own_unknowns(wrong.joint)] = True
@@ -148,13 +152,6 @@ def _inside_the_body(
         start = evaluate_joints(scaling, postures, theta, start.q, noise=noise)
 
 
-def _marker_distance(scaling: Scaling, postures: Markers, found: CalibrationState) -> Array:
-    """Return the RMS distance (T,) m of the markers of every posture from the body that follows them best."""
-    body = scaling.with_centres(scaling.centres)[0]
-    place = poses(body, found.q).points(list(body.markers.segment), body.markers.position)
-    return np.asarray(np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)))
-
-
 _NOBODY = (
     f"In every frame of the moving trials the markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS), so "
     "the joints stay where the static trial puts them. Are the labels right, and is it the same person?"
@@ -168,13 +165,6 @@ def _not_shown(shows: NDArray[np.bool_]) -> str:
         f"markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS). Look at the trials with the largest "
         "marker distance: labels, gaps, jumps."
     )
-
-
-def _without(postures: Markers, name: str) -> Markers:
-    """Return the postures with one marker hidden."""
-    xyz = np.array(postures.xyz)
-    xyz[:, postures.names.index(name)] = np.nan
-    return replace(postures, xyz=xyz)
 
 
 def _pulled(scaling: Scaling, found: CalibrationState, marker: str) -> str:

@@ -198,7 +198,9 @@ def beside_sliding_skin(
     kept = np.flatnonzero(body.markers.weight > 0)
     markers = at.left_open(_places(body, at.pose, kept))
     angles = (found.q[found.solved] - stand)[:, body.nq - len(body.joints) :]
-    slides = _slides(body, markers, angles, kept)
+    beside = np.repeat(neighbours(body)[:, list(body.markers.segment)][:, kept] > 0, 3, axis=1)
+    parts = [markers[:, :, near] * angle[:, None, None] for near, angle in zip(beside, angles.T, strict=True)]
+    slides = np.concatenate(parts, axis=2).reshape(markers.shape[0] * markers.shape[1], -1)
     rows = np.concatenate([markers, joints, at.residual[..., None]], axis=2).reshape(len(slides), -1)
     every, shared, own = rows.T @ rows, slides.T @ rows, slides.T @ slides
     left = _without_slides(every, shared, own, 1.0)[-1, -1] / (np.count_nonzero(at.rows) - len(angles) * body.nv)
@@ -226,15 +228,6 @@ def _places(body: Body, pose: Poses, kept: Index) -> Array:
     for place, marker in enumerate(kept):
         own[:, marker, :, place] = pose.rotation[:, body.markers.segment[marker]]
     return own.reshape(len(own), -1, 3 * len(kept))
-
-
-def _slides(body: Body, markers: Array, angles: Array, kept: Index) -> Array:
-    """Return (T r, s): the columns ``markers`` (T, r, 3K) of the ``kept`` ones times every one of the ``angles`` (T, n)
-    beside their segments.
-    """
-    beside = np.repeat(neighbours(body)[:, list(body.markers.segment)][:, kept] > 0, 3, axis=1)
-    parts = [markers[:, :, near] * angle[:, None, None] for near, angle in zip(beside, angles.T, strict=True)]
-    return np.concatenate(parts, axis=2).reshape(markers.shape[0] * markers.shape[1], -1)
 
 
 @dataclass(frozen=True, eq=False)
