@@ -195,7 +195,7 @@ def plate_lines(session: Session) -> Iterator[str]:
     for plate, trial in plates.values():
         yield f"# [plates.{plate.name}] # as in {trial.name}"
         corners = [[round(float(x), 5) for x in corner] for corner in plate.corners]
-        yield f"# corners_m = {json.dumps(corners)} {_ORDER}"
+        yield f"# corners_m = {json.dumps(corners)} {_WRITTEN_ORDER}"
         if plate.type:
             yield f"# type = {plate.type} # of the C3D standard"
             yield from _channel_lines(*_channels_line(plate, trial))
@@ -205,7 +205,7 @@ def plate_lines(session: Session) -> Iterator[str]:
     raw, groups = hidden
     for number, columns in enumerate(groups, start=1):
         yield f"# [plates.plate{number}] # its channels are in {raw.path.name}, which does not describe it"
-        yield f"# corners_m = [[x, y, z], [x, y, z], [x, y, z], [x, y, z]] {_ORDER}"
+        yield f"# corners_m = [[x, y, z], [x, y, z], [x, y, z], [x, y, z]] {_WRITTEN_ORDER}"
         yield f"# type = {2 if len(columns) == 6 else 3} # of the C3D standard"
         yield from _channel_lines([raw.analog_labels[column] for column in columns], (1.0,) * len(columns))
         yield from _use_lines()
