@@ -163,7 +163,7 @@ def test_the_manifest_binds_the_parts_and_the_recordings(session: Path, tmp_path
     (session / "walk.c3d").write_bytes(b"exported again")
     found = check_results(out)
     assert found is not None
-    assert (found.changed, found.missing, found.foreign) == (("body.json",), ("subject.html",), ("motions.npz",))
+    assert (found.changed, found.missing) == (("body.json",), ("subject.html",))
     assert [Path(one).name for one in found.inputs_changed] == ["walk.c3d"]
     assert not found.whole
 

@@ -180,9 +180,9 @@ def _short(value: ParameterValue) -> str:
     return ", ".join(str(one) for one in (value if isinstance(value, list) else np.ravel(value, order="F"))[:4])
 
 
-def text_rows(content: bytes, header: Header, where: str, *, group: str, name: str) -> list[tuple[int, int]]:
-    """Return byte position and width of every string of the text parameter ``group``:``name`` and its continuations
-    NAME2, NAME3 ...
+def label_rows(content: bytes, header: Header, where: str) -> list[tuple[int, int]]:
+    """Return byte position and width of every label of a point: POINT:LABELS and its continuations LABELS2,
+    LABELS3 ...
 
     Raises
     ------
@@ -197,12 +197,12 @@ def text_rows(content: bytes, header: Header, where: str, *, group: str, name: s
         at, number, word, value = _record(section, here, header.processor, where)
         if value is None:
             numbers[number] = word
-        elif isinstance(value, list) and word.rstrip("0123456789") == name:
+        elif isinstance(value, list) and word.rstrip("0123456789") == "LABELS":
             first = here + 2 + abs(int(np.int8(np.uint8(section[here])))) + 2
             found.append((number, first, section[first : first + 2 + section[first + 1]]))
     rows = []
     for number, first, head in found:
-        if numbers.get(number) == group and head[1] >= 1:
+        if numbers.get(number) == "POINT" and head[1] >= 1:
             width, count = head[2], math.prod(head[3:])
             rows += [(first + len(head) + i * width, width) for i in range(count)]
     return rows

@@ -14,7 +14,7 @@ import numpy as np
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.c3d.layout import Layout, texts
-from biodance.lab.c3d.parameters import read_header, text_rows
+from biodance.lab.c3d.parameters import label_rows, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_raw, split_label
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import write_new
@@ -277,7 +277,7 @@ def _exchange_points(
 def _rename(content: bytearray, source: Path, names: Mapping[str, str]) -> None:
     """Write other ``names`` over the labels of points."""
     header = read_header(bytes(content), str(source))
-    for start, width in text_rows(bytes(content), header, str(source), group="POINT", name="LABELS"):
+    for start, width in label_rows(bytes(content), header, str(source)):
         prefix, name = split_label(content[start : start + width].decode("latin-1").split("\0")[0])
         if name in names:
             label = f"{prefix}:{names[name]}" if prefix else names[name]

@@ -86,7 +86,7 @@ def read(path: Path, *, role: Role, subject: str | None = None, told: Told | Non
     )
     history = (
         *cells.said,
-        *_columns_said(columns, cells),
+        *_columns_said(columns),
         *timed,
         *lengths,
         *unseen,
@@ -161,7 +161,7 @@ def _markers(cells: Cells, columns: TableColumns, stamps: Array, path: Path) -> 
     return Markers(names, stamps, markers.xyz @ turn.T), said, turn
 
 
-def _columns_said(columns: TableColumns, cells: Cells) -> list[str]:
+def _columns_said(columns: TableColumns) -> list[str]:
     some = list(columns.markers)
     said = [f"{len(some)} markers ({some[0]} ... {some[-1]}), {len(columns.plates)} force plates by their labels."]
     if columns.others:

@@ -40,15 +40,14 @@ class _Manifest:
 
 @dataclass(frozen=True)
 class _Verified:
-    """A results folder beside its manifest: files of the run that are ``missing`` or ``changed``, those that are
-    ``foreign`` to it, and the recordings that are not as they were read (``inputs_changed``).
+    """A results folder beside its manifest: files of the run that are ``missing`` or ``changed``, and the recordings
+    that are not as they were read (``inputs_changed``).
     """
 
     folder: Path
     manifest: _Manifest
     missing: tuple[str, ...]
     changed: tuple[str, ...]
-    foreign: tuple[str, ...]
     inputs_changed: tuple[str, ...]
 
     @property
@@ -113,10 +112,7 @@ def check_results(folder: Path) -> _Verified | None:
     changed = (name for name in sorted(there & set(known)) if file_hash(folder / name) != known[name])
     recordings = ((Path(manifest.session) / name, sha) for name, sha in sorted(manifest.inputs.items()))
     other = (str(path) for path, sha in recordings if not path.is_file() or file_hash(path) != sha)
-    return _Verified(
-        folder, manifest, tuple(sorted(set(known) - there)), tuple(changed), tuple(sorted(there - set(known))),
-        tuple(other),
-    )  # fmt: skip
+    return _Verified(folder, manifest, tuple(sorted(set(known) - there)), tuple(changed), tuple(other))
 
 
 def results_below(place: Path) -> tuple[Path, ...]:

@@ -324,7 +324,7 @@ rise.
 
 
 @compiled
-def _held_at(chain, q, at, g, held):
+def _held_at(chain, q, g, held):
     """Mark the coordinates that a limit holds because the cost would fall beyond it."""
     first, roots = q.shape[0] - chain.parent.shape[0], chain.roots
     for i in range(g.shape[0]):
@@ -440,7 +440,7 @@ def minimise_frames(chain, xyz, weight, frames, found, tolerance, steps):
         cost[f] = add_up(chain, seen, w, now, at)
         for step in range(steps + 1):
             gradient(chain, at, g)
-            _held_at(chain, now, at, g, held)
+            _held_at(chain, now, g, held)
             turn_balls(chain, at, g, held, cardan, turning)
             slope[f], found.steps[f] = _largest_slope(chain, at, g, held), step
             if slope[f] <= tolerance or step == steps:
