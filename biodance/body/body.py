@@ -269,10 +269,8 @@ class Body(JointTree, Sendable):
 
 
 _VERSION = 1
-_HEAVIEST = 1000.0
-"""kg of a whole body: people, and robots that stand on force plates."""
-_FARTHEST = 10.0
-"""m of a place in a segment, or of a joint from its parent."""
+_HEAVIEST = 1000.0  # kg of a whole body: people, and robots that stand on force plates
+_FARTHEST = 10.0  # m of a place in a segment, or of a joint from its parent
 
 
 def body_text(body: Body, source: str) -> str:

@@ -25,8 +25,7 @@ ROUNDNESS = 4.0
 """Exponent of the solid in a box, |x/a|^p + |y/b|^p + |z/c|^p = 1: 2 is an ellipsoid, infinity the box."""
 _HEAD, _SHOULDER = 0.7, 0.3
 """Of the height over the shoulders: the head from the vertex down, and how far the trunk reaches up (they meet)."""
-_HEAD_BREADTH, _HEAD_DEPTH = 0.68, 0.85
-"""Of the height of the head."""
+_HEAD_BREADTH, _HEAD_DEPTH = 0.68, 0.85  # Of the height of the head
 
 
 def box_solid(box: Array) -> "Trimesh":

@@ -163,10 +163,8 @@ def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
     return np.asarray(chosen / np.linalg.norm(chosen))
 
 
-_FEWEST_PEOPLE = 3
-"""People without whom there is no band."""
-_EVERY = 5
-"""% between two values of a band in a file."""
+_FEWEST_PEOPLE = 3  # People without whom there is no band
+_EVERY = 5  # % between two values of a band in a file
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,10 +230,8 @@ def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...
     return tuple(bands)
 
 
-_ENOUGH = 0.8
-"""Share of a cycle in which a moment or a power must be known."""
-_BEYOND = 0.05
-"""s before and behind a cycle that are looked at for its first and last per cent."""
+_ENOUGH = 0.8  # Share of a cycle in which a moment or a power must be known
+_BEYOND = 0.05  # s before and behind a cycle that are looked at for its first and last per cent
 
 
 def load_curves(
@@ -304,10 +300,8 @@ LOAD_PANELS = (
     *("hip_power", "knee_power", "ankle_power"),
 )
 """The same of moments and powers."""
-_KNOWN = 0.8
-"""Share of a cycle that must be known for its peaks."""
-_OF_STANCE = "foot_progression"
-"""Known while the foot stands only: its mean is told."""
+_KNOWN = 0.8  # Share of a cycle that must be known for its peaks
+_OF_STANCE = "foot_progression"  # Known while the foot stands only: its mean is told
 _INSTANTS: Mapping[str, tuple[str, str]] = {
     "gait": ("at_strike", "at_off"),
     "squat": ("at_start", "at_lowest"),
@@ -320,8 +314,7 @@ _TURNS: Mapping[str, str] = {"ankle": "ankle_dorsiflexion"}
 """Joint -> the angle that tells how fast it turns, where it is not its flexion."""
 
 
-_Curve = tuple[Cycle, str, str]
-"""Cycle, side and quantity of a curve."""
+_Curve = tuple[Cycle, str, str]  # Cycle, side and quantity of a curve
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ _THRESHOLD = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
 the same).
 """
-_SHORTEST = 0.05
-"""s: a shorter contact, or a shorter time without, is noise."""
+_SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
 
 
 @dataclass(frozen=True)
@@ -80,16 +79,14 @@ def _without_short(loaded: Mask, shortest: float) -> Mask:
 
 _SWING = 0.25
 """Of the leg's length: a foot that does not travel as far ahead of the other and back makes no step."""
-_APART = 0.5
-"""s between two strikes of one foot, at least."""
+_APART = 0.5  # s between two strikes of one foot, at least
 _STRIKES, _LEAVES = 0.8, 0.6
 """Of the ground's speed under the pelvis. With them 57 strikes and 59 leavings of seven children, which their lab
 set by hand and force, are met to -4 and 0 ms in the mean (sd 15, 16 ms); with Zeni's extremes to -34 and +20 ms.
 """
 _EVENT_CUTOFF = 8.0
 """Hz of the low-pass on the paths of the feet, of which only the extremes are looked for."""
-_TOGETHER = 0.1
-"""s: events of force and of markers that are nearer than this are one event."""
+_TOGETHER = 0.1  # s: events of force and of markers that are nearer than this are one event
 
 
 def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
@@ -190,10 +187,8 @@ _PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
 """Our angle -> the label (with L or R before it) and component of plug-in gait's, where both have the same positive
 sense. Its knee has two more angles, which ours has not; the turn of its foot is that of a line, not of a body.
 """
-_NEAR_EVENT = 0.15
-"""s within which an event of ours and one of the file are the same."""
-_FEWEST = 20
-"""Frames without which nothing is compared."""
+_NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
+_FEWEST = 20  # Frames without which nothing is compared
 
 
 @dataclass(frozen=True)
@@ -260,18 +255,13 @@ def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple
 _CycleKind = Literal["gait", "squat", "sit_to_stand"]
 PERCENT = np.linspace(0.0, 100.0, 101)
 """% of a cycle at which its curves are given."""
-_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5
-"""s of a gait cycle."""
-_DEEP = 0.15
-"""Of the leg's length by which the pelvis goes down in a squat, at least."""
-_UP = 0.1
-"""Of a repetition's depth within which the pelvis counts as up."""
+_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5  # s of a gait cycle
+_DEEP = 0.15  # Of the leg's length by which the pelvis goes down in a squat, at least
+_UP = 0.1  # Of a repetition's depth within which the pelvis counts as up
 _SEATED = 0.03
 """m that the centre of mass lies behind the heels of somebody who sits: standing so, one falls."""
-_MOVES = 0.05
-"""m/s of the centre of mass from which a rise has begun."""
-_SLIDES = 0.1
-"""m that a foot may travel in a squat or a rise."""
+_MOVES = 0.05  # m/s of the centre of mass from which a rise has begun
+_SLIDES = 0.1  # m that a foot may travel in a squat or a rise
 
 
 @dataclass(frozen=True)
@@ -359,10 +349,8 @@ def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
     return np.asarray(behind > _SEATED)
 
 
-_BELT = 0.15
-"""m/s of a standing foot from which the ground is a belt."""
-_FLAT = (20.0, 40.0)
-"""% of a cycle in which the foot stands flat and tells how fast the ground moves."""
+_BELT = 0.15  # m/s of a standing foot from which the ground is a belt
+_FLAT = (20.0, 40.0)  # % of a cycle in which the foot stands flat and tells how fast the ground moves
 STRIDE_UNITS: Mapping[str, str] = {
     "cadence": "steps/min",
     "speed": "m/s",

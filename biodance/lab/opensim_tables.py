@@ -150,8 +150,7 @@ def _parts(path: Path) -> _Parts:
 
 
 _VECTORS_READ = "Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z."
-_BRACKETS = str.maketrans("", "", "~()[] ")
-"""What some writers put around the numbers of one cell."""
+_BRACKETS = str.maketrans("", "", "~()[] ")  # What some writers put around the numbers of one cell
 _OF_PLATE = {"f": "v", "p": "p", "m": "m"}
 """Force, point and moment of plate N are fN, pN, mN in the tables that OpenSim makes of C3D files."""
 

@@ -13,8 +13,7 @@ from pathlib import Path
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
 
-_LARGEST = 2**31
-"""Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
+_LARGEST = 2**31  # Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB
 LARGEST_NUMBER = 1e12
 """In any unit: of what cameras and plates record nothing comes near, and squares of it can still be computed with."""
 _TEXT_LOOKS_BINARY = b"\x00"

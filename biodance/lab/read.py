@@ -22,14 +22,11 @@ from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
 from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
 
-_FEWEST = 4
-"""Markers that must be seen; fewer may rest on something, or be rounded to the same digits."""
-_LASTING = 5
-"""Frames in a row; shorter runs come from a slower camera whose frames were repeated."""
+_FEWEST = 4  # Markers that must be seen; fewer may rest on something, or be rounded to the same digits
+_LASTING = 5  # Frames in a row; shorter runs come from a slower camera whose frames were repeated
 _ABRUPT = 0.5
 """Share of the step beside it (m a frame) that the last step before a rest or the first behind it has at least."""
-_FELT = 1e-5
-"""m: smaller steps are the last digits of a computed movement."""
+_FELT = 1e-5  # m: smaller steps are the last digits of a computed movement
 
 
 def frozen_frames(xyz: Array) -> Mask:
@@ -86,8 +83,7 @@ def without_frozen(trial: Trial) -> Trial:
 
 
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
-_HEAD = 8192
-"""Bytes of a file that are looked at to find its reader."""
+_HEAD = 8192  # Bytes of a file that are looked at to find its reader
 
 
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:

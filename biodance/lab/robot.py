@@ -20,10 +20,8 @@ _TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
 _LONGEST_GAP = 0.1
 """s without a sample over which angles are not interpolated: a joint moves visibly in it."""
-_TURN = 2 * np.pi
-"""rad: no joint of a humanoid turns further; larger numbers are degrees or counts."""
-_BEYOND = 0.35
-"""rad beyond a joint's range that an encoder may show: stops give, zeros are set by hand."""
+_TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers are degrees or counts
+_BEYOND = 0.35  # rad beyond a joint's range that an encoder may show: stops give, zeros are set by hand
 
 
 def _column_names(path: Path) -> tuple[str, ...]:

@@ -30,20 +30,17 @@ from biodance.motion.soles import (
 from biodance.records import SIDES, Array, LeftOut, Mask, Plate, Trial, Wrench, runs
 from biodance.settings import ContactRules
 
-_SHORTEST_FLIGHT = 0.05
-"""s: in less the parabola of the markers cannot be seen."""
+_SHORTEST_FLIGHT = 0.05  # s: in less the parabola of the markers cannot be seen
 _FALLS = 0.6
 """Downward acceleration, in g, from which the markers fall freely. Whatever carries somebody makes the fall slower; the
 swing of the limbs leaves 0.95 to 1.1 for the mean of markers all over the body, 0.97 to 1.45 for those of the pelvis
 (legs that swing up push it down), which runners marked on the legs alone need: the mean of their markers is the legs'.
 """
-_PARABOLA = 0.005
-"""m, RMS, by which the mean of the markers may leave the parabola (limbs move)."""
+_PARABOLA = 0.005  # m, RMS, by which the mean of the markers may leave the parabola (limbs move)
 _LACKS, _ENDS = 0.15, 0.05
 """Share of the weight that the plates lack while something else carries, and under which it has ended. In clean squats
 and walks they lack less for more than half of `_LASTING`."""
-_LASTING = 0.4
-"""s, at least, that something else carries: delays and impacts are over sooner."""
+_LASTING = 0.4  # s, at least, that something else carries: delays and impacts are over sooner
 _PLAIN = 1.0
 """s of other times that must agree: a trunk goes otherwise than the whole body for as long as one bend lasts."""
 _RIGHT = 0.1
@@ -216,15 +213,11 @@ def _unmeasured_notes(measured: Mask, found: Sequence[_Unmeasured]) -> tuple[str
 
 _SLOWEST = 0.2
 """m/s: a slower belt is none; feet creep that much in standing and at the edges of stance."""
-_RIGID = 0.25
-"""m/s: a sole whose points move more evenly than this lies flat on something."""
-_LOW = 0.03
-"""m over its lowest height in which a sole stands."""
-_EVEN = 0.15
-"""m/s around the median in which most flat soles move on a belt of constant speed."""
+_RIGID = 0.25  # m/s: a sole whose points move more evenly than this lies flat on something
+_LOW = 0.03  # m over its lowest height in which a sole stands
+_EVEN = 0.15  # m/s around the median in which most flat soles move on a belt of constant speed
 _MOST = 0.6
-_FEWEST = 10
-"""Frames of flat soles that tell a belt."""
+_FEWEST = 10  # Frames of flat soles that tell a belt
 
 
 def belts(trial: Trial, soles: Soles, load: Mask) -> tuple[Array, tuple[str, ...]]:

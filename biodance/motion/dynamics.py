@@ -217,8 +217,7 @@ def wrench_of_segments(body: Body, move: SegmentMotion, phi: Array) -> Array:
     return value
 
 
-_LEAST_FRAMES = 3
-"""A correlation of fewer frames says nothing."""
+_LEAST_FRAMES = 3  # A correlation of fewer frames says nothing
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,10 +24,8 @@ from biodance.records import SIDES, Array, Markers, Motion, Wrench, runs
 from biodance.records.motion import Encoders
 from biodance.spatial import cross, elementary_rotation, rigid_fit, skew, wrench_about_point
 
-_LEAST = 3
-"""Markers that fix a posture."""
-_FAR = 0.02
-"""m RMS: markers so far from where they are said to be are not those."""
+_LEAST = 3  # Markers that fix a posture
+_FAR = 0.02  # m RMS: markers so far from where they are said to be are not those
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +99,7 @@ the second where a step is so low that the first does not see it.
 """
 _AROUND = 0.25
 """s around a change of the standing foot that do not count: what the soles are off shows as a jump there."""
-_SHORT = 0.5
-"""s: shorter stances are looked over."""
+_SHORT = 0.5  # s: shorter stances are looked over
 RATE = 100.0
 """Hz at which motion and wrench are compared."""
 
@@ -324,10 +321,8 @@ def _quaternions(rotation: Array) -> Array:
 # which half of the shorter recording overlaps are tried at once (fast Fourier transform, gaps masked: Padfield 2012,
 # doi:10.1109/TIP.2011.2181402).
 
-_OVERLAP = 0.5
-"""Share of the shorter recording that must overlap."""
-_MOVES = 0.002
-"""m: centres of pressure that stay nearer than this (sd) tell no time."""
+_OVERLAP = 0.5  # Share of the shorter recording that must overlap
+_MOVES = 0.002  # m: centres of pressure that stay nearer than this (sd) tell no time
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,9 @@ TELLS = 0.7
 23 clean trials of 15 laboratories 0.9 to 0.999."""
 _BAND = LowPass(order=2, cutoff=6.0)
 """Of force and acceleration: steps and squats are below (Winter 2009, chapter 3), impacts of single limbs above."""
-_FARTHEST, _STEP = 0.5, 0.002
-"""s: how late or early a force is looked for, and in which steps."""
-_EDGE = 0.1
-"""s at each end of the markers, which the low-pass makes up."""
-_LEAST = 0.25
-"""s without a break that are looked at."""
+_FARTHEST, _STEP = 0.5, 0.002  # s: how late or early a force is looked for, and in which steps
+_EDGE = 0.1  # s at each end of the markers, which the low-pass makes up
+_LEAST = 0.25  # s without a break that are looked at
 _MOVES = 0.01
 """Share of the mean force by which it must swing to show an instant: 0.3 mm of noise in each of eight markers is 0.7 %
 of g at 4 Hz."""

@@ -22,14 +22,11 @@ from biodance.records import Array, Index, Markers
 
 NEED = 0.020
 """m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
-_ONCE_WIDER = 0.015
-"""m: the same for a body that was found too stiff elsewhere."""
+_ONCE_WIDER = 0.015  # m: the same for a body that was found too stiff elsewhere
 _NEARER = 0.9
 """A joint is taken if the markers left out lie nearer than this share of their distance without it."""
-_FRAMES, _TRIALS = 48, 6
-"""Frames of all trials together that are looked at, and trials, evenly chosen."""
-_RIDGE = 1e-6
-"""Of the mean squared lever: keeps what no marker shows where it is."""
+_FRAMES, _TRIALS = 48, 6  # Frames of all trials together that are looked at, and trials, evenly chosen
+_RIDGE = 1e-6  # Of the mean squared lever: keeps what no marker shows where it is
 _TELLING = {
     "neck": ("head",),
     "forearms": ("forearm_hand", "hand"),

@@ -91,8 +91,7 @@ def soles_from_body(body: Body, motion: Motion) -> Soles:
     return Soles(motion.time, outline)
 
 
-_UNDER = 0.03
-"""m: a centre of pressure so near to a sole is under it."""
+_UNDER = 0.03  # m: a centre of pressure so near to a sole is under it
 
 
 def inside(plate: Plate, points: Array) -> Array:
@@ -151,12 +150,10 @@ def distance_to_hull(point: Array, points: Array) -> Array:
     return distance
 
 
-_SAME_LEVEL = 0.05
-"""m: heights closer than this are one surface."""
+_SAME_LEVEL = 0.05  # m: heights closer than this are one surface
 _MARKER_HEIGHT = 0.20
 """m: a point of a sole that stands on a plate is at most this far above it (foot markers sit lower)."""
-_ASYMMETRY = 0.02
-"""m: the two feet's points may be this differently high above the ground."""
+_ASYMMETRY = 0.02  # m: the two feet's points may be this differently high above the ground
 _CARRIED = 0.9
 """Share of the body weight on the plates above which a foot that rests elsewhere is held in the air."""
 
@@ -244,12 +241,10 @@ _RIM = 0.005
 """m of the outline's edge that carry nothing: a sole is rounded, and broadest above the ground."""
 _REACH = 0.09
 """m: a foot within this height of a plate is over that plate and not over one of another step."""
-_HALF = 0.3
-"""Share of the sole that must be over a raised plate."""
+_HALF = 0.3  # Share of the sole that must be over a raised plate
 _BLOCK = 1024
 """Frames whose points all over the soles are looked at together: little memory, whatever the length."""
-_RAISED = 0.05
-"""m that a plate stands out of everything around it to count as raised."""
+_RAISED = 0.05  # m that a plate stands out of everything around it to count as raised
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,11 +37,9 @@ from biodance.spatial import (
 )
 from biodance.threads import one_thread
 
-_DEGREE = 5
-"""Degree of the spline: continuous acceleration and jerk."""
+_DEGREE = 5  # Degree of the spline: continuous acceleration and jerk
 
-_PERIODS = 3
-"""Periods of the cut-off by which the ends are continued."""
+_PERIODS = 3  # Periods of the cut-off by which the ends are continued
 
 _LEAST_COSINE = 1e-3
 """Smallest |cos| of a ball joint's second angle that rates are divided by: bounded near the singularity."""
@@ -407,10 +405,8 @@ def _notes(body: Body, found: InverseKinematics) -> tuple[str, ...]:
 # that all markers share (stamps that jitter move all of them alike, and no misfit shows it): what markers move more
 # than they miss the body by in the fastest quarter of the spectrum, where nobody moves.
 
-_FASTEST = 0.375
-"""Of the rate: from here to half of it lies the fastest quarter of the spectrum."""
-_STEP = 0.1
-"""Hz between the cut-offs that are tried."""
+_FASTEST = 0.375  # Of the rate: from here to half of it lies the fastest quarter of the spectrum
+_STEP = 0.1  # Hz between the cut-offs that are tried
 
 
 def with_own_cutoff(trial: Trial, body: Body, markers: Markers) -> Trial:

@@ -60,10 +60,8 @@ LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
-"""What may differ between two sentences of one wording."""
-_FEW = 4
-"""Trials of one check that are told one by one."""
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")  # What may differ between two sentences of one wording
+_FEW = 4  # Trials of one check that are told one by one
 LIMIT_TOLD = ", should be "
 """Between the value of a check and its limit, in a sentence about it."""
 

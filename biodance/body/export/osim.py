@@ -21,8 +21,7 @@ from biodance.records import Array
 
 FORMAT = "osim"
 SUFFIX = ".osim"
-_GEOMETRY = "Geometry"
-"""Folder beside the model in which OpenSim looks for meshes."""
+_GEOMETRY = "Geometry"  # Folder beside the model in which OpenSim looks for meshes
 ROOT_ROTATIONS = ("tilt", "list", "rotation")
 _ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ROOT_TRANSLATIONS = ("tx", "ty", "tz")

@@ -25,8 +25,7 @@ from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject
 from biodance.settings import STANDARD_GRAVITY, Settings
 
-_COM_SIGMAS = 3.0
-"""Half width of a CoM box in prior standard deviations."""
+_COM_SIGMAS = 3.0  # Half width of a CoM box in prior standard deviations
 _LUMBAR_HEIGHT = 0.112 / 1.755
 """Stature: height over the hips of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II, 1.755 m)."""
 
@@ -58,8 +57,7 @@ def sole(skeleton: Skeleton, subject: Subject, side: str) -> Foot:
     return Foot(SEGMENTS.index(segment), np.insert(corners, 1, -skeleton.ankle_height[side], axis=1))
 
 
-_ADULT = (18.0, 65.0)
-"""years: the ages that the usual table speaks for."""
+_ADULT = (18.0, 65.0)  # years: the ages that the usual table speaks for
 
 
 def human(

@@ -206,8 +206,7 @@ def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, 
     return np.asarray(middle - distance * unit(back))
 
 
-_MARKER_DIAMETER = 0.014
-"""m, where the file does not say: the usual marker of plug-in gait."""
+_MARKER_DIAMETER = 0.014  # m, where the file does not say: the usual marker of plug-in gait
 _ASIS_BETWEEN, _LEG_BETWEEN = (-0.024, 0.054), (-0.040, 0.040)
 """m: how much farther apart markers are than a typed measure without a warning. The distance of the spines is typed of
 bone and marked on skin, which lies outside of it: 15 mm (sd 13) in 15 persons of 6 public laboratories, here with three

@@ -102,13 +102,10 @@ def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -
     return RigidInertia(volume, np.array([0.0, middle, 0.0]), np.diag([yy + zz, xx + zz, xx + yy]))
 
 
-_CONTRADICTION = 0.15
-"""Share of the body mass by which girths, or a scan, may miss it."""
+_CONTRADICTION = 0.15  # Share of the body mass by which girths, or a scan, may miss it
 _TRUNK = ("pelvis", "trunk_head")
-_HEAD = 0.16
-"""Of the stature: from the middle of the neck to the vertex."""
-_STEP = 0.01
-"""Of a girth: the step of a difference quotient."""
+_HEAD = 0.16  # Of the stature: from the middle of the neck to the vertex
+_STEP = 0.01  # Of a girth: the step of a difference quotient
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,7 @@ OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
 """The joints that a body may have beyond its 23 axes."""
 _ACROMION = 0.5
 """Half shoulder widths from the shoulder's centre: so near, markers of the trunk ride on the collar bone."""
-_BEYOND_WRIST = 0.03
-"""m: markers of the forearm so far beyond the wrist are worn on the hand."""
+_BEYOND_WRIST = 0.03  # m: markers of the forearm so far beyond the wrist are worn on the hand
 _HEAD_MARKERS = 3
 
 

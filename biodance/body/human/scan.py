@@ -18,8 +18,7 @@ from biodance.records import SIDES, Array
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-_ROUNDING = 1e-12
-"""m."""
+_ROUNDING = 1e-12  # m
 
 
 class _Section(NamedTuple):
@@ -100,15 +99,12 @@ def _first(values: Array, marked: Array) -> Array:
     return np.take_along_axis(values, index[..., None], axis=1)
 
 
-_TALL = 0.06
-"""Share by which a scan may be taller or smaller than the person: shoes, hair, a bent knee."""
+_TALL = 0.06  # Share by which a scan may be taller or smaller than the person: shoes, hair, a bent knee
 _UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
 _TURNED = {"z": "xyz", "y": "zxy", "x": "yzx"}
 """By the axis that points up: axes of the file in the order ahead or sideways, ahead or sideways, up."""
-_FOOT, _ANKLE = 0.02, 0.07
-"""Of the stature: heights through the feet, and over them."""
-_AHEAD = 0.01
-"""Of the stature: the feet reach ahead of the ankles by at least this much on average."""
+_FOOT, _ANKLE = 0.02, 0.07  # Of the stature: heights through the feet, and over them
+_AHEAD = 0.01  # Of the stature: the feet reach ahead of the ankles by at least this much on average
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,20 +206,16 @@ def _turned(path: str, corners: Array, stature: float) -> _Scan:
 _UP = np.array([0.0, 1.0, 0.0])
 _NECK = 0.16
 """Of the stature: from the vertex down to the middle of the neck, where the density changes."""
-_APART = np.radians(8.0)
-"""Least angle between a straight arm and the vertical."""
+_APART = np.radians(8.0)  # Least angle between a straight arm and the vertical
 _TILTS, _STEEPEST = 8, np.radians(35.0)
 """Planes tried at a shoulder, up to this angle from the vertical."""
 _INSIDE, _PLACES = 0.04, 5
 """Of the stature: how far inside the shoulder centre a plane may lie; how many places are tried."""
-_SHOULDER = 0.013
-"""Of the stature squared: a larger section through a shoulder cuts the trunk as well."""
+_SHOULDER = 0.013  # Of the stature squared: a larger section through a shoulder cuts the trunk as well
 _THICK = 0.05
 """Of the stature: flesh farther from the arm's axis towards the body is no arm: a broad hip."""
-_REACH = 0.15
-"""Share by which shoulder to finger tips may differ from the skeleton's arm."""
-_HAND = 0.108
-"""Of the stature: wrist to finger tips (Winter 2009)."""
+_REACH = 0.15  # Share by which shoulder to finger tips may differ from the skeleton's arm
+_HAND = 0.108  # Of the stature: wrist to finger tips (Winter 2009)
 
 
 @dataclass(frozen=True, eq=False)

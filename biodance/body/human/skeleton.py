@@ -204,8 +204,7 @@ in many places where the model has one joint, marker sets turn the axes, and ski
 """
 _HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
 """Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
-_SPARE = np.radians(5.0)
-"""rad: how far a joint range is widened beyond the angle of the static trial."""
+_SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
 
 
 def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:

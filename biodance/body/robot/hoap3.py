@@ -27,16 +27,13 @@ _CARRIES = {
     "elbow_pitch": "forearm_hand",
 }
 """The last joint before each segment."""
-_SPEED = 1.0
-"""rad/s, the limit that Bonnet 2016 used for this robot."""
+_SPEED = 1.0  # rad/s, the limit that Bonnet 2016 used for this robot
 _LEG_BASE, _ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
 """m: where legs start in the pelvis (ISB axes) and arms in the trunk (forwards, left, up); Fujitsu, table 6.1-2."""
-_SHOULDER = 0.111
-"""m, from the middle to either shoulder."""
+_SHOULDER = 0.111  # m, from the middle to either shoulder
 _ANKLE_HEIGHT, _SOLE_AHEAD, _SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
 """m: sole under the ankle, from heel to toe, half its width about its middle line."""
-_COM_SD = 0.010
-"""m, prior standard deviation of every centre of mass; the others in `robot_prior`."""
+_COM_SD = 0.010  # m, prior standard deviation of every centre of mass; the others in `robot_prior`
 
 
 def hoap3() -> Body:

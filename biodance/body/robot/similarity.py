@@ -127,10 +127,8 @@ _RELATIVE_MASS_SD, _RELATIVE_INERTIA_SD = 0.15, 0.30
 """Of every segment: covers, cables and cards come and go (judgement; Bonnet 2016 finds 0.4 kg of 8 kg in all)."""
 POINT = 1e-6
 """m: links with a smaller radius of gyration are point masses, as some files write them."""
-_ROUNDING = 1e-4
-"""Of the largest moment of inertia: numbers of a file are rounded."""
-_COM_SD = 0.2
-"""m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3."""
+_ROUNDING = 1e-4  # Of the largest moment of inertia: numbers of a file are rounded
+_COM_SD = 0.2  # m of CoM per m of radius of gyration: 10 mm for the links of HOAP-3
 
 
 def robot_covariance(lumps: list[RigidInertia], com_sd: list[float]) -> Array:

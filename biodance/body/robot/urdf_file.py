@@ -63,12 +63,10 @@ def _mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
     return np.asarray(corners)
 
 
-_FLAT = 0.0005
-"""m: corners of a foot of boxes this near to the plane of its sole belong to it."""
+_FLAT = 0.0005  # m: corners of a foot of boxes this near to the plane of its sole belong to it
 _LAYER = 0.002
 """m: corners of a mesh this near to its lowest plane belong to the sole; meshes have rounded edges."""
-_STEEPEST = 0.5
-"""Cosine of the largest angle between a sole and the ground at zero joint angles."""
+_STEEPEST = 0.5  # Cosine of the largest angle between a sole and the ground at zero joint angles
 CORNERS = 12
 """A sole keeps at most so many corners, those that leave it largest, all on its outline: support is not overrated."""
 
@@ -160,12 +158,9 @@ def _refined(outline: Array, count: int) -> Array:
     return outline
 
 
-_KINDS = ("revolute", "continuous", "fixed")
-"""Types of joints that a body can have."""
-_TURN = np.pi
-"""rad: range of a continuous joint to either side."""
-_X = np.array([1.0, 0.0, 0.0])
-"""Axis of a joint that names none."""
+_KINDS = ("revolute", "continuous", "fixed")  # Types of joints that a body can have
+_TURN = np.pi  # rad: range of a continuous joint to either side
+_X = np.array([1.0, 0.0, 0.0])  # Axis of a joint that names none
 
 
 @dataclass(frozen=True, eq=False)

@@ -303,8 +303,7 @@ def study_masses(name: str, subject: Subject) -> dict[str, float]:
 
 
 _AXES = "xyz"
-_FULL = 0.02
-"""How far the masses of a complete table may sum from the whole body, as a share."""
+_FULL = 0.02  # How far the masses of a complete table may sum from the whole body, as a share
 
 
 def _completed(table: SegmentTable, subject: Subject, base: Reference) -> Reference:

@@ -56,8 +56,7 @@ def read_numbers(content: bytes, layout: Layout) -> _Numbers:
     return points, analog
 
 
-_PATIENCE = 60.0
-"""s after which the child is given up."""
+_PATIENCE = 60.0  # s after which the child is given up
 READ = """
 import io, sys, warnings
 import ezc3d, numpy
@@ -150,8 +149,7 @@ _PERSON = 1.5
 raised.
 """
 
-_PLATE = 0.6
-"""m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets."""
+_PLATE = 0.6  # m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
 
 _CORNERS = ("FORCE_PLATFORM", "CORNERS")
 _BELIEVABLE = (0.05, 4.75)
@@ -213,8 +211,7 @@ def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
     return math.nan, _PERSON, ""
 
 
-_FRAMES = 4096
-"""Frames looked at at once: little memory, however long the recording."""
+_FRAMES = 4096  # Frames looked at at once: little memory, however long the recording
 
 _GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
 """Parameters of POINT in which the results are listed; POINT:TYPE_GROUPS may name more."""

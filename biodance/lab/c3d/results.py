@@ -21,10 +21,8 @@ from biodance.lab.plain_text import write_new
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import Array, assign, frozen_array
 
-_PATIENCE = 300.0
-"""s after which the child is given up."""
-_NEAR = 0.1
-"""s: an event that the file has already within this time is not written again."""
+_PATIENCE = 300.0  # s after which the child is given up
+_NEAR = 0.1  # s: an event that the file has already within this time is not written again
 _Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
 _UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"}
 """Unit of a kind of results where the parameter of POINT (`_unit_name`) declares none."""

@@ -19,8 +19,7 @@ from biodance.spatial import wrench_about_point
 FileValue = str | Sequence[str] | ArrayLike
 _FileParameters = Mapping[str, Mapping[str, FileValue]]
 
-_MOST = 255
-"""The longest dimension of a parameter: one byte tells it."""
+_MOST = 255  # The longest dimension of a parameter: one byte tells it
 _MM = 1000.0
 _CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
 """What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""

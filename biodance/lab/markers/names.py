@@ -17,8 +17,7 @@ from biodance.records import SIDES
 
 _SHARED = 0.8
 """Share of the labels that begin alike before the beginning is taken for the subject's name."""
-_PAIRS = 2
-"""Pairs of mirror images that make a way to say the side one of this set."""
+_PAIRS = 2  # Pairs of mirror images that make a way to say the side one of this set
 _UNLABELLED = re.compile(r"^(\*\s*\d*|u\d+|(un(label|name|known|ident)|uname|uncertain|traj).*)$", re.IGNORECASE)
 _COMPUTED = re.compile(
     r"[hkaesw]_?jc\d?$|cent(re|er|ro)\w*$|jointcent|(?<![a-z])com$|mid_?p(oi)?nt|virtual|"
@@ -198,8 +197,7 @@ _SKIN = ("asis", "psis", "knee_medial", "ankle_medial")
 """Ends of landmarks that only a marker has: a trochanter may be called hip beside them."""
 _PARTS = re.compile(r"\d+(?:st|nd|rd|th)|\d+|[a-z]+")
 """A number, as an ordinal or not, or a word, within a token."""
-_WAYS = 24
-"""Ways to cut the tokens of a label into words, beyond which the label says nothing."""
+_WAYS = 24  # Ways to cut the tokens of a label into words, beyond which the label says nothing
 _Key = TypeVar("_Key")
 _Value = TypeVar("_Value")
 

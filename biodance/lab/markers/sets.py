@@ -251,8 +251,7 @@ def _number(value: Any) -> bool:
 
 FOLDER = "anthropometry/marker_sets"
 FAMILY = DataFamily("marker set", "biodance.marker_sets", FOLDER, ".toml")
-_MAPS = ("session.toml", "subject.toml")
-"""Files whose ``[markers] map`` is a marker set of its own."""
+_MAPS = ("session.toml", "subject.toml")  # Files whose ``[markers] map`` is a marker set of its own
 GUESSED = "guessed "
 """How the name of a guessed set begins; its map follows (`guess.guess_set`)."""
 

@@ -22,10 +22,8 @@ than somebody who stands for the static trial sways in that time.
 """
 _SLOWER = 0.5
 """Share of the step before it from which on a marker does not come to rest by and by, as computed movement does."""
-_FELT = 1e-5
-"""m: smaller steps are the last digits of a computed movement."""
-_LONGEST = 3
-"""Frames of a spike at most; what lasts longer may be another marker."""
+_FELT = 1e-5  # m: smaller steps are the last digits of a computed movement
+_LONGEST = 3  # Frames of a spike at most; what lasts longer may be another marker
 _OFF = 0.03
 """m from where the frames on both sides expect the marker. Skin, wands and heads of markers swing by 4 to 9 mm after
 heel strikes of running at 2.5 and 3.5 m/s (10 people, 150 Hz), by 16 mm at most in runs, drop jumps and squats of 14
@@ -37,8 +35,7 @@ in the frames on both sides; impacts reach 200, but move a marker by millimetres
 """
 
 
-_TOLD = 8
-"""Times that are told one by one."""
+_TOLD = 8  # Times that are told one by one
 
 
 class MarkerFault(Enum):
@@ -203,14 +200,11 @@ def _spikes(path: Array, step: float) -> tuple[Mask, float]:
 #   (Kabsch 1976, doi:10.1107/S0567739476001873, for the rotation).
 # - Whatever is left stays NaN: the kinematics give it no weight.
 
-_FLANK = 6
-"""Seen frames that each side of a short gap must have."""
-_CARRIERS = 5
-"""At most so many neighbours carry a marker across a gap; at least three are needed."""
+_FLANK = 6  # Seen frames that each side of a short gap must have
+_CARRIERS = 5  # At most so many neighbours carry a marker across a gap; at least three are needed
 _RIGID = 0.01
 """m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
-_OFF_LINE = 0.01
-"""m: so far from one line the neighbours must lie to fix a rotation."""
+_OFF_LINE = 0.01  # m: so far from one line the neighbours must lie to fix a rotation
 _CLOSURE = 0.02
 """m: the neighbours must predict the marker across the gap to this, or it is left unseen."""
 

@@ -150,18 +150,12 @@ _COMPONENTS = 3
 """Principal components of the markers' movement whose paths are smoothed: what is left holds noise and little else."""
 _SLOW = 0.375
 """Share of the rate of the rows at which the smooth paths have half their amplitude: people move more slowly."""
-_STILL = 0.01
-"""Of the mean squared speed: rows that are slower tell nothing of their instants."""
-_HIGHEST = 500.0
-"""Hz of cameras that are looked for."""
-_TICK = 0.25 / _HIGHEST
-"""s to which instants are rounded where rates are tried."""
-_FINE = 16
-"""Rates tried per cycle that a recording holds more."""
-_CHANCE = 1e-6
-"""That stamps without a grid gather as much at any rate."""
-_FEWEST = 100
-"""Rows without which nothing is looked for."""
+_STILL = 0.01  # Of the mean squared speed: rows that are slower tell nothing of their instants
+_HIGHEST = 500.0  # Hz of cameras that are looked for
+_TICK = 0.25 / _HIGHEST  # s to which instants are rounded where rates are tried
+_FINE = 16  # Rates tried per cycle that a recording holds more
+_CHANCE = 1e-6  # That stamps without a grid gather as much at any rate
+_FEWEST = 100  # Rows without which nothing is looked for
 
 
 def camera_instants(stamps: Array, xyz: Array) -> tuple[Array, str]:

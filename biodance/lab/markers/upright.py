@@ -19,18 +19,13 @@ from biodance.settings import STANDARD_GRAVITY, StandingRules
 
 WINDOW = 0.5
 """s: length of the quietest part of the static trial that is averaged."""
-_UNSEEN = 0.1
-"""m a frame: an unseen marker counts as one that moves so fast."""
-_STILL = 0.02
-"""m, standard deviation over half a second beyond which a marker does not stand still."""
-_BLOCK = 0.05
-"""s: the force is averaged over blocks of this length before it is judged."""
-_NUMBERS = 1_000_000
-"""Numbers ordered at once, so that a long trial needs little memory."""
+_UNSEEN = 0.1  # m a frame: an unseen marker counts as one that moves so fast
+_STILL = 0.02  # m, standard deviation over half a second beyond which a marker does not stand still
+_BLOCK = 0.05  # s: the force is averaged over blocks of this length before it is judged
+_NUMBERS = 1_000_000  # Numbers ordered at once, so that a long trial needs little memory
 _MOVEMENT: WeakKeyDictionary[Markers, float] = WeakKeyDictionary()
 """How far markers moved, kept as long as they live: reader, roles and checks ask for it."""
-_PLACES = 16
-"""As many places in an order are found without ordering all."""
+_PLACES = 16  # As many places in an order are found without ordering all
 
 
 def movement(markers: Markers) -> float:
@@ -170,8 +165,7 @@ _FRONT_AND_BACK = (("toe", "{}_heel"), ("toe_lateral", "{}_heel"), ("asis", "{}_
 _ABOVE = ("ankle_lateral", "asis")
 _FEET = ("_heel", "_toe", "_toe_lateral", "_toe_medial")
 _NEEDED = ("asis", "knee_lateral", "ankle_lateral", "heel", "toe")
-_STATURES = np.geomspace(0.85, 2.15, 40)
-"""m: statures that are tried."""
+_STATURES = np.geomspace(0.85, 2.15, 40)  # m: statures that are tried
 
 
 @cache

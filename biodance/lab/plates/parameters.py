@@ -25,8 +25,7 @@ FOUR_SENSORS = (3, 6, 7)
 CONTENT = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "FFFMMM", 5: "FFFMMM", 6: "F" * 12, 7: "F" * 8}
 """What each channel (after the calibration matrix) holds: F force, M moment, L length."""
 _MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
-_USUAL_TYPE = 2
-"""Three forces and three moments: taken for channels of which nothing else is said."""
+_USUAL_TYPE = 2  # Three forces and three moments: taken for channels of which nothing else is said
 _NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
 _SIX = ("fx", "fy", "fz", "mx", "my", "mz")

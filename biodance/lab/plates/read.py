@@ -24,8 +24,7 @@ from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
 _AROUND = 0.05  # m by which a sole reaches beyond its markers
 
 _STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
-_SAME_PLACE = 0.001
-"""m: standard deviation of a centre of pressure that nobody moves."""
+_SAME_PLACE = 0.001  # m: standard deviation of a centre of pressure that nobody moves
 _QUIET = 2.5
 """N: largest standard deviation of what an empty plate reads, half the spread up to which `decode` calls one quiet; a
 foot that comes or goes changes it by far more.

@@ -15,8 +15,7 @@ from biodance.lab.plain_text import COMMAS_READ, decode
 from biodance.lab.plates.parameters import channel_groups
 from biodance.records import Array
 
-_QUOTES = "'\"`´‘’‚‛“”„‟′″"
-"""What programs and spreadsheets put around a label."""
+_QUOTES = "'\"`´‘’‚‛“”„‟′″"  # What programs and spreadsheets put around a label
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
 _HEADER_ROWS = 30
 _PARQUET = b"PAR1"

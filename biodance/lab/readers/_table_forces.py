@@ -21,15 +21,12 @@ from biodance.records import SIDES, Array, Markers, Mask, Plate, Wrench
 from biodance.settings import COP_FORCE, STANDARD_GRAVITY
 from biodance.spatial import wrench_about_origin
 
-_PERSON = (50.0, 4000.0)
-"""N that the mean load on plates can be: a child of 5 kg to 400 kg."""
+_PERSON = (50.0, 4000.0)  # N that the mean load on plates can be: a child of 5 kg to 400 kg
 _FARTHEST = 20.0
 """m from the point of the moments that a pressure can lie; farther, the moments are in N·mm."""
 _SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
-_UNDER = 0.25
-"""m between pressure and feet up to which they belong together: a foot's length."""
-_MARGIN = 0.15
-"""m that a foot reaches beyond its markers and pressures."""
+_UNDER = 0.25  # m between pressure and feet up to which they belong together: a foot's length
+_MARGIN = 0.15  # m that a foot reaches beyond its markers and pressures
 _FLAT = 0.03
 """m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
 _SINKS = 0.02
@@ -38,8 +35,7 @@ _PRESSED = 0.58
 """Share of the way from heel to toe marker at which the pressure of somebody who stands lies: 12 people of 4
 laboratories on plates of known place, 13 mm before the middle, sd 13 mm along the feet and 8 mm across.
 """
-_PLACE_SD = 0.013
-"""m along the feet, the same 12 people: what their way of leaning leaves open."""
+_PLACE_SD = 0.013  # m along the feet, the same 12 people: what their way of leaning leaves open
 
 
 class Load(NamedTuple):

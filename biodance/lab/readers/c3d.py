@@ -27,8 +27,7 @@ NAME = "C3D"
 EXTENSIONS = (".c3d",)
 PREFERENCE = 0
 FOLLOWS_TOLD = True
-_KEY = 0x50
-"""Second byte of every C3D file."""
+_KEY = 0x50  # Second byte of every C3D file
 
 
 def sniff(head: bytes) -> bool:
@@ -36,8 +35,7 @@ def sniff(head: bytes) -> bool:
     return len(head) >= 2 and head[1] == _KEY and 2 <= head[0] <= 127 and b"\x00" in head
 
 
-_CLOUD = 6
-"""Markers that show how a body lies."""
+_CLOUD = 6  # Markers that show how a body lies
 _LONGER = 1.5
 _AXES = "XYZ"
 

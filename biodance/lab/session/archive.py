@@ -27,8 +27,7 @@ _COLUMNS = {
     "visit": ("visit", "session"),
 }
 """What a table may call its columns."""
-_KINDS = 6
-"""Different values up to which a column names conditions."""
+_KINDS = 6  # Different values up to which a column names conditions
 _CHANNEL = re.compile(r"\s*\"?(time|t|[FM][xyz])\s*[\[(]?\s*([\w·.]*)\s*[\])]?", flags=re.IGNORECASE)
 
 

@@ -21,8 +21,7 @@ from biodance.lab.session.recordings import RESULTS, TEXT
 from biodance.library import parse_json
 from biodance.version import __version__
 
-_MANIFEST = "manifest.json"
-"""Written last into a results folder."""
+_MANIFEST = "manifest.json"  # Written last into a results folder
 
 
 @dataclass(frozen=True)

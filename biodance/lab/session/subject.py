@@ -36,16 +36,14 @@ trial of 12 people of 9 laboratories (walks, squats, marching) against their sta
 _DOWN, _SINKS = 0.03, 0.02
 """m of an ankle over its lowest place (5th percentile), and of the iliac spines under their highest (95th), up to which
 both feet are on the ground and the person is upright."""
-_UPRIGHT = 10
-"""Frames of that at least: on stairs both ankles are hardly ever low."""
+_UPRIGHT = 10  # Frames of that at least: on stairs both ankles are hardly ever low
 _ALIKE = 0.4
 """Correlation of the shares of two landmarks, the mean over the pairs: long legs lift all of them."""
 _RISE = 0.026
 """Share of the stature by which acromion markers rise with arms lifted by 90 degrees (45 mm at 1.75 m), in proportion
 to the angle and known to half; measured on 7 people with arms out and 6 with arms down.
 """
-_LIFTED = 45.0
-"""Degrees of arms that have no marker at the elbow."""
+_LIFTED = 45.0  # Degrees of arms that have no marker at the elbow
 
 
 def stature_of_markers(trial: Trial) -> tuple[float, float, str]:

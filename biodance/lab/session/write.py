@@ -172,8 +172,7 @@ def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
 
 _MARK = "registration.json"
 """Name of the file that says that a folder was written by `biodance register`."""
-_BESIDE = (".mp", ".vsk", ".enf", ".toml")
-"""What belongs to a session beside its recordings."""
+_BESIDE = (".mp", ".vsk", ".enf", ".toml")  # What belongs to a session beside its recordings
 
 
 def registered_folder(folder: Path, *, force: bool) -> Path:

@@ -27,8 +27,7 @@ class Balls:
         return np.stack([angles[self.first + k] for k in range(3)])
 
 
-_SAME = 1e-8
-"""m, and of the entries of rotation matrices: what differs by less is equal."""
+_SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
 
 
 def balls(body: Body) -> Balls:

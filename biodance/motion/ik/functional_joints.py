@@ -55,8 +55,7 @@ _NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
 deviations, which are then those of 12 virtual dances.
 """
-_FAULTS = 3
-"""Joints that lie elsewhere and markers that have moved, at most, in one session."""
+_FAULTS = 3  # Joints that lie elsewhere and markers that have moved, at most, in one session
 _NO_POSTURE = 0.1
 """m, RMS marker distance from which on a frame shows no posture of this body: 0.009 to 0.033 at most in eleven real
 sessions, 0.044 in one with exchanged head markers, metres where a recording went wrong.

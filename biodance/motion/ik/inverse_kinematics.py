@@ -34,8 +34,7 @@ from biodance.motion.ik.search import (
 from biodance.motion.kinematics import place_jacobian, poses
 from biodance.records import Array, Index, Markers
 
-_LEVER = 0.1
-"""m, what one radian is compared with: one metre of root translation counts as 10 rad."""
+_LEVER = 0.1  # m, what one radian is compared with: one metre of root translation counts as 10 rad
 
 _LEAST_MOTION = 0.02
 """Least share of its lever by which any unit change of posture must move the markers that it carries, for the
@@ -209,12 +208,9 @@ def _too_few(body: Body, markers: Markers, open_coordinates: tuple[str, ...]) ->
     )
 
 
-_TOLERANCE = 1e-7
-"""m, largest slope of a solved frame, as in `solve_ik`."""
-_PATIENCE = 100
-"""Frames between two searches from the markers alone, where the fit has become bad."""
-_BAD = 0.05
-"""m: RMS distance beyond which the descent from the last frame is distrusted."""
+_TOLERANCE = 1e-7  # m, largest slope of a solved frame, as in `solve_ik`
+_PATIENCE = 100  # Frames between two searches from the markers alone, where the fit has become bad
+_BAD = 0.05  # m: RMS distance beyond which the descent from the last frame is distrusted
 _ONE = np.arange(1)
 
 

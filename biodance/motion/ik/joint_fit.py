@@ -114,10 +114,8 @@ def _markers(cost: tuple[Array, Array], markers: MarkerSlopes, free: Index) -> d
     return dict(zip(markers.names, value.tolist(), strict=True))
 
 
-_POSTURES = 150
-"""Postures taken evenly from all moving trials together."""
-_STEPS, _SMALLEST = 8, 5e-4
-"""Most Gauss-Newton steps; m or rad below which a step ends the search."""
+_POSTURES = 150  # Postures taken evenly from all moving trials together
+_STEPS, _SMALLEST = 8, 5e-4  # Most Gauss-Newton steps; m or rad below which a step ends the search
 
 
 @dataclass(frozen=True, eq=False)

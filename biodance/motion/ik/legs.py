@@ -130,16 +130,12 @@ def _solve_sine(y: Array, z: Array, wanted: Array) -> Array:
 
 KNEE = 3
 """Place of the knee among the six joints."""
-_SQUAT = np.radians(60.0)
-"""Flexion of the knee in the posture from which all others are found."""
-_LOCKED = np.radians(0.3)
-"""Flexion of the longest leg."""
+_SQUAT = np.radians(60.0)  # Flexion of the knee in the posture from which all others are found
+_LOCKED = np.radians(0.3)  # Flexion of the longest leg
 _SOFT = 0.0025
 """Share of the leg's length within which a foot out of reach is drawn towards the hip, smoothly."""
-_BENDS = 0.1
-"""How much a knee must change the square of the leg's length, in that square."""
-_POSTURES = 16
-"""Postures of hip and ankle in which the length of the leg is judged."""
+_BENDS = 0.1  # How much a knee must change the square of the leg's length, in that square
+_POSTURES = 16  # Postures of hip and ankle in which the length of the leg is judged
 
 
 @dataclass(frozen=True, eq=False)

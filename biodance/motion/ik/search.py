@@ -17,8 +17,7 @@ from biodance.motion.kinematics import poses
 from biodance.records import Array, Index, assign
 from biodance.spatial import rigid_fit
 
-_STEPS = 200
-"""Most Newton steps of a frame."""
+_STEPS = 200  # Most Newton steps of a frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +163,7 @@ MORE_SHARES = (0.25, 0.75)
 _SHORT = 640
 """Frames below which a trial is short: it has too few neighbours to correct a frame that started wrongly."""
 
-_NEIGHBOURS = 11
-"""Frames whose median fit a frame is compared with."""
+_NEIGHBOURS = 11  # Frames whose median fit a frame is compared with
 
 _DOUBT = (1.5, 0.001)
 """A frame is doubtful where its RMS distance exceeds the neighbours' median times the first number plus the second

@@ -13,12 +13,10 @@ _SMALL = 0.02
 of the exact turn.
 """
 
-_UPRIGHT = 0.3
-"""Cosine of the second angle above which the angles are a good measure of the rotation."""
+_UPRIGHT = 0.3  # Cosine of the second angle above which the angles are a good measure of the rotation
 
 
-_EQUAL = 1e-6
-"""rad: angles that differ by less are equal; which is larger may be rounding."""
+_EQUAL = 1e-6  # rad: angles that differ by less are equal; which is larger may be rounding
 
 
 @compiled

@@ -13,14 +13,11 @@ import numpy as np
 from biodance.motion.ik.compiled import compiled
 from biodance.records import Array
 
-_CLOSED = 1e-12
-"""Distance (leg lengths) and angle (rad) from the goal at which a foot is there."""
+_CLOSED = 1e-12  # Distance (leg lengths) and angle (rad) from the goal at which a foot is there
 _NEAR = 0.5
 """rad: a larger change of an angle from frame to frame may lead to another solution and is not trusted."""
-_LEADS = 8
-"""Steps in which a foot is led from the known posture."""
-_LONGEST = 0.3
-"""rad: longest step of an angle in one iteration."""
+_LEADS = 8  # Steps in which a foot is led from the known posture
+_LONGEST = 0.3  # rad: longest step of an angle in one iteration
 _DAMPING = 1e-2, 1e-14
 """Damping of the normal equations per squared distance from the goal, and at the goal itself."""
 
