@@ -33,6 +33,28 @@ _TURNED_BY = 0.1
 _READS = 0.3
 """N: an empty row that reads less is zero: writers of tables cut off what is below a threshold."""
 
+NAME = "table of OpenSim"
+EXTENSIONS = (".mot", ".sto")
+PREFERENCE = 20
+
+
+def sniff(head: bytes) -> bool:
+    """Return whether the head has the line "endheader"."""
+    return bool(re.search(r"^\s*endheader\s*$", head_text(head), flags=re.MULTILINE | re.IGNORECASE))
+
+
+def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
+    """Return the trial of a table with plate columns: plates, no markers."""
+    table = read_mot(path)
+    plates, said, doubts = plates_of(table, where=str(path))
+    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=plates_rate(plates))
+    return Trial(path.stem, role, None, plates, source, history=said, warnings=(*table.warnings, *doubts))
+
+
+def plates_rate(plates: tuple[Plate, ...]) -> float:
+    """Return the rate (Hz) of plates; NaN without one."""
+    return plates[0].wrench.rate if plates else math.nan
+
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
@@ -219,26 +241,3 @@ def _rectangle(cop: Array) -> Array:
     (x0, y0, z), (x1, y1, _) = np.nanmin(cop, axis=0), np.nanmax(cop, axis=0)
     x0, y0, x1, y1 = x0 - _FOOT_MARGIN, y0 - _FOOT_MARGIN, x1 + _FOOT_MARGIN, y1 + _FOOT_MARGIN
     return np.array([[x1, y1, z], [x0, y1, z], [x0, y0, z], [x1, y0, z]])
-
-
-NAME = "table of OpenSim"
-EXTENSIONS = (".mot", ".sto")
-PREFERENCE = 20
-
-
-def sniff(head: bytes) -> bool:
-    """Return whether the head has the line "endheader"."""
-    return bool(re.search(r"^\s*endheader\s*$", head_text(head), flags=re.MULTILINE | re.IGNORECASE))
-
-
-def read(path: Path, *, role: Role, subject: str | None = None) -> Trial:
-    """Return the trial of a table with plate columns: plates, no markers."""
-    table = read_mot(path)
-    plates, said, doubts = plates_of(table, where=str(path))
-    source = Source(path, sha256(read_bytes(path)), "MOT", analog_rate=plates_rate(plates))
-    return Trial(path.stem, role, None, plates, source, history=said, warnings=(*table.warnings, *doubts))
-
-
-def plates_rate(plates: tuple[Plate, ...]) -> float:
-    """Return the rate (Hz) of plates; NaN without one."""
-    return plates[0].wrench.rate if plates else math.nan
