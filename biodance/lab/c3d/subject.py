@@ -229,7 +229,7 @@ _PLAIN = ("Bodymass", "age", "gender")
 _LEGAL = {"Bodymass": (2.0, 400.0), "age": (0.0, 120.0), "gender": (0.0, 1.0)}
 _STATURE, _LEG = (0.4, 2.6), (0.2, 1.4)
 _SCALES = (1e-3, 1.0, 1e-2)
-_NAMES = {"".join(name.upper()): name for name in (*_LENGTHS, *_PLAIN)}
+_NAMES = {name.upper(): name for name in (*_LENGTHS, *_PLAIN)}
 
 
 def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
 from biodance.lab.markers.upright import movement, steady_mass
 from biodance.lab.plates.corners import ToldPlate
@@ -220,25 +219,12 @@ def read_plates(
     return _ReadPlates(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
 
 
-def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
-    """Return the summed wrench of plates that share one time base; TrialRefused without plates or with different
-    time bases.
-    """
-    if not plates or any(not np.array_equal(p.wrench.time, plates[0].wrench.time) for p in plates):
-        raise TrialRefused(
-            "The total wrench needs at least one plate and one time base for all of them. Read the plates from one "
-            "file."
-        )
-    return Wrench(plates[0].wrench.time, np.sum([p.wrench.value for p in plates], axis=0))
-
-
 def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: float | None) -> tuple[str, ...]:
     """Return a warning if the weight in quiet standing contradicts the declared mass."""
     walks = markers is not None and movement(markers) > StandingRules.still
     if not plates or walks:
         return ()
-    total = total_wrench(plates)
-    mass = steady_mass(total)
+    mass = steady_mass(Wrench(plates[0].wrench.time, np.sum([one.wrench.value for one in plates], axis=0)))
     if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= CheckLimits.mass / 100:
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"
