@@ -231,9 +231,7 @@ def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
 
 
 def _room_for(body: Body, cut: Cut) -> Body:
-    """Return the body whose parts stand one further in ``links``, so that one more segment finds its place before them;
-    parts whose joints go with the cut are pieces of the new segment.
-    """
+    """Return the body with room for one more segment before its parts; parts on cut joints are its pieces."""
     count, gone = len(body.segments), float(cut.phi[0] / body.sip.phi[10 * body.segment_index(cut.segment)])
     parts = []
     for k, part in enumerate(body.parts):

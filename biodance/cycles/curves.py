@@ -277,9 +277,7 @@ def load_curves(
 def _moments_and_powers(
     body: Body, motion: Motion, ground: Mapping[str, Wrench]
 ) -> tuple[list[tuple[str, str]], Array, Array]:
-    """Return joint and kind ("moment", "power") of m quantities, their rows (T, m, 10N) and what the ground gives (T,
-    m): value = rows phi - given.
-    """
+    """Return joint, kind ("moment", "power"), rows (T, m, 10N) and given (T, m): value = rows phi - given."""
     regressor, given = torque_regressor_of_links(body, motion), ground_torques(body, motion, ground)
     rates, groups = motion.v[:, body.n_root :], [list(chain) for chain in chains(body)]
     rows = [np.einsum("tj,tjp->tp", rates[:, axes], regressor[:, axes]) for axes in groups]

@@ -66,9 +66,7 @@ def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent
 
 
 def _without_short(loaded: Mask, shortest: float) -> Mask:
-    """Return ``loaded`` (T,) without gaps and without contacts shorter than ``shortest`` frames; the ends of the
-    trial stay.
-    """
+    """Return ``loaded`` (T,) without gaps and contacts shorter than ``shortest`` frames; the ends stay."""
     kept = loaded.copy()
     for value in (False, True):
         for start, stop in runs(kept == value):
@@ -134,9 +132,7 @@ def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, 
 
 
 def _delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent) -> float:
-    """Return by how many s the nearest of ``events`` of the same kind and foot comes later than one event; infinity
-    without any.
-    """
+    """Return by how many s the nearest of ``events`` of this kind and foot comes later; infinity without."""
     kind = event.side, event.down
     return min((one.time - event.time for one in events if (one.side, one.down) == kind), key=abs, default=np.inf)
 
@@ -154,9 +150,7 @@ def _thigh_and_shank(body: Body) -> float:
 
 
 def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: float) -> list[float]:
-    """Return the times s at which a foot begins (``down``) or ends to go with the ground, from its ``path`` (T,) m
-    ahead of the pelvis.
-    """
+    """Return the times s at which a foot begins (``down``) or ends to go with the ground, by its ``path``."""
     from scipy.signal import butter, find_peaks, sosfiltfilt
 
     rate = motion.rate

@@ -60,9 +60,7 @@ class PlateCorrection:
 
 
 def _free(plate: Plate, one: PlateCorrection) -> Plate:
-    """Return a plate as it would have recorded without the cause, at the same times: held constant beyond the first and
-    last known sample, NaN beside samples between them that are.
-    """
+    """Return a plate as it would have recorded without the cause, at the same times."""
     free = one.fault.undone(plate, one.target.rpartition(":")[2], one.value)
     time, moved = plate.wrench.time, free.wrench.time
     if moved is time:

@@ -67,9 +67,7 @@ def inspect_paths(
 
 
 def _said_in(folder: Path) -> tuple[MarkerSet | None, Told, str]:
-    """Return the marker set that the session.toml of a folder names, None without one, what it says of the plates, and
-    what is wrong with it.
-    """
+    """Return the marker set that a session.toml names, what it says of the plates, and what is wrong with it."""
     try:
         said = read_session_file(folder)
         return (read_marker_set(said.marker_set) if said.marker_set else None), said.told, ""

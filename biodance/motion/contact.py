@@ -66,9 +66,7 @@ def flight(trial: Trial, touching: Mask, load: Mask) -> Mask:
 
 
 def _falls(trial: Trial, start: int, stop: int) -> bool:
-    """Return whether the markers of the body, or those of the pelvis, fall freely from frame ``start`` to before
-    ``stop``: their mean on a parabola of about one g.
-    """
+    """Return whether markers of body or pelvis fall freely in frames ``start`` to ``stop``: a parabola of one g."""
     if trial.markers is None or trial.markers.time.size < 2:
         return False
     span = slice(max(0, start - 1), min(trial.markers.time.size, stop + 1))
@@ -272,9 +270,7 @@ def speeds(soles: Soles, plates: tuple[Plate, ...] = (), moving: Array | None = 
 
 
 def _resting(speed: Array, time: Array, *, still: float, lasting: float) -> Mask:
-    """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for at least ``lasting`` s (or the
-    whole trial).
-    """
+    """Return (T, 2) where a foot rests: all its points slower than ``still`` m/s for ``lasting`` s."""
     slow = np.asarray((speed < still).all(axis=2))
     least = 1 if time.size < 2 else min(time.size, int(np.ceil(lasting / np.median(np.diff(time)))))
     found = np.zeros_like(slow)
@@ -432,9 +428,7 @@ def _unplaced(trial: Trial) -> tuple[str, ...]:
 
 
 def _cop_notes(trial: Trial, outside: Array, measured: Mask, rules: ContactRules) -> tuple[str, ...]:
-    """Return a sentence for every plate whose centre of pressure lies outside the soles on it, as a median over the
-    measured frames.
-    """
+    """Return a sentence for every plate whose centre of pressure lies outside the soles on it (median)."""
     notes = []
     for index, plate in enumerate(trial.plates):
         distance = outside[measured, index]

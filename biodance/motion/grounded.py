@@ -186,10 +186,7 @@ def ground(
 def _q(
     angle: Array, turn: Array, place: Array, foot: NDArray[np.intp], *, base: BaseSeen | None, tilt: Array | None = None
 ) -> Array:
-    """Return the configurations (T, nq) of a robot that stands on ``foot`` (T,), its soles at ``turn`` and ``place`` of
-    `_soles`; ``tilt`` (T, 3) rad, small rotation vectors in the frame of the first standing sole, turns the standing
-    sole from flat about its middle.
-    """
+    """Return configurations (T, nq) of a robot on ``foot`` (T,); ``tilt`` (T, 3) rad turns its sole from flat."""
     rotation, position = _chained(turn, place, foot)
     middle = position + np.einsum("tij,tj->ti", rotation, place[foot, np.arange(foot.size)])
     if tilt is not None:
@@ -229,9 +226,7 @@ def _leg(body: Body) -> float:
 
 
 def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
-    """Return frames of both soles in the root's, turn (2, T, 3, 3) and place (2, T, 3) m, and the ``height`` (2, T) m
-    of the other sole's lowest corner over each one's plane.
-    """
+    """Return both soles in the root's frame, turn and place, and ``height`` (2, T) m of the other's lowest corner."""
     root = np.array([0.0, 0, 0, 0, 0, 0, 1])
     q = np.concatenate([np.tile(root, (len(angle) + 1, 1)), np.vstack([np.zeros(angle.shape[1]), angle])], axis=1)
     pose = poses(body, q)
@@ -410,9 +405,7 @@ def _path(wrench: Array) -> NDArray[np.complex128]:
 def _correlated(
     a: NDArray[np.complex128], a_mask: NDArray[np.bool_], b: NDArray[np.complex128], b_mask: NDArray[np.bool_]
 ) -> tuple[NDArray[np.complex128], ...]:
-    """Return for every lag of b behind a, -(len(a) - 1) to len(b) - 1: correlation (0 where too little overlaps),
-    slope of b on a, means of a and of b over the overlap.
-    """
+    """Return for every lag of b behind a: correlation, slope of b on a, and their means over the overlap."""
     shift_a, shift_b = a[a_mask].mean(), b[b_mask].mean()
     x, y = (np.where(m, z - c, 0) for z, m, c in ((a, a_mask, shift_a), (b, b_mask, shift_b)))
     size = 1 << int(np.ceil(np.log2(a.size + b.size)))

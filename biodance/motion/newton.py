@@ -141,9 +141,7 @@ def _trunk(trial: Trial, mass: float) -> Trunk | None:
 
 
 def _height(trial: Trial) -> Array | None:
-    """Return the height (T,) m of the middle between pelvis and trunk, each the mean of its markers that are seen
-    throughout; None without pelvis or trunk.
-    """
+    """Return the height (T,) m of the middle between pelvis and trunk; None without one of them."""
     assert trial.markers is not None
     segment = {marker.label: marker.segment for marker in read_marker_set(trial.marker_set).markers}
     heights = []
@@ -167,9 +165,7 @@ def _covered(trial: Trial, mass: float) -> Mask:
 
 
 def _lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, sway: float) -> LagAndMass | None:
-    """Return what Newton tells of the vertical force (S,) N of all plates at times (S,) s; None where less than a
-    quarter of a second without a break is covered, or the force is too short to be filtered.
-    """
+    """Return what Newton tells of the vertical force (S,) N at times (S,) s; None where too little is covered."""
     known = np.isfinite(vertical)
     rate = 1 / float(np.median(np.diff(time))) if time.size > 1 else 0.0
     if rate <= 2 * _BAND.cutoff or time.size < 2 * _BAND.shortest(rate) or not known.all():
@@ -218,9 +214,7 @@ def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, fl
 
 
 def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
-    """Return the mass kg and its sd by the force (T,) N, each span of frames with the weight of its own sd; NaN without
-    one.
-    """
+    """Return the mass kg and its sd by the force (T,) N, spans weighted by their own sd; NaN without one."""
     weights = trunk.weights(gravity)
     if not weights:
         return float("nan"), float("nan")

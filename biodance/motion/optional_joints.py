@@ -130,9 +130,7 @@ def _follow(body: Body, some: _Sample) -> _Followed | None:
 
 
 def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
-    """Return (F, K): how much of a marker's displacement the model's own follows in the postures ``q`` (F, nq), mean
-    of three directions.
-    """
+    """Return (F, K): how much of a marker's displacement the model follows in postures ``q`` (F, nq)."""
     rows = [body.markers.names.index(name) for name in names]
     segment, pose = [body.markers.segment[k] for k in rows], poses(body, q)
     J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[rows]))

@@ -82,9 +82,7 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
 
 
 def _still_part(markers: Markers | None, run: slice, rate: float, within: float) -> slice | None:
-    """Return the longest part of ``run`` in which the typical marker stays ``within`` m: the whole, a half, a quarter,
-    ... of `_PART` s or more; None without one. Who sways farther than that in 5 s stands still for 1 s all the same.
-    """
+    """Return the longest part of ``run``, halved down to `_PART` s, with the typical marker ``within`` m; or None."""
     if markers is None:
         return run
     length = run.stop - run.start

@@ -116,9 +116,7 @@ def standing_on(plates: tuple[Plate, ...], soles: Soles) -> Mask:
 
 
 def _pressed_by(plate: Plate, soles: Soles) -> Mask:
-    """Return (T, 2) which soles carry what a plate measures: the foot that is told; else its centre of pressure lies
-    under this foot, else under both.
-    """
+    """Return (T, 2) which soles carry what a plate measures: the foot told, the one under it, else both."""
     cop = plate.wrench.cop(height=plate.height, threshold=COP_FORCE)[:, :2]
     known = np.isfinite(cop).all(axis=1)
     alone = np.zeros((len(cop), 2), dtype=bool)
@@ -296,9 +294,7 @@ def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: Surfaces, touchin
 
 
 def _spread_over(plates: tuple[Plate, ...], soles: Soles, touching: Mask, load: Mask) -> Mask:
-    """Return (P, T, 2, S) which points all over the soles are over each plate, seen from above; of a plate of unknown
-    place, or whose foot is told, all that are seen of a foot that stands on it.
-    """
+    """Return (P, T, 2, S) which points of the soles are over each plate; all of a foot on an unplaced plate."""
     unplaced = [index for index, plate in enumerate(plates) if not plate.placed or plate.foot]
     pressed = np.array([_pressed_by(plates[i], soles) for i in unplaced])
     standing = _standing(pressed, load[:, unplaced], touching) if unplaced else None
@@ -332,9 +328,7 @@ def _standing(pressed: Mask, load: Mask, touching: Mask) -> Mask:
 
 
 def _samples(outline: Array) -> Array:
-    """Return points (T, 2, S, 3) m all over the soles without their rim: their ``outline`` (T, 2, P, 3) m and the
-    middles of all its chords.
-    """
+    """Return points (T, 2, S, 3) m all over the soles without their rim, from their ``outline`` (T, 2, P, 3) m."""
     outwards = (outline - outline.mean(axis=2, keepdims=True)) * np.array([1.0, 1.0, 0.0])
     length = np.linalg.norm(outwards, axis=-1, keepdims=True)
     narrow = outline - np.minimum(_RIM / np.maximum(length, 1e-9), 1.0) * outwards

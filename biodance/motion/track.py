@@ -81,9 +81,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
 
 
 def _moving(chart: Chart, near: Array, at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array, Array]:
-    """Return posture (B, nq), v and a (B, nv) from the coordinates of ``chart`` and their two first derivatives;
-    ``near`` (n, B) rad decides between equal sets of angles.
-    """
+    """Return posture (B, nq), v and a (B, nv) from ``chart`` coordinates; ``near`` (n, B) rad picks angles."""
     joints, n_root = chart.joints, chart.n_root
     posture = chart.posture(at, near)
     v, a = np.empty((2, n_root + chart.joint_count, near.shape[1]))
@@ -163,9 +161,7 @@ def _root_rates(at: Smooth, first: Smooth, second: Smooth) -> tuple[Array, Array
 
 
 def _ball_rates(joints: Balls, angles: Array, at: Array, first: Array, second: Array) -> tuple[Array, Array]:
-    """Return the rates and accelerations (3, G, T) of the ball joints' angles from their quaternions (4, G, T) and the
-    derivatives.
-    """
+    """Return rates and accelerations (3, G, T) of ball joints' angles from quaternions (4, G, T)."""
     sign = joints.sign
     at, first, second = (np.moveaxis(one, 0, -1) for one in (at, first, second))
     back = quaternion_conjugate(at)
@@ -225,9 +221,7 @@ def angle_states(
 
 
 def _given(body: Body, columns: list[int]) -> tuple[Array, Array]:
-    """Return what each marker tells of the posture (K, nv, nv), and what is known without any (nv,): precisions in
-    1/m² and 1/rad².
-    """
+    """Return what each marker tells of the posture (K, nv, nv), and what is known without: 1/m², 1/rad²."""
     jacobian = general_jacobian(body, columns) * np.concatenate([np.ones(body.n_root), body.free])
     weight = body.markers.weight[columns] / error_size("soft_tissue", "marker") ** 2
     told = weight[:, None, None] * (np.swapaxes(jacobian, 1, 2) @ jacobian)
@@ -243,9 +237,7 @@ def _open(
     seen: NDArray[np.bool_],
     shown: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return (T, nv) the coordinates to which the markers that are not ``seen`` (T, K) in a frame add more than
-    `_LARGEST_ADDED`, beside all that any frame of ``shown`` (T, K) has; ``segments`` (K) that they sit on.
-    """
+    """Return (T, nv) the coordinates to which markers not ``seen`` (T, K) add more than `_LARGEST_ADDED`."""
     told, before = given
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     ever = shown.any(axis=0)
@@ -465,9 +457,7 @@ def own_cutoff(body: Body, markers: Markers, settings: LowPass) -> float | None:
 
 
 def _power(values: Array) -> Array:
-    """Return the mean power (T - 2,) of columns (T, ...) per frequency: of the sine transform of what is beside the
-    straight line between the ends, which continues them by point reflection as the low-pass does.
-    """
+    """Return the mean power (T - 2,) of columns (T, ...) per frequency, by point reflection as the low-pass."""
     columns, frames = np.array(values).reshape(len(values), -1), np.arange(len(values))
     for column in columns.T:
         known = np.isfinite(column)

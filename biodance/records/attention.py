@@ -133,9 +133,7 @@ def _together(rows: list[Attention]) -> Attention:
 
 
 def _range(found: list[tuple[str, str]]) -> str:
-    """Return the smallest and the largest of many values (trial, ``5.6 % of weight``) with their trials; "" where they
-    are no numbers of one unit.
-    """
+    """Return the smallest and largest of values (trial, ``5.6 % of weight``) with their trials; or ""."""
     parts = [(trial, *value.partition(" ")) for trial, value in found]
     try:
         low, high = (choose(parts, key=lambda part: float(part[1])) for choose in (min, max))

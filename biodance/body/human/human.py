@@ -31,9 +31,7 @@ _LUMBAR_HEIGHT = 0.112 / 1.755
 
 
 def _shape_boxes(skeleton: Skeleton) -> Array:
-    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment
-    frames.
-    """
+    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature, in the segment frames."""
     table = read_table("human", "boxes")
     columns = "x_min y_min z_min x_max y_max z_max"
     corners = np.array([row_numbers(table.row(segment=kind_of(s)), columns) for s in SEGMENTS])

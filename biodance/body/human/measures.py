@@ -88,9 +88,7 @@ def standing(static: Trial) -> StaticPosture:
 
 
 def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
-    """Return the markers that a knee alignment device stood in for, label -> (3,) m: where its three arms meet, square
-    to each other and equally long, on the side of the body.
-    """
+    """Return the markers that a knee alignment device stood in for, label -> (3,) m: where its arms meet."""
     found = {}
     for marker in marker_set.markers:
         if marker.label in points or not set(marker.corner_of) or not set(marker.corner_of) <= points.keys():

@@ -171,9 +171,7 @@ def _opinion(
 
 
 def _shares(kind: str, sex: Sex) -> dict[str, float]:
-    """Return the parts of a segment that tapes go round, with their shares in its mass (de Leva 1996); from navel to
-    neck is one.
-    """
+    """Return the parts of a segment that tapes go round, with their shares in its mass (de Leva 1996)."""
     masses = {part: lump.mass for part, lump in table_parts(sex).items()}
     shares: dict[str, float] = {}
     for part in PARTS[kind]:

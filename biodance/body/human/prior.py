@@ -72,9 +72,7 @@ def _table_spread(kind: str) -> _Spread:
 
 
 def _by_sex(groups: list[list[Any]], alike: bool) -> list[list[Any]]:
-    """Return the groups of women and men apart where the sexes are cut ``alike``, else together: where a table cuts
-    pelvis from trunk is no difference between the sexes, but one of its ways to cut.
-    """
+    """Return the groups of women and men apart where the sexes are cut ``alike``, else together."""
     return groups if alike else [[one for group in groups for one in group]]
 
 

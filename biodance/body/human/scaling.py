@@ -78,9 +78,7 @@ def _with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> 
 
 
 def _widen_unseen(body: Body, unseen: tuple[str, ...]) -> Body:
-    """Return the body with wider standard deviations of where the mass of its unseen parts is: a posture that nobody
-    saw shifts the centre of mass.
-    """
+    """Return the body with wider standard deviations of where the mass of its unseen parts is."""
     sizes = {f"{side}_{part}": "arm" for side in SIDES for part in _ARM if f"{side}_elbow" in unseen}
     sizes |= {"trunk_head": "trunk_head"} if "trunk" in unseen else {}
     if not sizes:
@@ -210,9 +208,7 @@ class Scaling:
         return self.body()[0]
 
     def _standing(self, body: Body, frames: SegmentFrames) -> tuple[Body, Array]:
-        """Return a body whose limits allow its posture in the static trial, unseen parts held as they stand, and that
-        posture.
-        """
+        """Return a body whose limits allow its static posture, unseen parts held, and that posture."""
         q = _static_posture(body, frames)
         limits, widened = widen_limits(body, q)
         body = replace(body, limits=limits, notes=(*body.notes, *widened))

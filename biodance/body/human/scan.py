@@ -58,9 +58,7 @@ def clip_surface(triangles: Array, point: Array, normal: Array) -> Array:
 
 
 def _crossing_edges(triangles: Array, point: Array, normal: Array) -> Array:
-    """Return where a plane cuts triangles: (c, 2, 3) m, one edge a triangle, so that what the normal points to lies
-    above the lid that these edges bound.
-    """
+    """Return where a plane cuts triangles: (c, 2, 3) m, one edge a triangle, the lid above."""
     height = _heights(triangles, point, normal)
     count = (height > 0).sum(axis=1)
     crossed = (count == 1) | (count == 2)
@@ -85,9 +83,7 @@ def cut_section(triangles: Array, point: Array, normal: Array) -> _Section:
 
 
 def _heights(triangles: Array, point: Array, normal: Array) -> Array:
-    """Return the heights (n, 3) m of the corners over a plane, those within rounding as 0: a corner has the same in
-    every triangle (sums, since a matrix product rounds by place).
-    """
+    """Return the heights (n, 3) m of the corners over a plane (sums: a matrix product rounds by place)."""
     arm = triangles - point
     height = arm[..., 0] * normal[0] + arm[..., 1] * normal[1] + arm[..., 2] * normal[2]
     return np.where(np.abs(height) < _ROUNDING, 0.0, height)

@@ -232,9 +232,7 @@ def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]],
 def _soles(
     file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], axes: Array
 ) -> dict[str, Array]:
-    """Return the outlines (P, 3) m of both soles in the frames of the feet; ``axes`` (3, 3), rows: forwards, up and to
-    the right in the root's frame.
-    """
+    """Return the outlines (P, 3) m of both soles; ``axes`` (3, 3) rows: forwards, up, right of the root."""
     soles = {}
     for side, carrier in feet.items():
         if not carrier.corners.size:

@@ -51,9 +51,7 @@ def mesh_file(urdf: Path, name: str) -> Path:
 
 @lru_cache(maxsize=256)
 def _mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
-    """Return the corners (K, 3) m of the convex hull of a mesh file times ``scale`` m per unit; of a flat mesh, all its
-    corners.
-    """
+    """Return the corners (K, 3) m of the convex hull of a mesh times ``scale`` m; of a flat one, all corners."""
     from scipy.spatial import ConvexHull, QhullError
 
     corners = np.unique(np.array(read_mesh(path, scale=np.array(scale)).vertices), axis=0)
@@ -367,9 +365,7 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
 
 
 def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, float, float, float] | None:
-    """Return lower, upper, velocity and effort of a joint; None if it has neither of the last two and zero is in its
-    range: a finger that is drawn and never moves.
-    """
+    """Return lower, upper, velocity and effort of a joint; None for one drawn and never moved."""
     limit = element.find("limit")
     if limit is None:
         raise FileRefused(

@@ -60,9 +60,7 @@ def _unsigned(value: float) -> float:
 
 
 def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
-    """Return all frame counts that the file declares: header, TRIAL fields, POINT:FRAMES, POINT:LONG_FRAMES; those
-    that end at the most that 16 bits hold tell nothing.
-    """
+    """Return the frame counts that the file declares; those that end at the most that 16 bits hold tell nothing."""
     first, last = (_field(parameters, name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
     spans = ((float(header.first_frame), float(header.last_frame)), (first, last))
     declared = [to - start + 1 for start, to in spans if to != _CLIPPED]
@@ -71,9 +69,7 @@ def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
 
 
 def _frames_held(content: bytes, start: int, width: int, first: int, remarks: list[str]) -> int:
-    """Return how many frames of ``width`` bytes the file holds from byte ``start`` on, at least those from number
-    ``first`` on that 16 bits tell, and say in ``remarks`` that the length decided.
-    """
+    """Return how many frames of ``width`` bytes the file holds from byte ``start`` on; ``remarks`` say so."""
     size, least = len(content) - start, _CLIPPED - first + 1
     held = size // max(width, 1)
     while held > least and size - (held - 1) * width < C3D_BLOCK and not any(content[start + (held - 1) * width :]):
@@ -213,9 +209,7 @@ def _counts(
     notes: list[str],
     remarks: list[str],
 ) -> tuple[int, int, int, int, int]:
-    """Return (start byte, points, channels, samples per frame, frames); ``notes`` say what was overruled, ``remarks``
-    that nothing but the file's length tells the frames.
-    """
+    """Return (start byte, points, channels, samples per frame, frames); say in ``notes`` what was overruled."""
     starts = _distinct(
         [header.data_start, (_scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
     )

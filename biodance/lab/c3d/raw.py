@@ -402,9 +402,7 @@ def _smells(
 
 
 def _leaps(points: Array, markers: list[int], parameters: Parameters) -> int:
-    """Return how often a marker, one of these columns of ``points``, moves by more than a metre between two frames in
-    which it is seen; 0 if the unit is not known.
-    """
+    """Return how often a marker moves by more than a metre between two frames; 0 if the unit is not known."""
     try:
         metre = 1.0 / metres_per_unit(parameters, spread_frames(points)[:, markers], where="")[0]
     except FileRefused:

@@ -106,9 +106,7 @@ def subjects_of(raw: RawC3d) -> tuple[str, ...]:
 
 
 def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
-    """Return those of the prefixes, one for each marker, that name people: not those of things, which carry few
-    markers; all of them where nobody carries more.
-    """
+    """Return those of the prefixes, one for each marker, that name people; all where nobody carries many."""
     counts = Counter(prefixes)
     enough = {prefix for prefix, count in counts.items() if count > _OBJECT}
     return tuple(prefix for prefix in counts if prefix and (prefix in enough or not enough))

@@ -83,9 +83,7 @@ def _high(stand: Standing, place: str, label: str) -> float:
 
 
 def _cheapest(cost: Array) -> tuple[list[tuple[int, int]], float]:
-    """Return (row, column) of the cheapest one-to-one assignment of ``cost`` (N, P), and its sum: every row may also go
-    nowhere, at no cost; inf where it must not go.
-    """
+    """Return (row, column) of the cheapest assignment of ``cost`` (N, P), in which rows may stay, and its sum."""
     some, places = cost.shape
     whole = np.full((some, places + some), 1e6)
     whole[:, :places] = np.minimum(cost, 1e6)
@@ -97,9 +95,7 @@ def _cheapest(cost: Array) -> tuple[list[tuple[int, int]], float]:
 
 @cache
 def _template() -> tuple[tuple[str, ...], Array, Array]:
-    """Return the landmarks with a usual place, it (P, 3), and the covariance (3, P, P) along each axis: out, ahead, up;
-    in shares of the stature.
-    """
+    """Return the landmarks with a usual place, it (P, 3), and covariances (3, P, P): shares of the stature."""
     usual = usual_standing()
     parts = {part: ("",) if part in ("mid_psis", "c7") else SIDES for part in usual["places"]}
     places = tuple(f"{side}_{part}" if side else part for part, sides in parts.items() for side in sides)
@@ -116,9 +112,7 @@ def _template() -> tuple[tuple[str, ...], Array, Array]:
 
 
 def _squares(shares: Array, known: Mapping[str, int]) -> Array:
-    """Return (N, P) squared distances, in standard deviations, of markers (N, 3) from where a person has the landmarks
-    of `_template`, given the markers ``known`` (landmark -> row); a landmark that is known is expected by the others.
-    """
+    """Return (N, P) squared distances, in sd, of markers (N, 3) from landmarks, given the ``known`` ones' rows."""
     places, at, covariance = _template()
     sides = np.array([OUTWARDS.get(place.partition("_")[0], 1.0) for place in places])
     have = [k for k, place in enumerate(places) if place in known]
@@ -169,9 +163,7 @@ class _PersonLabels:
         self._unplaced = self._by_height_and_width()
 
     def _wordings(self, label: str) -> Iterator[tuple[str, float]]:
-        """Yield the landmarks that a label names, and what its words cost, nats; first, if it stands there, the other
-        end of its joint, and the other side where nobody has what it names.
-        """
+        """Yield the landmarks that a label names, or names by mistake, and what its words cost, nats."""
         ways = self.said[label]
         said = ways[0].place if ways else ""
         misread, end = [], other_end(said)
@@ -203,9 +195,7 @@ class _PersonLabels:
                 yield place
 
     def _by_height_and_width(self) -> Array:
-        """Return the cost (N, P), nats, of where labels are for what has no usual place: by its height; of the ends of
-        an elbow or of toes the lateral one is outside.
-        """
+        """Return the cost (N, P), nats, of heights where there is no usual place, and of ends of elbows and toes."""
         cost, labels, usual = np.zeros(self.words.shape), list(self.rows), usual_standing()["places"]
         for i, j in np.argwhere(np.isfinite(self.words)):
             if part_of(LANDMARKS[j]) not in usual:
@@ -245,9 +235,7 @@ class _PersonLabels:
             known = fixed = new
 
     def _costs(self, known: Mapping[str, str], fixed: Mapping[str, str], free: Mask) -> tuple[Array, Array]:
-        """Return the costs (N, P) given the landmarks that are ``known``, and those of labels without the name as far
-        away as they are rivals; what is ``fixed`` stays.
-        """
+        """Return the costs (N, P) given the ``known`` landmarks, and those of rivals; what is ``fixed`` stays."""
         usual, away, labels = self._distances({}), self._distances(known), list(self.rows)
         gain = np.array([_nats("needed") * (part_of(place) in _GAINS) for place in LANDMARKS])
         placed = np.where(np.isfinite(away), np.minimum(away, _nats("farthest")), 0.0) + self._unplaced
@@ -287,9 +275,7 @@ class _PersonLabels:
         return away
 
     def _at_ends_of_feet(self, away: Array, free: Mask, taken: Collection[str]) -> Mask:
-        """Return (N, P) whether a label may be a heel or toe by its place: the hindmost and foremost of a foot, or both
-        markers at its ball where both feet have two.
-        """
+        """Return (N, P) whether a label may be a heel or toe: the hindmost and foremost of a foot, or its ball."""
         ends, balls = dict[str, int](), dict[str, int]()
         mute = np.array([not ways for ways in self.confirmed.values()])
         here = free & (away < bound("near") / 2) & np.array([[label not in taken] for label in self.rows])

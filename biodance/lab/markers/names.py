@@ -65,9 +65,7 @@ def _is_no_marker(name: str, bones: set[str]) -> bool:
 
 
 def _beginning(names: Sequence[str]) -> str:
-    """Return what nearly all names begin with: some signs and a separator, three letters, a number of two digits, or a
-    small letter before a capital.
-    """
+    """Return what nearly all names begin with: signs and a separator, letters, a number, a small letter."""
     counts = Counter(name[:end] for name in names for end in range(1, len(name)))
     often = [start for start, times in counts.items() if times >= max(_SHARED * len(names), 4)]
     capital = sum(name[1:2].isupper() for name in names) >= _SHARED * len(names)
@@ -83,9 +81,7 @@ def _ending(names: Sequence[str]) -> str:
 
 
 def _tokens_of(label: str) -> tuple[str, ...]:
-    """Return the words of a label in small letters without accents: split at separators and where a word begins with a
-    capital.
-    """
+    """Return the words of a label in small letters without accents, split at separators and capitals."""
     spoken = "".join(_SPOKEN.get(sign, sign) for sign in label)
     flat = "".join(sign for sign in unicodedata.normalize("NFKD", spoken) if not unicodedata.combining(sign))
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", flat)
@@ -130,9 +126,7 @@ def _sided(given: tuple[str, ...], word: str, side: str, pair: tuple[str, str]) 
 def _readings_of(
     labels: Iterable[str], pairs: Sequence[tuple[str, str]], noise: frozenset[str]
 ) -> dict[str, tuple[_Spelled, ...]]:
-    """Return label -> its readings as this set writes its sides: the way that makes most pairs of mirror images first,
-    then among the other labels the next. A label with a mirror image is read in no other way.
-    """
+    """Return label -> its readings as this set writes its sides: the way that makes most mirror images first."""
     every = {label: readings(name, pairs, noise) for label, name in plain_labels(labels).items()}
     out: dict[str, tuple[_Spelled, ...]] = {}
     ways: list[tuple[str, str, str]] = []
@@ -300,9 +294,7 @@ def _meanings(ways: Iterable[_Spelled]) -> tuple[Meaning, ...]:
 
 
 def _places(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
-    """Return the places of one reading: a landmark whose spelling the tokens make in some order, else a segment; a
-    number behind a name may count its markers.
-    """
+    """Return the places of one reading: a landmark that the tokens spell in some order, else a segment."""
     found = _spelled(rest, side)
     stem = (*rest[:-1], rest[-1].rstrip("0123456789"))
     if not found and stem != rest and any(stem):
@@ -336,9 +328,7 @@ def _spelled(rest: tuple[str, ...], side: str) -> list[tuple[str, int]]:
 
 
 def _composed(rest: tuple[str, ...]) -> list[tuple[str, int]]:
-    """Return landmark and rank for tokens that name a region and a quality of it, whole or in short: KneeLat, lat_kn,
-    EpiFemInt. Words that say nothing may stand among them, but no remainder within a token.
-    """
+    """Return landmark and rank for tokens that name a region and a quality of it: KneeLat, lat_kn, EpiFemInt."""
     words, kinds_of = _vocabulary(), _vocabulary().words
     parted = [part for token in rest for part in ([token] if token in kinds_of else _PARTS.findall(token))]
     known = [part for part in parted if part in kinds_of or part not in words.segments]  # a word is not cut

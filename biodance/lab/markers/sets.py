@@ -92,9 +92,7 @@ class Contents:
 
 
 def _parse_marker_set(path: Path) -> Contents:
-    """Read and check a marker-set file; a ``[map]`` of labels to landmarks or segments (`_parse_map`) is the short form
-    of ``[markers]`` and ``[landmarks]``.
-    """
+    """Read and check a marker-set file; a ``[map]`` is the short form of ``[markers]`` and ``[landmarks]``."""
     table = read_toml(path)
     _legal(path, "key", tuple(table), _FILE_KEYS)
     for name in ("aliases", "markers", "landmarks", "map"):
@@ -138,9 +136,7 @@ def _read_map(path: Path) -> Contents:
 
 
 def _parse_map(given: Mapping[str, Any], path: str) -> Contents:
-    """Return the marker set of a map: which label of the recordings is which landmark, or merely sits on which segment;
-    ``path`` names where it stands.
-    """
+    """Return the marker set of a map of labels to landmarks or segments; ``path`` names where it stands."""
     markers: dict[str, _SetMarker] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():

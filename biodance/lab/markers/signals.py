@@ -120,9 +120,7 @@ def _frozen(xyz: Array) -> Mask:
 
 
 def _breaks_off(steps: Array, start: int, stop: int) -> bool:
-    """Return whether a marker with ``steps`` (T,) m a frame does not come to rest by and by before ``start``, or not
-    start so at ``stop``; unseen frames and the ends of the recording tell nothing.
-    """
+    """Return whether ``steps`` (T,) m a frame break off before ``start`` or set in at ``stop`` in full."""
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
         if min(near, farther) >= 0 and max(near, farther) < steps.size:
             slow = steps[near] < _SLOWER * steps[far] and steps[far] < steps[farther]
@@ -174,9 +172,7 @@ def _limit(step: float) -> float:
 
 
 def _spikes(path: Array, step: float) -> tuple[Mask, float]:
-    """Return (T,) where a marker's ``path`` (T, 3) jumps, and how far at most: the clearest jump is taken out first,
-    for the frames beside it seem to be off, too.
-    """
+    """Return (T,) where a marker's ``path`` (T, 3) jumps, the clearest taken out first, and how far at most."""
     path, spiky, farthest = path.copy(), np.zeros(len(path), dtype=bool), 0.0
     while True:
         found = [_off_its_way(path, frames) for frames in range(1, _LONGEST + 1)]

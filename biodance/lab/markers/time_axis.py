@@ -191,9 +191,7 @@ def _paths(xyz: Array) -> Array | None:
 
 
 def _on_grid(stamps: Array, paths: Array) -> tuple[Array, float] | None:
-    """Return the instants (S,) s, one a frame, at which the ``paths`` (S, c) are smoothest, and the rate (Hz) of the
-    cameras; None where no grid is told.
-    """
+    """Return the instants (S,) s at which the ``paths`` (S, c) are smoothest and the cameras' rate; or None."""
     instants = np.array(stamps)
     for _ in range(_ROUNDS):
         late, weight = _late(instants, paths)
@@ -216,9 +214,7 @@ def _on_grid(stamps: Array, paths: Array) -> tuple[Array, float] | None:
 
 
 def _late(instants: Array, paths: Array) -> tuple[Array, Array]:
-    """Return how much later (S,) s than ``instants`` (S,) s rows of ``paths`` (S, c) were seen, if they are smooth, and
-    the squared speed (S,) that tells it.
-    """
+    """Return how much later (S,) s rows of ``paths`` (S, c) were seen, if smooth, and their squared speed (S,)."""
     rate = 1 / float(np.median(np.diff(instants)))
     stiff = rate / (2 * np.pi * _SLOW * rate) ** 4
     smooth = [make_smoothing_spline(instants, path, lam=stiff) for path in paths.T]
@@ -229,9 +225,7 @@ def _late(instants: Array, paths: Array) -> tuple[Array, Array]:
 
 
 def _grid(instants: Array, weight: Array, rate: float) -> tuple[float, float] | None:
-    """Return the rate (Hz) and an instant (s) of the grid on which the ``instants`` (S,) gather; None where they
-    gather no more than chance would.
-    """
+    """Return rate (Hz) and an instant (s) of the grid on which ``instants`` (S,) gather; None as by chance."""
     share = weight / weight.sum()
     places = np.rint((instants - instants[0]) / _TICK).astype(int)
     count = next_fast_len(_FINE * (int(places[-1]) + 1), real=True)

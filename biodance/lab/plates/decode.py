@@ -195,9 +195,7 @@ def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
 
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
-    """Return ORIGIN (3,) in m, in the file's unit, or in m or mm where only that makes sense, and what was decided;
-    TrialRefused where nothing does.
-    """
+    """Return ORIGIN (3,) in m, in the unit that makes sense, and what was decided."""
     four = plate.type in FOUR_SENSORS
     fits = []
     for unit in dict.fromkeys((metres, 0.001, 1.0)):
@@ -260,9 +258,7 @@ def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReadi
 
 
 def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask, tuple[str, ...]]:
-    """Return the channels with the nearest known sample where one is no number, where all are known, and what was
-    masked; TrialRefused where nothing is known.
-    """
+    """Return the channels with the nearest known sample in gaps, where all are known, and what was masked."""
     known = np.asarray(np.isfinite(channels).all(axis=1))
     if known.all():
         return channels, known, ()

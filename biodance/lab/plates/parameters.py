@@ -219,9 +219,7 @@ def plate_parameters(
 
 
 def _told_columns(channels: Sequence[str | int], labels: tuple[str, ...]) -> Array:
-    """Return the channels that session.toml names as numbers (n,) from 1 among the ``labels`` of the file;
-    TrialRefused where the file has no such channel, or has it twice.
-    """
+    """Return the channels that session.toml names as numbers (n,) from 1 among the ``labels`` of the file."""
     plain = [label.strip().casefold() for label in labels]
     named = [label for label in labels if label]
     found = []

@@ -52,9 +52,7 @@ def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> t
 
 
 def _borne_elsewhere(reading: PlateReading, others: Sequence[PlateReading], markers: Markers | None) -> float:
-    """Return the largest force N of another plate on which a foot is seen; 0 where one is seen on this plate, too, or
-    none of the others carries anybody.
-    """
+    """Return the largest force N of another plate with a foot on it; 0 with a foot on this one, or without."""
     if markers is None or _feet_on(reading, markers):
         return 0.0
     loads = [float(np.abs(one.sensor[:, 2]).max()) for one in others if _feet_on(one, markers)]
@@ -71,9 +69,7 @@ def _feet_on(reading: PlateReading, markers: Markers) -> bool:
 
 
 def _without_offset(reading: PlateReading, elsewhere: float) -> PlateReading:
-    """Return the reading without the constant that the plate reads while the person is ``elsewhere`` (N), as its zero:
-    up to a third of that load, as in a trial in which it is seen unloaded. As it is for others.
-    """
+    """Return the reading without the constant that it reads while the person is ``elsewhere`` (N), as its zero."""
     level, spread, _ = _course(reading, _CONTACT)
     if not TOUCH_FORCE < abs(level) <= LARGEST_SHARE * elsewhere or spread >= _QUIET:
         return reading
@@ -84,9 +80,7 @@ def _without_offset(reading: PlateReading, elsewhere: float) -> PlateReading:
 
 
 def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) -> str:
-    """Return why a plate is dead, "" for one that is alive: it carries the same load at the same place for the whole
-    trial, though the person moves or stands on other plates, where the feet are.
-    """
+    """Return why a plate is dead, "" for one alive: a constant load at one place though the person moves."""
     length = _CONTACT if elsewhere else 0.0  # noise is averaged only where feet tell that nobody is on the plate
     level, spread, wanders = _course(reading, length)
     still = spread < _STUCK * abs(level) and wanders < _SAME_PLACE * abs(level)
@@ -103,9 +97,7 @@ def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) 
 
 
 def _course(reading: PlateReading, length: float) -> tuple[float, float, float]:
-    """Return the mean vertical force N along the plate's z, and the standard deviations of its means over ``length`` s
-    (0 = of the samples) and of those of the worse of both tilting moments, N·m.
-    """
+    """Return the mean vertical N, and the sds of its means over ``length`` s and of the worse moment's, N·m."""
     sensor = reading.sensor[reading.known, 2:5]
     size = min(max(1, round(length * reading.rate)), len(sensor))
     count = len(sensor) // size
@@ -138,9 +130,7 @@ def without_padding(
 
 
 def _padded_samples(raw: RawC3d, markers: Markers | None) -> Mask:
-    """Return (S,) True for the samples at the start and the end of a recording in which all channels repeat the first
-    or the last measured one to the last digit, though the markers go on.
-    """
+    """Return (S,) True at the ends where all channels repeat one sample though the markers go on."""
     padded = np.zeros(len(raw.analog), dtype=bool)
     live = raw.analog[:, (raw.analog != raw.analog[:1]).any(axis=0)] if len(raw.analog) else raw.analog
     if not live.size:

@@ -45,9 +45,7 @@ _FZ_ALONE = (
 
 
 def _surface_wrench(reading: PlateReading) -> tuple[Array, _Said]:
-    """Return the wrench (S, 6) N, N·m about the centre of the surface, plate axes, sign as recorded, and what was
-    decided.
-    """
+    """Return the wrench (S, 6) N, N·m about the surface centre, plate axes, as recorded; what was decided."""
     below, said = sensor_below(reading.vector, reading.axes)
     wrench = wrench_about_point(reading.sensor, below)
     if reading.plate.polynomial is None:
@@ -402,9 +400,7 @@ def _unmirrored(reading: PlateReading, time: Array, markers: Markers | None) -> 
 
 
 def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[PlateReading, int, str, str]:
-    """Return the reading, its axes by quarter turns where only that puts the load under the feet; by how many degrees;
-    what was decided and what is in doubt, "" for nothing.
-    """
+    """Return the reading turned by quarters if only that puts the load under the feet; degrees; said; doubt."""
     distance = _distance(reading, time, markers)
     if distance is None:
         return reading, 0, "", ""
@@ -425,9 +421,7 @@ def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[P
 
 
 def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | None:
-    """Return the median distance (m) of load and feet in frames spread over the trial; None if no foot is seen on the
-    plate.
-    """
+    """Return the median distance (m) of load and feet; None if no foot is seen on the plate."""
     if not markers.time.size:
         return None
     frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))

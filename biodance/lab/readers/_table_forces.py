@@ -242,9 +242,7 @@ def _put(shift: Array) -> str:
 
 
 def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
-    """Return the median (2,) m by which the feet on the ground lie beside the pressure, while the person stands upright
-    on both where that is seen. None where no foot is on the ground under load.
-    """
+    """Return the median (2,) m by which loaded feet on the ground lie beside the pressure; None without any."""
     known = np.isfinite(_pressure(total)).all(axis=1)
     if known.sum() < 1:
         return None

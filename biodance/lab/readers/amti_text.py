@@ -148,9 +148,7 @@ def _rate(values: Array, columns: list[str]) -> float | None:
 
 
 def _refuse_other_clock(values: Array, columns: list[str], rate: float, path: Path) -> None:
-    """Refuse a table whose own time column goes in other steps than ``rate`` Hz: rows are lost, doubled or exchanged,
-    or the rate is wrong.
-    """
+    """Refuse a table whose own time column goes in other steps than ``rate`` Hz."""
     if "time_s" not in columns or columns.index("time_s") >= values.shape[1]:
         return
     own = _rate(values, columns)

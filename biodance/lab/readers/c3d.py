@@ -124,9 +124,7 @@ def file_frame(raw: RawC3d, *, subject: str | None = None) -> tuple[float, Array
 def _in_lab(
     raw: RawC3d, labels: MarkerLabels, known: MarkerSet | None
 ) -> tuple[Markers | None, float, Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the markers in m in the lab frame, the file's unit of length in m, lab_R_file (3, 3), what was decided
-    and what is doubtful.
-    """
+    """Return the markers in m in the lab, metres per unit, lab_R_file (3, 3), what was decided, and doubts."""
     all_in_order = labels.columns == tuple(range(raw.points.shape[1]))
     points = raw.points if all_in_order else raw.points[:, list(labels.columns)]
     metres, units, doubts = metres_per_unit(raw.parameters, points, where=str(raw.path))
@@ -178,9 +176,7 @@ def _gaps(markers: Markers | None) -> tuple[str, ...]:
 def _turn_to_z_up(
     raw: RawC3d, markers: Markers | None, known: MarkerSet | None
 ) -> tuple[Array, tuple[str, ...], tuple[str, ...]]:
-    """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings; the identity if it does
-    already.
-    """
+    """Return the rotation lab_R_file (3, 3) that makes z point up, history and warnings."""
     floor, declared = _floor(raw, markers), _declared(raw, markers)
     body = axis_to_head(markers, known) if markers else None
     witnesses = {"the plates": floor, "the markers from feet to head": body, "POINT:Y_SCREEN": declared}

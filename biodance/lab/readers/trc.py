@@ -73,9 +73,7 @@ def _may_hold_forces(table: Path) -> bool:
 
 
 def _going_on(markers: Path, place: Path) -> list[Path]:
-    """Return the tables of a folder whose stem is that of the markers and more (``walk_GRF_2plates`` for ``walk``, not
-    ``walk2``), and of no other markers with a longer stem.
-    """
+    """Return the tables whose stem is that of the markers and more (``walk_GRF`` for ``walk``), and no other's."""
     stems = [path.stem for path in markers.parent.glob("*.trc")]
 
     def fits(stem: str, table: Path) -> bool:
@@ -297,9 +295,7 @@ def _spread(values: Array) -> float:
 def _equal_steps(
     names: tuple[str, ...], number_of: NDArray[np.int64], raw: Array, xyz: Array, declared: float, path: Path
 ) -> tuple[tuple[Array, Array], list[str]]:
-    """Return time (T,) with equal steps and the coordinates on it, and warnings: frames left out by their numbers or
-    the declared rate are NaN, steps that change are resampled.
-    """
+    """Return time (T,) with equal steps, coordinates on it (NaN in frames left out), and warnings."""
     axis = time_axis(raw, where=str(path), row="frame")
     if raw.size == 1:
         return (raw, xyz), []

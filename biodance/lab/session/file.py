@@ -222,9 +222,7 @@ def _undescribed(session: Session) -> tuple[RawC3d, tuple[tuple[int, ...], ...]]
 
 
 def _channels_line(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float, ...]]:
-    """Return the labels of a plate's channels, or their numbers where labels do not tell them apart, and N or N·m per
-    unit of each; no sensitivity where the file has a matrix, nothing where it describes no such plate.
-    """
+    """Return the labels (or numbers) of a plate's channels, and N or N·m per unit where there is no matrix."""
     if trial.source.format != "C3D":
         return [], ()
     raw = read_raw(trial.source.path)

@@ -242,9 +242,7 @@ def _check_mass(mass: float, on_plates: list[_Declared], notes: list[str]) -> fl
 
 
 def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the mass (kg); where nobody knows it and no plate was recorded, that of a middling person of this stature:
-    markers are followed whatever the mass is. NaN beside plates, which a wrong mass would contradict.
-    """
+    """Return the mass (kg); that of a middling person of this stature where nothing tells it and no plate is."""
     if math.isfinite(mass):
         return mass
     if math.isnan(stature) or any(trial.plates for trial in trials):
@@ -261,9 +259,7 @@ def _middle_mass(mass: float, stature: float, trials: Sequence[Trial], notes: li
 
 
 def _stature_of_markers(trials: Sequence[Trial], notes: list[str]) -> float:
-    """Return the stature (m) by the markers of a static trial, without one by those of the tallest moving trial; NaN if
-    none tells it.
-    """
+    """Return the stature (m) by the markers of a static trial, else of the tallest moving one; NaN if none."""
     for trial in (t for t in trials if t.role == "static"):
         stature, sd, told_by = stature_of_markers(trial)
         if _LEGAL_STATURE[0] <= stature <= _LEGAL_STATURE[1]:

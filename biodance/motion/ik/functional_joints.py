@@ -188,9 +188,7 @@ def _told(
     spared: Mapping[str, tuple[str, float]],
     refused: Mapping[str, float],
 ) -> _FunctionalJoints:
-    """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
-    far that would lie with them; ``refused`` how far joints would go that were kept.
-    """
+    """Return the result with its notes: markers ``spared``, and how far ``refused`` joints would go."""
     covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
     deviation = np.sqrt(np.diag(covariance))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())

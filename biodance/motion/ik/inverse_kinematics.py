@@ -170,9 +170,7 @@ def solve_ik(body: Body, markers: Markers, *, guess: Array | None = None, tolera
 
 
 def _lean(problem: MarkerProblem, own: Index, found: Minimum, frames: Index) -> Minimum:
-    """Solve ``frames`` with their markers and, at the weight ``_LEAN``, all markers of the posture interpolated from
-    the ``own`` frames.
-    """
+    """Solve ``frames`` with their markers and, at ``_LEAN``, all those of the posture between the ``own`` frames."""
     start = interpolate_postures(problem, own, found.q, frames)
     if not frames.size:
         return Minimum(start, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp))

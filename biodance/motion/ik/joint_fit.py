@@ -213,9 +213,7 @@ def beside_sliding_skin(
 
 
 def _without_slides(square: Array, shared: Array, own: Array, noise: float) -> Array:
-    """Return the products ``square`` (p, p) of rows in units of their standard deviation, with the slides taken out:
-    ``own`` (s, s) their products, ``shared`` (s, p) those with the rows; ``noise`` the variance of a row.
-    """
+    """Return the products ``square`` (p, p) of rows with slides taken out: ``own`` (s, s), ``shared`` (s, p)."""
     inner = own + noise * error_size("slide", "marker") ** -2 * np.eye(len(own))
     return np.asarray((square - shared.T @ np.linalg.solve(inner, shared)) / noise)
 

@@ -97,9 +97,7 @@ class JointUnknowns:
         return np.concatenate([residual, apart]), np.concatenate([slope, apart_slope])
 
     def _sides(self, theta: Array) -> tuple[Array, Array]:
-        """Return by how many standard deviations the limbs of ``_LIMBS`` are longer on the right (2,), and the slope
-        (2, 37); of a limb that ends at a joint which the movement contradicts, only as far as such a joint is known.
-        """
+        """Return by how many sds the limbs are longer on the right (2,), and the slope (2, 37)."""
         more, slope = np.zeros(len(_LIMBS)), np.zeros((len(_LIMBS), SIZE))
         sd = np.full(len(_LIMBS), error_size("side_length", "limb"))
         for row, (upper, lower) in enumerate(_LIMBS):
@@ -246,9 +244,7 @@ def knees_elsewhere(
 
 
 def _ways(centres: Centres, knee: str) -> Array:
-    """Return (2, 37): what the unknowns move a knee's axis forwards from the place that the lateral marker gives it, m,
-    and turn it about the bone, rad.
-    """
+    """Return (2, 37): what the unknowns move a knee's axis forwards, m, and turn it about the bone, rad."""
     bone, out = JointUnknowns(centres).bone(knee), np.zeros((2, SIZE))
     forwards = np.cross(bone, centres.right[knee])
     forwards /= np.linalg.norm(forwards)

@@ -242,9 +242,7 @@ def _meeting(rotation: Array, translation: Array, axis: Array) -> Array:
 
 
 def _length_terms(rotation: Array, translation: Array, axis: Array, hip: Array, low: Array, high: Array) -> Array:
-    """Return a, b, c (3, K) of the squared hip-ankle distance, in the middle of the ranges and in K - 1 postures of
-    hip and ankle.
-    """
+    """Return a, b, c (3, K) of the squared hip-ankle distance, in the middle and in K - 1 postures."""
     angles = np.random.default_rng(0).uniform(low, high, (_POSTURES, 6))
     angles[0] = (low + high) / 2
     squares = []

@@ -116,9 +116,7 @@ _OTHERS = 0.01
 
 
 def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | None = None) -> Array:
-    """Return q (F, nq): the angles at a ``share`` of their range between the limits (None: zero), the root where its
-    markers say.
-    """
+    """Return q (F, nq): angles at a ``share`` of their range (None: zero), the root where its markers say."""
     lower, upper = problem.chain.lower, problem.chain.upper
     angles = np.clip(np.zeros(len(lower)), lower, upper)
     if share is not None:
@@ -130,9 +128,7 @@ def _guess_postures(problem: MarkerProblem, frames: Index, *, share: float | Non
 
 
 def _place_root(problem: MarkerProblem, frames: Index, angles: Array) -> Array:
-    """Return q (F, nq) with the ``angles`` (F, n) rad and the root's pose that fits the body, rigid at them, best to
-    its markers: the root segment's before all others.
-    """
+    """Return q (F, nq) with ``angles`` (F, n) rad and the root's pose that fits the rigid body best."""
     body, xyz = problem.body, problem.xyz[frames]
     if not body.n_root:
         return angles
@@ -212,9 +208,7 @@ def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
 
 
 def _retry(problem: MarkerProblem, frames: Index, found: Minimum) -> Minimum:
-    """Return ``found`` with the doubtful frames tried again: from their markers, and from the nearest sound frames
-    on both sides.
-    """
+    """Return ``found`` with doubtful frames tried again, from their markers and from sound frames beside."""
     rms = np.sqrt(np.maximum(2 * found.cost, 0.0) / problem.weight[frames].sum(axis=1))
     doubtful = rms > _DOUBT[0] * median_filter(rms, min(_NEIGHBOURS, len(rms)), mode="mirror") + _DOUBT[1]
     sound, bad = np.flatnonzero(~doubtful), np.flatnonzero(doubtful)

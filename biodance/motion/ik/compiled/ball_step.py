@@ -68,9 +68,7 @@ def beyond(angle, lower, upper):
 
 @compiled
 def _angles_of(quaternion, sign, near, lower, upper, out):
-    """Fill ``out`` (3,) with that set of Cardan angles which lies less outside the limits; if both do alike, the one
-    closer to ``near``.
-    """
+    """Fill ``out`` (3,) with the Cardan angles less outside the limits, or if alike, closer to ``near``."""
     x, y, z, w = quaternion
     a = sign * np.arctan2(2 * (x * w - y * z), 1 - 2 * (x * x + y * y))
     b = sign * np.arcsin(min(max(2 * (x * z + y * w), -1.0), 1.0))
@@ -182,9 +180,7 @@ def continue_angles(chain, q):
 
 @compiled
 def _slope_at(before, at, after, one, two):
-    """Return the slope in the middle of three values ``one`` and ``two`` frames apart: zero at a turn, else a
-    weighted harmonic mean.
-    """
+    """Return the slope in the middle of three values: zero at a turn, else a weighted harmonic mean."""
     left, right = (at - before) / one, (after - at) / two
     if left * right <= 0:
         return 0.0
@@ -213,9 +209,7 @@ def smooth_at(known, values, k, frame, out):
 
 @compiled
 def _posture_of(chain, smooth, near, single, q):
-    """Fill q (nq,) from ``smooth`` coordinates (see ``chart``); ``near`` (nq,) decides between equal sets of Cardan
-    angles.
-    """
+    """Fill q (nq,) from ``smooth`` coordinates; ``near`` (nq,) decides between equal sets of Cardan angles."""
     first, c = q.shape[0] - chain.parent.shape[0], 0
     if chain.roots:
         for c in range(3):

@@ -401,9 +401,7 @@ def _shorten(chain, x):
 
 @compiled
 def _centred_squares(chain, xyz, weight):
-    """Return the weighted squared distances of the markers from their mean, m² (from the lab's origin for a fixed
-    root).
-    """
+    """Return the weighted squared distances of the markers from their mean (fixed root: from the origin), m²."""
     total, square = 0.0, 0.0
     mean = np.zeros(3)
     for k in range(xyz.shape[0]):
