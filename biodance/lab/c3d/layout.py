@@ -1,8 +1,6 @@
-"""Decide how many points, channels, samples and frames the data section of a C3D file holds.
-
-The numbers stand in the header, in the parameters and, as the last witness, in the length of the file. Where they
-contradict each other, only a reading that fills the file to its last block is believed; if there is none, or more than
-one, the file is refused.
+"""Decide how many points, channels, samples and frames the data section of a C3D file holds, by header, parameters and
+the length of the file. Where they contradict each other, only the one reading that fills the file to its last block is
+believed; else the file is refused.
 """
 
 import math
@@ -18,9 +16,7 @@ from biodance.errors import FileRefused
 from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
 
 _CLIPPED = 65535
-"""What the 16-bit frame numbers hold in a recording that is longer; the full number then stands in the TRIAL group
-or LONG_FRAMES, or the length of the file alone tells it.
-"""
+"""What 16-bit frame numbers hold in a longer recording: TRIAL, LONG_FRAMES or the length of the file tells more."""
 
 
 def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:

@@ -1,6 +1,4 @@
-"""Who is in the session: taken from what was declared (session.toml, Vicon files, recordings), else guessed; every
-guess is said.
-"""
+"""Who is in the session: declared (session.toml, Vicon files, recordings), else guessed; every guess is said."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
