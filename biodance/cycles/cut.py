@@ -45,7 +45,7 @@ class FootEvent:
 def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
     """Return when each foot came down on a plate or left it, in the order of time.
 
-    ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `THRESHOLD`,
+    ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `_THRESHOLD`,
     between two frames in which the plates tell what the ground does to this foot and the other one is not over the same
     plate: a force that two feet share tells nothing of one.
     """
