@@ -54,7 +54,7 @@ _NumberKey = tuple[str, str, str, str, str]
 @dataclass(frozen=True, eq=False)
 class SegmentTable:
     """One table: ``numbers`` by study (""), segment, sex ("F" or "M"), quantity and axis; ``groups`` of its studies
-    (adult, child ...) by study and sex; ``layout`` says how its segments lie in the model (`biodance.body.tables.choice`);
+    (adult, child ...) by study and sex; ``layout`` says how its segments lie in the model (`tables.choice`);
     ``provenance`` the .toml.
     """
 
