@@ -15,9 +15,7 @@ GENERAL = "general"
 
 
 def number_field(default: float, low: float, high: float, unit: str, meaning: str, *, word: str = "") -> Any:
-    """Return the field of a number from ``low`` to ``high``; where there is a ``word``, it is the default and legal,
-    too.
-    """
+    """Return the field of a number from ``low`` to ``high``; a ``word`` is the default and legal, too."""
     return field(
         default=word or default, metadata={"legal": (low, high), "unit": unit, "meaning": meaning, "word": word}
     )
@@ -29,9 +27,7 @@ def word_field(default: str, legal: tuple[str, ...], meaning: str) -> Any:
 
 
 class Setting(NamedTuple):
-    """One setting: its dotted ``key``, ``value``, ``unit`` ("" without one), ``meaning``, and the ``legal`` values
-    in words.
-    """
+    """One setting: dotted ``key``, ``value``, ``unit`` ("" = none), ``meaning``, ``legal`` values in words."""
 
     key: str
     value: Value
@@ -42,9 +38,7 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """Settings that belong together; every value is checked at birth, a whole number where a float is meant becomes
-    one.
-    """
+    """Settings that belong together, checked at birth; a whole number where a float is meant becomes one."""
 
     name: ClassVar[str]
 

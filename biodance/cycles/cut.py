@@ -123,9 +123,7 @@ def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
 
 
 def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[Array, Array]:
-    """Return by how much the strikes and the leavings (n,) s come later by markers than by forces, where both see
-    one.
-    """
+    """Return by how much strikes and leavings (n,) s come later by markers than by forces, both seen."""
     late = [(event.down, _delay_of_nearest(markers, event)) for event in force]
     strikes, leavings = ([s for d, s in late if d is down and abs(s) < _TOGETHER] for down in (True, False))
     return np.array(strikes), np.array(leavings)

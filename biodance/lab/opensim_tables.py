@@ -84,9 +84,7 @@ def read_mot(path: str | Path) -> TimeTable:
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
-    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a
-    wrong header.
-    """
+    """Return the column labels of a .mot or .sto file without ``time``; FileRefused as of `read_mot`."""
     return _parts(Path(path)).labels[1:]
 
 

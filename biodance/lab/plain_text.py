@@ -154,9 +154,7 @@ def with_points(text: str) -> tuple[str, bool]:
 
 
 def cells(line: str) -> list[str]:
-    """Return the cells of one row: between tabs where there are tabs (a cell may be empty), else between runs of
-    blanks.
-    """
+    """Return the cells of one row: between tabs where there are any (a cell may be empty), else between blanks."""
     return [cell.strip() for cell in line.rstrip("\r\n").split("\t")] if "\t" in line else line.split()
 
 

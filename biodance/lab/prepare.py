@@ -26,9 +26,7 @@ _NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_dampe
 
 @dataclass(frozen=True)
 class LowPass:
-    """Low-pass of a ``kind``: ``order`` of one pass (both have twice that), ``cutoff`` Hz where both together are 3
-    dB down.
-    """
+    """Low-pass of a ``kind``: ``order`` of one of two passes, ``cutoff`` Hz where both are 3 dB down."""
 
     order: int = FilterSettings.order
     cutoff: float = USUAL_CUTOFF
@@ -64,17 +62,13 @@ class LowPass:
 
 
 def motion_filter(settings: Settings) -> LowPass:
-    """Return the low-pass of the joint coordinates: with the cut-off that an analyst or the trial chose, else the
-    usual one.
-    """
+    """Return the low-pass of the joint coordinates: with the chosen cut-off, else the usual one."""
     chosen = settings.filter.cutoff
     return LowPass(settings.filter.order, USUAL_CUTOFF if chosen == "auto" else float(chosen), settings.filter.kind)
 
 
 def force_filter(settings: Settings) -> LowPass:
-    """Return the low-pass that an analyst chose for the forces: that of the joint coordinates, unless another
-    cut-off was asked for.
-    """
+    """Return the low-pass of the forces: that of the joint coordinates, unless another cut-off was chosen."""
     chosen, same = settings.filter.force_cutoff, motion_filter(settings)
     return same if chosen == "same" else replace(same, cutoff=float(chosen))
 
@@ -130,9 +124,7 @@ def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
 
 
 def left_raw(values: Array, rate: float, settings: LowPass) -> NDArray[np.bool_]:
-    """Return where ``low_pass`` leaves a number as it is, because its run between two gaps is too short; shape of
-    ``values``.
-    """
+    """Return where ``low_pass`` leaves a number as it is: its run is too short; shape of ``values``."""
     columns = np.asarray(values, dtype=float).reshape(len(values), -1)
     out = np.zeros(columns.shape, dtype=bool)
     for column in np.flatnonzero(np.isnan(columns).any(axis=0)):

@@ -65,9 +65,7 @@ def _without_origin(trial: Trial) -> Trial:
 
 
 def without_frozen(trial: Trial) -> Trial:
-    """Return the trial with its markers unseen where they are frozen, and a warning that says so; as it is where none
-    are.
-    """
+    """Return the trial with its markers unseen where they are frozen, and a warning that says so."""
     markers = trial.markers
     frozen = np.zeros(0, dtype=bool) if markers is None else frozen_frames(markers.xyz)
     if markers is None or not frozen.any():

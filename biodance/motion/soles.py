@@ -95,9 +95,7 @@ _UNDER = 0.03  # m: a centre of pressure so near to a sole is under it
 
 
 def inside(plate: Plate, points: Array) -> Array:
-    """Return how far points (..., 3) m are inside the plate seen from above: distance to the nearest edge, negative
-    outside.
-    """
+    """Return how far points (..., 3) m are inside the plate from above: to the nearest edge, < 0 outside."""
     corners = plate.corners[:, :2]
     after = np.concatenate([corners[1:], corners[:1]])
     (x, y), (u, v) = corners.T, (after - corners).T
@@ -169,9 +167,7 @@ class Surfaces:
 
 
 def find_surfaces(trial: Trial, soles: Soles, rests: Mask, load: Mask, *, weight: float) -> Surfaces:
-    """Return the surfaces of a trial; ``rests`` (T, 2), ``load`` (T, plates) True where loaded, ``weight`` N (NaN =
-    unknown).
-    """
+    """Return the surfaces of a trial; ``rests`` (T, 2), loaded ``load`` (T, plates), ``weight`` N or NaN."""
     plates = sorted({round(plate.height, 3) for plate in trial.plates})
     offset = _offsets(trial, soles, rests, load)
     low = (soles.outline[..., 2] - offset).min(axis=2)

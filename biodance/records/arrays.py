@@ -45,9 +45,7 @@ def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> 
 
 
 def any_coordinate(flags: Mask) -> Mask:
-    """Return (...) where one of the three coordinates is flagged, (..., 3): ``flags.any(axis=-1)`` in a third of its
-    time.
-    """
+    """Return (...) where a coordinate (..., 3) is flagged: ``flags.any(axis=-1)`` in a third of its time."""
     return np.asarray(flags[..., 0] | flags[..., 1] | flags[..., 2])
 
 
@@ -102,9 +100,7 @@ def rate_of(time: Array) -> float:
 
 
 def by_name(trials: Iterable[_Named], name: str, kind: str) -> _Named:
-    """Return the first of ``trials`` of that ``name``; UnknownName lists all names where there is none of the
-    ``kind``.
-    """
+    """Return the first of ``trials`` of that ``name``; UnknownName lists all where there is none."""
     some = tuple(trials)
     return some[known_index(kind, name, [one.name for one in some])]
 

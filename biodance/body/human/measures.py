@@ -126,9 +126,7 @@ def unit(vector: Array) -> Array:
 
 
 def pelvis_frame(right_asis: Array, left_asis: Array, mid_psis: Array) -> tuple[Array, Array]:
-    """Return lab_R_pelvis (3, 3) and the middle of the ASIS (3,) m: z to the right ASIS, x forwards in the plane of
-    ASIS and PSIS (ISB).
-    """
+    """Return lab_R_pelvis (3, 3) (z to the right ASIS, x forwards; ISB) and the middle of the ASIS (3,) m."""
     middle = (right_asis + left_asis) / 2
     z = unit(right_asis - left_asis)
     y = unit(np.cross(z, middle - mid_psis))

@@ -20,9 +20,7 @@ _CLIPPED = 65535
 
 
 def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
-    """Return a numeric parameter flattened to (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if
-    missing or text.
-    """
+    """Return a numeric parameter as (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if missing."""
     family = _continued(parameters, group, name)
     arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
     return np.concatenate(arrays) if arrays else np.empty(0)

@@ -58,9 +58,7 @@ def integers(content: bytes | memoryview, processor: int, kind: str = "u2") -> N
 
 
 def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
-    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are
-    converted to IEEE.
-    """
+    """Return the bytes as 32-bit floats (n,) in the processor's number format; DEC (VAX F) becomes IEEE."""
     if processor != DEC:
         return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)

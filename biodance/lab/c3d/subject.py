@@ -79,9 +79,7 @@ def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:
 
 @dataclass(frozen=True)
 class MarkerLabels:
-    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``), what is
-    suspicious (``warnings``).
-    """
+    """The chosen points: ``columns`` in the file, ``names``, ``history`` of decisions, ``warnings``."""
 
     columns: tuple[int, ...]
     names: tuple[str, ...]
@@ -96,9 +94,7 @@ show no pelvis with two legs.
 
 
 def subjects_of(raw: RawC3d) -> tuple[str, ...]:
-    """Return the names of the subjects in a file: label prefixes (`_people_of`), or SUBJECTS:NAMES where labels have
-    none.
-    """
+    """Return the names of the subjects in a file: label prefixes (`_people_of`), else SUBJECTS:NAMES."""
     prefixes = [prefix for i, (prefix, _) in enumerate(raw.split_labels) if i not in raw.nameless]
     if any(prefixes):
         return _people_of(prefixes)
@@ -113,9 +109,7 @@ def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
 
 
 def poses_only(raw: RawC3d) -> str:
-    """Return the sentence for a file with segment poses (group ROTATION) and no point that was ever seen; "" for
-    others.
-    """
+    """Return the sentence for a file with segment poses (group ROTATION) and no point ever seen; "" for others."""
     said = "" if np.isfinite(raw.points).any() else segment_poses(raw.parameters)
     return f"{raw.path}: {said}" if said else ""
 

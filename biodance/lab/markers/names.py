@@ -89,9 +89,7 @@ def _tokens_of(label: str) -> tuple[str, ...]:
 
 
 def readings(label: str, pairs: Iterable[tuple[str, str]], noise: frozenset[str]) -> list[_Spelled]:
-    """Return the ways to take a side from one label, with the words of ``pairs`` (right, left); ``noise`` are words
-    that say nothing.
-    """
+    """Return the ways to take a side from one label, with ``pairs`` (right, left); ``noise`` says nothing."""
     tokens = _tokens_of(label)
     kept = tuple(token for token in tokens if token not in noise) or tokens
     out = [_Spelled("", given) for given in dict.fromkeys((kept, tokens))]
@@ -198,9 +196,7 @@ _Value = TypeVar("_Value")
 
 @dataclass(frozen=True)
 class Meaning:
-    """One thing that a label may mean: ``place`` a landmark or segment with its side; ``rank`` 0 for the most usual
-    spelling of it.
-    """
+    """One thing that a label may mean: ``place`` a landmark or segment with its side; ``rank`` 0 = most usual."""
 
     place: str
     rank: int

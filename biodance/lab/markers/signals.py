@@ -207,9 +207,7 @@ _CLOSURE = 0.02
 
 @dataclass(frozen=True)
 class MarkerGaps:
-    """How often a marker was not seen: ``percent`` of all frames, ``longest`` gap in s (the ends of the recording
-    count).
-    """
+    """How often a marker was not seen: ``percent`` of all frames, ``longest`` gap in s (ends count)."""
 
     label: str
     percent: float
@@ -218,9 +216,7 @@ class MarkerGaps:
 
 @dataclass(frozen=True)
 class Gap:
-    """Frames ``start`` to ``stop`` (excluded) of one marker that were not seen; ``how`` it was dealt with, one plain
-    sentence.
-    """
+    """Frames ``start`` to ``stop`` (excluded) of a marker that were not seen; ``how`` it was dealt with."""
 
     label: str
     start: int

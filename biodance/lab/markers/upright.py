@@ -89,9 +89,7 @@ def standing_mass(trial: Trial) -> float | None:
 def steady_mass(
     wrench: Wrench, *, rules: StandingRules | None = None, gravity: float = STANDARD_GRAVITY
 ) -> float | None:
-    """Return the mass in kg that a wrench carries in its longest quiet part, by default within 3 % for 0.4 s; None
-    without one.
-    """
+    """Return the mass in kg that a wrench carries in its longest quiet part (3 % for 0.4 s); None without one."""
     vertical = wrench.force[:, 2]
     size = max(1, round(_BLOCK * wrench.rate)) if np.isfinite(wrench.rate) else 1
     count = vertical.size // size
@@ -420,9 +418,7 @@ def _only_way_to_stand(markers: Markers) -> Array | None:
 
 
 def clear_axis(direction: Array) -> Array | None:
-    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none or the direction is not
-    finite.
-    """
+    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none."""
     size = np.sort(np.abs(direction))
     if not np.isfinite(size).all() or size[2] <= bound("clear") * size[1]:
         return None

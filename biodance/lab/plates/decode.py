@@ -46,9 +46,7 @@ FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle inc
 
 @dataclass(frozen=True)
 class Decisions:
-    """What was decided about a plate, step by step: from session.toml, corners, origin, units, gaps, what the load
-    shows, zero.
-    """
+    """What was decided about a plate, step by step, from session.toml to its zero."""
 
     told: tuple[str, ...] = ()
     corners: tuple[str, ...] = ()
@@ -122,9 +120,7 @@ class _Geometry(NamedTuple):
 
 
 class _DecodedPlates(NamedTuple):
-    """The ``readings`` of the plates of a file, the reason by number why others are ``refused``, and what a person
-    should look at.
-    """
+    """The ``readings`` of a file's plates, why others are ``refused`` by number, and ``warnings``."""
 
     readings: list[PlateReading]
     refused: dict[int, str]
@@ -276,9 +272,7 @@ def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask,
 
 @dataclass(frozen=True)
 class Baseline:
-    """Samples ``start`` to ``stop`` (exclusive) over which each channel is averaged, both 0 for none; ``said`` is
-    the sentence about it.
-    """
+    """Samples ``start`` to ``stop`` (exclusive) to average, both 0 for none; ``said`` is the sentence about it."""
 
     start: int
     stop: int
@@ -368,9 +362,7 @@ def is_unloaded(level: float, vertical: Array) -> bool:
 
 
 def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:
-    """Return the means of ``values`` (S,) over whole blocks of ``length`` s, and the samples per block (at least one
-    block).
-    """
+    """Return the means of ``values`` (S,) over whole blocks of ``length`` s (one at least), and samples a block."""
     size = min(max(1, round(length * rate)), values.size)
     count = values.size // size
     return values[: count * size].reshape(count, size).mean(axis=1), size

@@ -50,9 +50,7 @@ FAMILY: Family[Reader] = Family(
 
 
 def readers(chosen: Chosen[Reader] = None) -> tuple[Reader, ...]:
-    """Return the readers in the order in which they are asked; ``chosen`` names choose from the family, objects join
-    it.
-    """
+    """Return the readers in the order in which they are asked; ``chosen`` names choose, objects join."""
     return tuple(sorted(FAMILY.choose(chosen).values(), key=lambda reader: (reader.PREFERENCE, reader.NAME)))
 
 

@@ -43,9 +43,7 @@ _EVEN = 0.02  # share by which a time step may differ from the others (times are
 
 @dataclass(frozen=True, eq=False)
 class _AmtiText:
-    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y) m; ``sensor_depth`` m below the
-    surface.
-    """
+    """``load`` (S, 6) N, N·m as written, plate axes; ``rate`` Hz; ``size`` (x, y), ``sensor_depth`` m."""
 
     load: Array
     rate: float

@@ -55,9 +55,7 @@ _MOST_PLATES, _MOST_CHANNELS, _FASTEST = 16, 32, 100_000
 
 @dataclass(frozen=True, eq=False)
 class _BsfPlate:
-    """One plate: ``load`` (S, 6) N, N·m applied to it, plate axes; ``size`` (x, y) m; ``offset``, ``distance`` (3,)
-    m from the header.
-    """
+    """One plate: ``load`` (S, 6) N, N·m on it, plate axes; ``size`` (x, y), ``offset``, ``distance`` (3,) m."""
 
     model: str
     serial: int
@@ -69,9 +67,7 @@ class _BsfPlate:
 
 @dataclass(frozen=True, eq=False)
 class _BsfContent:
-    """What a .bsf file holds: ``version``, ``rate`` Hz, ``main`` header record, ``plates``, and the other
-    instruments' channel count.
-    """
+    """What a .bsf file holds: ``version``, ``rate`` Hz, ``main`` header record, ``plates``, other channels."""
 
     version: int
     rate: float

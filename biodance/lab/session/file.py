@@ -289,9 +289,7 @@ class _TrialEntry(_Entry):
 
 
 class _MarkersEntry(_Entry):
-    """The table ``[markers]``: the ``file`` (or name) of a marker set, or the ``map`` of labels to landmarks and
-    segments.
-    """
+    """The table ``[markers]``: the ``file`` (or name) of a set, or the ``map`` of labels to places."""
 
     file: str | None = None
     map: dict[str, str] | None = None
@@ -336,9 +334,7 @@ class SessionFile:
         return Told(self.plates, self.subject.mass_kg)
 
     def role(self, name: str) -> Role | None:
-        """Return the role of a trial: by its exact name, else by the first pattern that fits; upper and lower case
-        count the same.
-        """
+        """Return the role of a trial: by its exact name, else by the first pattern; case does not count."""
         exact = [entry.role for key, entry in self.trials if key.lower() == name.lower()]
         similar = [entry.role for key, entry in self.trials if fnmatchcase(name.lower(), key.lower())]
         return next((role for role in exact + similar if role), None)

@@ -15,9 +15,7 @@ from biodance.spatial import continuous_quaternion, unit_quaternion
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """G ball joints: ``first`` (G,) index of the first of the three joints, ``sign`` (G, 1) of their axes'
-    handedness.
-    """
+    """G ball joints: ``first`` (G,) index of each one's first joint, ``sign`` (G, 1) of their handedness."""
 
     first: np.ndarray
     sign: Array
@@ -49,9 +47,7 @@ def balls(body: Body) -> Balls:
 
 
 def continued(quaternion: Array) -> Array:
-    """Return unit quaternions (4, ..., B), components first, of ``quaternion`` (4, ..., B) without jumps of sign along
-    the last axis.
-    """
+    """Return ``quaternion`` (4, ..., B) of unit size, without jumps of sign along the last axis."""
     last = np.moveaxis(quaternion, 0, -1)
     return np.moveaxis(continuous_quaternion(unit_quaternion(last)), -1, 0)
 
@@ -121,9 +117,7 @@ class Chart:
         return self.joint_count + (7 if self.n_root else 0)
 
     def smooth(self, q: Array) -> Smooth:
-        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and full turns are continued
-        along them).
-        """
+        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames, signs and turns continued."""
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
         half = 0.5 * self.joints.sign * self.joints.angles_of(angles)
@@ -139,9 +133,7 @@ class Chart:
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
     def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B); quaternions are normalised here; of equal sets of Cardan angles that closer to ``near``
-        (n, B) rad is taken.
-        """
+        """Return q (nq, B); of equal sets of Cardan angles the one closer to ``near`` (n, B) rad is taken."""
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
         ball = _ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))

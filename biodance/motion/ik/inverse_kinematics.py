@@ -44,9 +44,7 @@ posture to be determined.
 
 @dataclass(frozen=True, eq=False)
 class _Determination:
-    """Per frame: ``determined`` (T,); ``open_coordinates`` names what the best-seen frame leaves open (empty if it
-    is determined).
-    """
+    """Per frame: ``determined`` (T,); ``open_coordinates`` what the best-seen frame leaves open."""
 
     determined: NDArray[np.bool_]
     open_coordinates: tuple[str, ...]

@@ -135,9 +135,7 @@ class CalibrationState:
 
 
 def spread_postures(trials: Sequence[Markers], names: tuple[str, ...]) -> Markers:
-    """Return ``POSTURES`` frames, or as many as there are, taken evenly from all trials; NaN where a trial lacks a
-    marker.
-    """
+    """Return up to ``POSTURES`` frames, evenly from all trials; NaN where a trial lacks a marker."""
     shown = [one.seen[:, [name in names for name in one.names]].any(axis=1) for one in trials]
     frames = np.flatnonzero(np.concatenate(shown)) if shown else np.empty(0, dtype=int)
     if not frames.size:

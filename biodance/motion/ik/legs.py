@@ -20,9 +20,7 @@ LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_do
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One leg of a body: columns of its six angles, sign of the mirrored axes, and the constant placements between
-    its joints.
-    """
+    """One leg: columns of its six angles, sign of the mirrored axes, placements between its joints."""
 
     columns: tuple[int, ...]
     sign: float
@@ -52,9 +50,7 @@ class Leg:
 
     @staticmethod
     def fits(body: Body, side: str) -> bool:
-        """Return whether the ``side`` leg of a body has the joints of this closed form: names, order, axes, meeting
-        in hip and ankle.
-        """
+        """Return whether the ``side`` leg has the joints of this closed form: names, order, axes, centres."""
         names, s = [joint.name for joint in body.joints], -1.0 if side == "left" else 1.0
         index = [names.index(name) if (name := f"{side}_{movement}") in names else -2 for movement in LEG]
         if min(index) < 0 or any(body.joints[j].parent != p for j, p in zip(index, [-1, *index[:-1]], strict=True)):
@@ -116,9 +112,7 @@ class Leg:
 
 
 def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
-    """Return ``value`` unchanged below ``limit - width`` and smoothly (three derivatives) approaching ``limit``
-    above.
-    """
+    """Return ``value`` as it is below ``limit - width``, smoothly (three derivatives) nearing ``limit`` above."""
     over = np.maximum(value - (limit - width), 0.0) / width
     return np.where(over > 0, limit - width + width * (over / (1 + over**4) ** 0.25), value)
 
@@ -190,9 +184,7 @@ class GeneralLeg:
         return cls(columns, joints, hip, straight, sense, terms, squat)
 
     def length(self, knee: Array | float) -> Array:
-        """Return the hip-ankle distance (...) m at knee flexions (...) rad from the straight leg, of the posture
-        where it is least.
-        """
+        """Return the least hip-ankle distance (...) m at knee flexions (...) rad from the straight leg."""
         a, b, c = self.length_terms
         angle = self.straight + self.sense * np.asarray(knee)[..., None]
         return np.asarray(np.sqrt(np.min(a + b * np.cos(angle) + c * np.sin(angle), axis=-1)))

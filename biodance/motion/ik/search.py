@@ -42,9 +42,7 @@ class MarkerProblem:
 
 
 class Minimum(NamedTuple):
-    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; ``slope`` (B,) m, largest projected gradient; ``steps``
-    (B,) steps tried.
-    """
+    """What was reached: ``q`` (B, nq); ``cost`` (B,) m²; largest ``slope`` (B,) m; ``steps`` (B,) tried."""
 
     q: Array
     cost: Array
@@ -77,9 +75,7 @@ def marker_problem(body: Body, columns: list[int], xyz: Array, *, tolerance: flo
 
 
 def minimise_markers(problem: MarkerProblem, frames: Index, start: Array, *, steps: int = _STEPS) -> Minimum:
-    """Return the minima (F frames) of ``frames`` (F,) reached from the postures ``start`` (F, nq) in at most
-    ``steps`` steps.
-    """
+    """Return the minima of ``frames`` (F,) reached from ``start`` (F, nq) in at most ``steps`` steps."""
     count, joints = len(frames), len(problem.chain.lower)
     q = np.array(start, order="C")
     angles = q[:, q.shape[1] - joints :]
@@ -199,9 +195,7 @@ def from_markers(problem: MarkerProblem, frames: Index, shares: tuple[float | No
 
 
 def from_guess(problem: MarkerProblem, frames: Index, guess: Array) -> Minimum:
-    """Return the minima reached from the postures ``guess`` (F, nq), each root first put where the markers say if
-    that is nearer.
-    """
+    """Return the minima reached from ``guess`` (F, nq), roots first put where markers say if nearer."""
     moved = _place_root(problem, frames, guess[:, guess.shape[1] - len(problem.chain.lower) :])
     own, other = (minimise_markers(problem, frames, q, steps=0) for q in (guess, moved))
     return _retry(problem, frames, minimise_markers(problem, frames, better(own, other).q))

@@ -190,9 +190,7 @@ def _slope_at(before, at, after, one, two):
 
 @compiled
 def smooth_at(known, values, k, frame, out):
-    """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between the ``known`` frames k and k +
-    1.
-    """
+    """Fill ``out`` (C,) with the cubic through ``values`` (M, C) at ``frame`` between ``known`` k and k + 1."""
     last, width = known.shape[0] - 1, float(known[k + 1] - known[k])
     share = (frame - known[k]) / width
     h0, h1 = (1 + 2 * share) * (1 - share) ** 2, share * share * (3 - 2 * share)

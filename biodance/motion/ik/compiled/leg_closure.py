@@ -172,9 +172,7 @@ def _reach_for(leg, angles, turn, place, rounds, s):
 
 @compiled
 def lead(leg, known, angles, turn, place, s):
-    """Fill ``angles`` (6,) for the pose ``turn``, ``place``, led there from the angles ``known``; return how far the
-    foot is from it.
-    """
+    """Fill ``angles`` (6,) for the pose ``turn``, ``place``, led from ``known``; return the foot's distance."""
     for k in range(6):
         angles[k] = known[k]
     _place_foot(leg, angles, s)

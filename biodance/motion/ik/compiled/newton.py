@@ -154,9 +154,7 @@ def place(chain, q, at):
 
 @compiled
 def add_up(chain, xyz, weight, q, at):
-    """Fill the sums of ``at`` for markers xyz (K, 3) m of ``weight`` (K,) at a placed posture q; return the cost,
-    m².
-    """
+    """Fill the sums of ``at`` for markers xyz (K, 3) m of ``weight`` (K,) at a placed q; return the cost, m²."""
     S, cost = at.below, 0.0
     S[:] = 0.0
     x, y, z = (q[0], q[1], q[2]) if chain.roots else (0.0, 0.0, 0.0)
@@ -338,9 +336,7 @@ def _held_at(chain, q, g, held):
 
 @compiled
 def turn_balls(chain, at, g, held, cardan, turning):
-    """Mark the ball joints that step by a rotation vector, all but ``cardan`` and the held, and turn their third
-    axis and gradient so.
-    """
+    """Mark the ball joints that step by a rotation vector, not ``cardan`` or held; turn axis and gradient."""
     for b in range(chain.ball.shape[0]):
         j = chain.ball[b]
         i = chain.roots + j
@@ -367,9 +363,7 @@ def _largest_slope(chain, at, g, held):
 
 @compiled
 def displace(chain, q, x, turning, stopped, out):
-    """Fill ``out`` with q moved by the step x (nv,), angles within their limits; mark the ball joints that a limit
-    ``stopped``.
-    """
+    """Fill ``out`` with q moved by x (nv,), within the limits; mark the ball joints ``stopped`` at one."""
     roots, first = chain.roots, q.shape[0] - chain.parent.shape[0]
     if roots:
         for c in range(3):

@@ -158,9 +158,7 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
 
 @compiled
 def fill_wrench(rotation, position, omega, alpha, drive, phi, wrench):
-    """Fill wrench (T, 6) with what links with the parameters ``phi`` (N, 10) need: `fill_regressor` times phi; it holds
-    zeros.
-    """
+    """Fill wrench (T, 6), which holds zeros, with `fill_regressor` times the parameters ``phi`` (N, 10)."""
     w, dw, h, spin, force, moment = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     first, about = np.empty(3), np.empty(3)
     for t in range(position.shape[0]):
