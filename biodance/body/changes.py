@@ -65,9 +65,7 @@ def written_in(body: Body, segment: int, turn: Array, shift: Array) -> Body:
 
 
 def move_joint(body: Body, joint: int, shift: Array) -> Body:
-    """Return the body with the origin of ``joint`` (an index) moved by ``shift`` (3,) m in its parent's frame; all that
-    hangs on it goes along.
-    """
+    """Return the body with ``joint`` moved by ``shift`` (3,) m in its parent's frame, with all that hangs on it."""
     joints = list(body.joints)
     joints[joint] = replace(joints[joint], translation=joints[joint].translation + np.asarray(shift))
     return replace(body, joints=tuple(joints))

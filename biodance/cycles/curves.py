@@ -169,9 +169,7 @@ _EVERY = 5  # % between two values of a band in a file
 
 @dataclass(frozen=True, eq=False)
 class NormalCurve:
-    """One quantity of one kind of cycle over ``people``: ``mean`` and ``sd`` between them (101,) at `PERCENT` in
-    ``unit``; both sides together.
-    """
+    """One quantity over ``people``: ``mean`` and ``sd`` between them (101,) at `PERCENT` in ``unit``."""
 
     kind: str
     quantity: str

@@ -104,9 +104,7 @@ def _said(one: PlateCorrection) -> str:
 
 
 def corrected_session(session: Session, corrections: tuple[PlateCorrection, ...]) -> Session:
-    """Return a session as read, with the corrections of its laboratory made; those that its folder says it has already
-    (`APPLIED`) are not made twice.
-    """
+    """Return a session as read with its laboratory's corrections made, but not those that it has (`APPLIED`)."""
     path = session.folder / APPLIED
     done = {(one.effect, one.target) for one in read_corrections(path)} if path.is_file() else set()
     told = [line for trial in session.trials for line in trial.history]

@@ -377,9 +377,7 @@ def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, withi
 
 
 def on_motion_clock(measured: Wrench, time: Array, fit: PlateFit) -> Array:
-    """Return the ``measured`` wrench (T, 6) at ``time`` (T,) s of the motion, in the frame of the first standing sole;
-    NaN beyond the recording.
-    """
+    """Return the wrench (T, 6) at ``time`` (T,) s of the motion, in the first standing sole's frame, or NaN."""
     at = time + fit.delay
     seen = np.stack([np.interp(at, measured.time, one, left=np.nan, right=np.nan) for one in measured.value.T], axis=1)
     return from_plate(seen, fit.place, fit.yaw)

@@ -63,9 +63,7 @@ class Trunk:
         return [slice(*run) for run in runs(self.covered) if run[1] - run[0] >= least * self.rate]
 
     def weights(self, gravity: float) -> list[tuple[slice, Array, float]]:
-        """Return the frames that weigh, the factors (n,) s²/m by which forces at them give a mass, and its standard
-        deviation as a share of it.
-        """
+        """Return the frames that weigh, the factors (n,) s²/m from force to mass, and its relative sd."""
         found = []
         for span in self.spans(_WEIGHS):
             weight, bend = fading(self.time[span])

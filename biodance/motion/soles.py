@@ -269,9 +269,7 @@ def overhang_notes(plates: tuple[Plate, ...], soles: Soles, beside: Mask) -> tup
 
 
 def footing(plates: tuple[Plate, ...], soles: Soles, surfaces: Surfaces, touching: Mask, load: Mask) -> Footing:
-    """Return which plates the touching feet (T, 2) are over, and whether they can touch anything else; ``load`` (T, P)
-    True where a plate is loaded.
-    """
+    """Return which plates the touching feet (T, 2) are over, and what else they can touch; ``load`` (T, P)."""
     spread = _spread_over(plates, soles, touching, load)
     low = (soles.outline[..., 2] - surfaces.offset).min(axis=2)
     unseen = np.isnan(low)

@@ -53,9 +53,7 @@ _SPREAD = 256
 
 
 def spread_frames(values: Array) -> Array:
-    """Return some hundred frames of ``values`` (T, ...), spread over the recording: enough to tell how large something
-    is and where it lies.
-    """
+    """Return some hundred frames of ``values`` (T, ...), spread over the recording, to tell size and place."""
     return values[:: max(1, len(values) // _SPREAD)]
 
 

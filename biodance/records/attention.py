@@ -14,9 +14,7 @@ from biodance.records.arrays import Mask
 
 
 class LeftOut(StrEnum):
-    """A reason for which frames are not compared with a body, in the order in which the gates are asked: a frame counts
-    at the first that takes it out.
-    """
+    """Why frames are not compared with a body, in the order of the gates: a frame counts at the first."""
 
     CARRIED_ELSEWHERE = "carried_elsewhere"
     """A chair, a rail or a hand carries a part of the person."""

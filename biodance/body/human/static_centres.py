@@ -71,9 +71,7 @@ class Centres:
         return next((one.centre for one in self.errors if one.joint == joint), static_sd(joint))
 
     def sides_sd(self, limb: str) -> float:
-        """Return the standard deviation (m) of how much longer a ``limb`` (thigh, shank, ...) is on the right: of
-        people, and of the joint centres at its ends.
-        """
+        """Return the sd (m) of how much longer a ``limb`` is on the right: of people, and of joint centres."""
         ends = (self.sd(f"{side}_{joint}") for side in SIGN for joint in LIMB_ENDS[limb])
         return float(np.linalg.norm([error_size("side_length", "limb"), *ends]))
 

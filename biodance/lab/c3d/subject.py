@@ -31,9 +31,7 @@ class FileEvent:
 
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
-    """``angles`` by label, (T, 3) deg, NaN = none; ``events`` of the feet in the order of time; ``program`` that says
-    it wrote them, "" = not said.
-    """
+    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time; ``program`` that wrote them, or ""."""
 
     angles: Mapping[str, Array]
     events: tuple[FileEvent, ...]

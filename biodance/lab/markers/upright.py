@@ -199,9 +199,7 @@ class Standing:
         return np.asarray(xyz @ np.stack([self.right, self.ahead, [0.0, 0.0, 1.0]]).T / self.stature)
 
     def misfit(self, place: str, label: str) -> float:
-        """Return how far a marker is from the usual height of a landmark: 1 at the limit where it is believed; 0 where
-        the height tells nothing.
-        """
+        """Return how far a marker is from a landmark's usual height: 1 where hardly believed; 0 if untold."""
         usual = _height_of(place)
         return float(abs(self.shares([label])[0, 2] - usual[0]) / usual[1]) if usual else 0.0
 

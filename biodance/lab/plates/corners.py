@@ -201,9 +201,7 @@ NOTHING_TOLD = ToldPlate()
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What the analyst says that a reader of forces must know: ``plates`` by name (``plate1``), the declared body
-    ``mass`` kg, None = not said.
-    """
+    """What the analyst says to readers of forces: ``plates`` by name, declared body ``mass`` kg or None."""
 
     plates: Mapping[str, ToldPlate] = field(default_factory=lambda: MappingProxyType({}))
     mass: float | None = None

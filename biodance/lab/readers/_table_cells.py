@@ -25,9 +25,7 @@ _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN|NA|")
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """``labels`` (C) without quotes and units, ``units`` (C) as written, "" = not said; ``values`` (T, C), NaN = empty;
-    ``said`` how they were read.
-    """
+    """``labels``, ``units`` (C) as written, "" = not said; ``values`` (T, C), NaN = empty; ``said`` how read."""
 
     labels: tuple[str, ...]
     units: tuple[str, ...]
@@ -53,9 +51,7 @@ def read_cells(content: bytes, path: Path) -> Cells:
 
 
 def header_of(text: str) -> tuple[int, str, tuple[str, ...]] | None:
-    """Return row (from 0), separator and cells of the labels: of the first row of at least four cells of which most are
-    no numbers; None without one.
-    """
+    """Return row (from 0), separator and cells of the labels: the first row of >= 4 cells, most no numbers."""
     for row, line in enumerate(text.split("\n")[:_HEADER_ROWS]):
         for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
             found = tuple(cell.strip() for cell in line.split(separator))

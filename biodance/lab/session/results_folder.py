@@ -56,9 +56,7 @@ class _Verified:
 
 
 def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str], *, growing: str = "") -> None:
-    """Bind the files in a ``folder`` to the recordings of a ``session``, whose ``inputs`` are name -> SHA-256; but for
-    a log that is still ``growing``.
-    """
+    """Bind the files in a ``folder`` to a ``session``'s ``inputs`` (name -> SHA-256), but for a ``growing`` log."""
     outputs = {name: file_hash(folder / name) for name in _files_in(folder) if name != growing}
     one = _Manifest(uuid.uuid4().hex, __version__, str(session), dict(inputs), outputs)
     text = json.dumps(asdict(one), indent=1, sort_keys=True)
@@ -172,9 +170,7 @@ def inputs_of(paths: Mapping[Path, str], session: Path) -> dict[str, str]:
 
 
 def put_in_place(part: Path, place: Path) -> None:
-    """Flush a finished folder to the disk and let it change places with what lies at ``place``, in one step; what lay
-    there is ``part`` then.
-    """
+    """Flush a finished folder to disk and exchange it with ``place`` in one step; ``part`` has what lay there."""
     for path in (*part.rglob("*"), part):
         flush(path)
     if part.parent == place:  # a disk of its own: its folder cannot change its name

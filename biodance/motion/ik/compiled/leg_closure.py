@@ -201,9 +201,7 @@ def lead(leg, known, angles, turn, place, s):
 
 @compiled
 def close_leg(leg, known, turn, place, s, out, away):
-    """Fill ``out`` (T, 6) with the angles for poses ``turn`` (T, 3, 3), ``place`` (T, 3) of the foot, ``away`` (T,) how
-    far it stays from them.
-    """
+    """Fill ``out`` (T, 6) with the angles for foot poses ``turn``, ``place``, ``away`` (T,) how far it stays."""
     for t in range(len(place)):
         change = np.inf
         if t and away[t - 1] < _CLOSED:
