@@ -104,7 +104,7 @@ def diagnose_command(
         tables, carried = results.make_tables_folder(session), read_lab(reading.lab)
         result, before, place = examine_with_reference(session, reading, results, tell)
         recorded, folder = result.session, place.part
-        found = front.diagnose(result, reference=before, tolerances=carried.tolerances, accept=accept, tell=tell)
+        found = front.diagnose(result, reference=before, tolerances=carried.tolerances, tell=tell)
         result = found.mended.result if found.mended is not None else result
         result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
