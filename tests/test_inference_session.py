@@ -216,6 +216,16 @@ def test_a_zero_that_only_an_empty_plate_shows_is_named_beside_the_simulation() 
     assert ("plate_offset", "plate2:Fx") in {(one.effect, one.target) for one in found.diagnosis.findings}
 
 
+def test_what_laboratories_have_is_known_without_a_name() -> None:
+    """Eight milliseconds are no fault where laboratories differ by six, and may be taken off all the same."""
+    usual = replace(known(), sizes={**known().sizes, "time_delay": 0.006})
+    found = inferred(body(), windows(1, hidden=lambda *some: delay(*some, late=0.008)), tolerances=usual, effects=FAST)
+    assert found.diagnosis.findings == ()
+    (one,) = found.tolerated()
+    assert (one.effect, one.parameters[0].value) == ("time_delay", pytest.approx(0.008, rel=0.05))
+    assert inferred(body(), windows(1), tolerances=usual, effects=FAST).tolerated() == ()
+
+
 def two_plates(window):
     """Return the window with a second plate, on which nobody stands, and the zeros of both taken off."""
     (one,) = window.trial.plates
