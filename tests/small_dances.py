@@ -9,9 +9,9 @@ import numpy as np
 from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import feet_in_move
-from biodance.dance.problem.support import support_sequence
 from biodance.dance.search.posture import initial_guess
 from biodance.records import Subject
 

@@ -20,6 +20,10 @@ ONE_ALGORITHM = {
     "lab/plates/decode.py": "a plate's channels to its wrench: corners, origin, gaps, units, zero, wrench",
     "inference/decision.py": "what a session ends with: places, sizes, habits, reasons, from one posterior",
     "pipeline/live.py": "a recording as a stream: every frame tracked, the wrench watched, the body identified",
+    "dance/dance.py": "a dance and its file, entry by entry: what is written, and what is believed of a stranger's",
+    "dance/performers.py": "imprecise people: how they err in a dance, and what that leaves of every limit",
+    "dance/search/known_postures.py": "words of limbs, what a person can do of them, and the postures that they make",
+    "dance/search/move.py": "a move within all limits: straight, slower, round about, exciting; each tries the next",
     "inference/sets.py": "the search over sets of causes: score, fit, widen, lessen, again beside an unknown",
     "lab/plates/sense.py": "the directions of a plate: every hypothesis is judged by the same load on the same plate",
 }

@@ -8,11 +8,10 @@ from small_dances import BODY, small_dance
 
 from biodance.dance.metrics import longest_alone
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import Stance
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.posture_table import PostureTable
-from biodance.dance.search.vocabulary import read_vocabulary, words_for
+from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES
 

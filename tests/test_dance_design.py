@@ -13,8 +13,8 @@ from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.limits.balance import Balance
+from biodance.dance.playback import bearing, rehearse
 from biodance.dance.problem.plan import Plan
-from biodance.dance.rehearsal import bearing, rehearse
 from biodance.dance.search import posture_set
 from biodance.dance.search.course import Course
 from biodance.dance.search.posture_set import alike

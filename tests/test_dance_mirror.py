@@ -10,13 +10,12 @@ import pytest
 from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import PersonLimits, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import holding
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.mirror import image_feet, mirror_posture, mirror_vectors, symmetric
-from biodance.dance.search.posture import initial_guess, solve
+from biodance.dance.search.posture import image_feet, initial_guess, mirror_posture, mirror_vectors, solve, symmetric
 from biodance.records import Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))

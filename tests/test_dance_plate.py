@@ -11,8 +11,8 @@ from walkers import Stand, plate, walker
 from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.dance.dance import Dance
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan, read_plan
-from biodance.dance.problem.support import support_sequence
 from biodance.errors import BiodanceError
 from biodance.pipeline.dance_result import plate_sentence, plates_too_small
 from biodance.records import Session, Subject

@@ -10,19 +10,18 @@ import pytest
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
+from biodance.dance.design import safe_stretch
 from biodance.dance.limits import family
 from biodance.dance.performers import PerformersResult
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.context import DesignContext
-from biodance.dance.search.course import Course, PlainStep
-from biodance.dance.search.no_next_posture import NoNextPosture
+from biodance.dance.search.course import Course, DesignContext, PlainStep
 from biodance.dance.search.posture import KEPT, initial_guess, refuse, solve
-from biodance.dance.search.repair import safe_stretch
+from biodance.dance.search.reachability import NoNextPosture
 from biodance.dance.search.word_course import WordSearch, word_course
 from biodance.errors import BiodanceError
 from biodance.records import Subject

@@ -13,13 +13,13 @@ from biodance.body.human.human import human
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.plan import Plan
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search import context, optimised_course
+from biodance.dance.search import course as course_module
 from biodance.dance.search import move as move_module
-from biodance.dance.search.context import Checkpoint, DesignContext
-from biodance.dance.search.course import Course, PlainStep
+from biodance.dance.search import optimised_course
+from biodance.dance.search.course import Checkpoint, Course, DesignContext, PlainStep
 from biodance.dance.search.move import Move, Task
 from biodance.dance.search.optimised_course import feasible_course
 from biodance.dance.search.posture import KEPT, initial_guess, solve
@@ -142,5 +142,5 @@ def test_parts_of_older_code_are_not_gone_on_with(tmp_path, monkeypatch):
     now = Checkpoint(tmp_path, BODY, PLAN, 1)
     now.put("postures", x=np.ones(3))
     assert Checkpoint(tmp_path, BODY, PLAN, 1).get("postures") is not None
-    monkeypatch.setattr(context, "code", lambda: "of yesterday")
+    monkeypatch.setattr(course_module, "code", lambda: "of yesterday")
     assert Checkpoint(tmp_path, BODY, PLAN, 1).get("postures") is None

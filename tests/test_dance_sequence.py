@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import feet_in_move, stance
-from biodance.dance.problem.support import support_sequence
 from biodance.dance.search.optimised_course import nearest_neighbours
 from biodance.errors import BiodanceError
 from biodance.records import Subject

@@ -12,7 +12,7 @@ from small_dances import BODY, small_dance
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import expect
-from biodance.dance.margin import Margin
+from biodance.dance.limits._checked import Margin
 from biodance.dance.metrics import dance_metrics
 from biodance.dance.performers import PerformersMargin, PerformersResult
 from biodance.dance.problem.plan import Plan

@@ -9,7 +9,7 @@ from small_dances import BODY, small_dance
 from biodance.dance.dance import Dance
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, unconcerned
 from biodance.dance.limits.joint_range import JointRange
-from biodance.dance.problem.stance import Phase
+from biodance.dance.problem.splines import Phase
 from biodance.dance.problem.state import State
 from biodance.dance.verify import Margin, _least, broken, verify
 

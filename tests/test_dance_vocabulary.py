@@ -8,11 +8,10 @@ import numpy as np
 from small_dances import BODY
 
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan, read_plan
-from biodance.dance.problem.support import support_sequence
 from biodance.dance.search.information import CENTRES, rows_of_centres
-from biodance.dance.search.posture_table import PostureTable
-from biodance.dance.search.vocabulary import Vocabulary, read_vocabulary, words_for
+from biodance.dance.search.known_postures import PostureTable, Vocabulary, read_vocabulary, words_for
 from biodance.motion.kinematics import poses
 
 CHAIN = Chain(BODY)

@@ -202,7 +202,7 @@ def play_command(
         The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.rehearsal import rehearse
+    from biodance.dance.playback import rehearse
     from biodance.report.figures.film import film_path, write_film
     from biodance.report.tables.dance import playback_document
 

@@ -25,7 +25,7 @@ from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
 from biodance.dance.robot import design_robot, expect_robot, robot_plan
-from biodance.dance.search.no_next_posture import NoNextPosture
+from biodance.dance.search.reachability import NoNextPosture
 from biodance.dance.search.word_course import freer_dance
 from biodance.dance.verify import Margin, broken
 from biodance.display import cause_in_words

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.problem.stance import Phase
+from biodance.dance.problem.splines import Phase
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject

@@ -10,9 +10,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.parts import JointLimits
 from biodance.dance.limits import Limit
-from biodance.dance.limits._arm_lift import LEAST_LIFT, ArmLift
-from biodance.dance.limits._foot_load import FootLoad
-from biodance.dance.problem.movements import names_joint
+from biodance.dance.limits._person import LEAST_LIFT, ArmLift, FootLoad
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import SEAT_TO_HIP, seat
 from biodance.errors import BiodanceError, UnknownName
@@ -35,6 +33,8 @@ _FITS = math.radians(3.0)
 """rad less at which the seat is soft enough."""
 _LEAST_RANGE = math.radians(6.0)
 """rad: nobody holds a joint within less."""
+_LIMBS = {"arm": ("shoulder", "elbow"), "leg": ("hip", "knee", "ankle")}
+"""What an arm and a leg are made of."""
 
 
 @dataclass(frozen=True)
@@ -224,6 +224,18 @@ def joints(body: Body, key: str) -> list[int]:
     if not found:
         raise UnknownName.of("joint, side or group of joints", key, ("all", *SIDES, "arm", "leg", *names))
     return found
+
+
+def names_joint(key: str, joint: str) -> bool:
+    """Return whether ``key`` names a joint, from coarse to fine: "all"; "left"; "arm" or "knee" (both sides);
+    "left_arm" or "left_knee"; "left_knee_flexion".
+    """
+    side, _, bare = joint.partition("_") if joint.partition("_")[0] in SIDES else ("", "", joint)
+    of, rest = next(((one, key[len(one) + 1 :]) for one in SIDES if f"{key}_".startswith(f"{one}_")), ("", key))
+    if of and of != side:
+        return False
+    starts = _LIMBS.get(rest, (rest,))
+    return key == "all" or not rest or any(f"{bare}_".startswith(f"{start}_") for start in starts)
 
 
 def _check_range(body: Body, joint: int, low: float, high: float) -> None:

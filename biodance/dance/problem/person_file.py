@@ -23,16 +23,16 @@
     left_knee_flexion = [20, 90]
 
 A key of the last three names joints from the coarse to the fine: "all"; "left"; "arm", "leg" or "knee" (both sides);
-"left_arm"; "left_knee"; "left_knee_flexion". Several that name the same joint act one after the other. Angles are
-positive in the direction of the name. What an arm is lifted at most holds whatever the joint angles by which
-(`limits._arm_lift`); where only one direction is named it holds for both.
+"left_arm"; "left_knee"; "left_knee_flexion". Several that name the same joint act one after the other. A movement is in
+plain English ("arm forward") or by its ISB joint ("shoulder flexion"), of one side or of both; spaces, dots and
+underscores are the same. Angles are positive in the direction of the name. What an arm is lifted at most holds whatever
+the joint angles by which (`limits._person`); where only one direction is named it holds for both.
 """
 
 import math
 from pathlib import Path
 from typing import Any
 
-from biodance.dance.problem.movements import moved_joints, named_movement, plain
 from biodance.dance.problem.person import PersonLimits, Shares
 from biodance.dance.problem.plan import finite_number, table
 from biodance.errors import BiodanceError, UnknownName
@@ -47,6 +47,45 @@ _RIGHT_ANGLE = math.pi / 2
 _SEAT = (0.3, 1.2)
 """m that a seat may be high."""
 _Ranges = list[tuple[str, float, float]]
+
+_ARM_LIFT = (("shoulder_flexion", 1), ("shoulder_adduction", -1))
+_MOVES: dict[str, tuple[tuple[str, int], ...]] = {
+    "arm_lift": _ARM_LIFT,
+    "shoulder_elevation": _ARM_LIFT,
+    "arm_forward": (("shoulder_flexion", 1),),
+    "arm_sideways": (("shoulder_adduction", -1),),
+    "shoulder_abduction": (("shoulder_adduction", -1),),
+    "arm_backward": (("shoulder_flexion", -1),),
+    "shoulder_extension": (("shoulder_flexion", -1),),
+    "arm_turn_in": (("shoulder_rotation", 1),),
+    "shoulder_internal_rotation": (("shoulder_rotation", 1),),
+    "arm_turn_out": (("shoulder_rotation", -1),),
+    "shoulder_external_rotation": (("shoulder_rotation", -1),),
+    "elbow_bend": (("elbow_flexion", 1),),
+    "hip_bend": (("hip_flexion", 1),),
+    "leg_backward": (("hip_flexion", -1),),
+    "hip_extension": (("hip_flexion", -1),),
+    "leg_sideways": (("hip_adduction", -1),),
+    "hip_abduction": (("hip_adduction", -1),),
+    "leg_across": (("hip_adduction", 1),),
+    "leg_turn_in": (("hip_rotation", 1),),
+    "hip_internal_rotation": (("hip_rotation", 1),),
+    "leg_turn_out": (("hip_rotation", -1),),
+    "hip_external_rotation": (("hip_rotation", -1),),
+    "knee_bend": (("knee_flexion", 1),),
+    "foot_up": (("ankle_dorsiflexion", 1),),
+    "foot_down": (("ankle_dorsiflexion", -1),),
+    "ankle_plantarflexion": (("ankle_dorsiflexion", -1),),
+    "foot_turn_in": (("ankle_inversion", 1),),
+    "foot_turn_out": (("ankle_inversion", -1),),
+    "ankle_eversion": (("ankle_inversion", -1),),
+    "trunk_bow": (("trunk_flexion", 1),),
+    "trunk_extension": (("trunk_flexion", -1),),
+    "trunk_lean": (("trunk_bending", 1), ("trunk_bending", -1)),
+    "trunk_turn": (("trunk_rotation", 1), ("trunk_rotation", -1)),
+}
+"""Movement: its joints without side, and the sense in which each turns (1: that of its name)."""
+_JOINTS = tuple(dict.fromkeys(joint for moves in _MOVES.values() for joint, _ in moves))
 
 
 def read_person(path: str | Path) -> PersonLimits:
@@ -166,3 +205,27 @@ def _shares(path: Path, raw: dict[str, Any], name: str) -> Shares:
         if not 0 <= value <= 1:
             raise BiodanceError(f"{path}: {name}.{key} = {value:g}; a share lies between 0 and 1.")
     return found
+
+
+def moved_joints(key: str, where: str) -> tuple[tuple[str, int], ...]:
+    """Return the joints, with the side if ``key`` names one, and senses of a movement; UnknownName, found ``where``, if
+    there is none of this name.
+    """
+    moved = named_movement(key)
+    if moved is None:
+        raise UnknownName.of(f"movement in {where}", key, (*_MOVES, *_JOINTS))
+    return moved
+
+
+def named_movement(key: str) -> tuple[tuple[str, int], ...] | None:
+    """Return the joints and senses of a movement, None if there is none of this name."""
+    name = plain(key).replace("lift_", "")
+    side = next((f"{one}_" for one in SIDES if name.startswith(f"{one}_")), "")
+    bare = name.removeprefix(side)
+    moves = ((bare, 1),) if bare in _JOINTS else _MOVES.get(bare)
+    return None if moves is None else tuple((f"{side}{joint}", sense) for joint, sense in moves)
+
+
+def plain(key: str) -> str:
+    """Return a key with underscores only: ``left arm.forward`` -> ``left_arm_forward``."""
+    return "_".join(key.replace(".", " ").split())

@@ -18,8 +18,20 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, static_grams, total
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.stance import Stance
-from biodance.dance.search.mirror import image_feet, mirror_posture, mirror_vectors, symmetric
-from biodance.dance.search.posture import ATTEMPTS, KEPT, Exciting, Posture, initial_guess, posture_at, refuse, solve
+from biodance.dance.search.posture import (
+    ATTEMPTS,
+    KEPT,
+    Exciting,
+    Posture,
+    image_feet,
+    initial_guess,
+    mirror_posture,
+    mirror_vectors,
+    posture_at,
+    refuse,
+    solve,
+    symmetric,
+)
 from biodance.records import Array
 
 RUNS = 2

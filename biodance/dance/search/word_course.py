@@ -17,18 +17,22 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.dance.dance import Dance
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, feet_in_move
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.context import DesignContext
-from biodance.dance.search.course import Course, move_task
+from biodance.dance.search.course import Course, DesignContext, move_task
 from biodance.dance.search.information import PostureInformation, update_posterior
-from biodance.dance.search.move import Move, Task, straight_via
-from biodance.dance.search.no_next_posture import LEAST, NoNextPosture, nearest_in_words, words_never_kept
-from biodance.dance.search.posture_table import PostureTable
-from biodance.dance.search.reachability import Reachability, WordStep, feet_key
-from biodance.dance.search.straight_moves import AMPLE, ENOUGH, straight_move
-from biodance.dance.search.vocabulary import words_left_out
+from biodance.dance.search.known_postures import PostureTable, words_left_out
+from biodance.dance.search.move import AMPLE, ENOUGH, Move, Task, straight_move, straight_via
+from biodance.dance.search.reachability import (
+    LEAST,
+    NoNextPosture,
+    Reachability,
+    WordStep,
+    feet_key,
+    nearest_in_words,
+    words_never_kept,
+)
 from biodance.records import Array
 
 _INSTRUCTION = 0.5

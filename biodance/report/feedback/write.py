@@ -14,7 +14,7 @@ from biodance.body.solids import segment_solids
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
-from biodance.dance.problem.footprint import plate_corners
+from biodance.dance.problem.feet import plate_corners
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.display import spaced
 from biodance.errors import BiodanceError

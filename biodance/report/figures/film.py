@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.dance.rehearsal import Rehearsal
+from biodance.dance.playback import Rehearsal
 from biodance.errors import BiodanceError, MissingLibrary
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.cues import dance_instructions
-from biodance.dance.problem.footprint import room_on_plates
-from biodance.dance.rehearsal import Rehearsal
+from biodance.dance.playback import Rehearsal
+from biodance.dance.problem.feet import room_on_plates
 from biodance.pipeline.dance_result import DanceResult
 from biodance.report.tables.schema import Row, Schema
 
