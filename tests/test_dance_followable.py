@@ -21,11 +21,10 @@ from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_bod
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.search.course import Checkpoint, DesignContext
 from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for, words_left_out
-from biodance.dance.search.reachability import NoNextPosture, Reachability
-from biodance.dance.search.word_course import WordSearch
+from biodance.dance.search.word_course import NoNextPosture, Reachability, WordSearch
 from biodance.dance.verify import broken, verify
 from biodance.motion.kinematics import poses
-from biodance.report.pages.dance import mannequin_svg
+from biodance.report.dance import mannequin_svg
 
 PLAN = Plan("x", "", (("parallel", 5),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.3, gentle=True)
 CHAIN = Chain(BODY)

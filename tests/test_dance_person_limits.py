@@ -13,8 +13,7 @@ from biodance.dance.design import design
 from biodance.dance.limits import Limit
 from biodance.dance.limits._person import ArmLift, FootLoad
 from biodance.dance.problem.feet import support_sequence
-from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints
-from biodance.dance.problem.person_file import read_person
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import seat
 from biodance.dance.problem.state import State

@@ -19,7 +19,7 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import feet_in_move, seat
-from biodance.dance.search.posture import KEPT, distance_from, initial_guess, solve
+from biodance.dance.search.postures import KEPT, distance_from, initial_guess, solve
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses

@@ -20,8 +20,7 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.search.course import Checkpoint, Course, DesignContext, Tell
 from biodance.dance.search.move import AMPLE, ENOUGH, other_moves
 from biodance.dance.search.optimised_course import optimised_course
-from biodance.dance.search.reachability import LEAST, NoNextPosture, WordStep
-from biodance.dance.search.word_course import WordSearch, word_course
+from biodance.dance.search.word_course import LEAST, NoNextPosture, WordSearch, WordStep, word_course
 from biodance.dance.verify import Margin, broken, verify_with
 from biodance.errors import BiodanceError
 from biodance.threads import one_thread

@@ -17,6 +17,8 @@ from biodance.records import Array, Index, freeze
 
 _DEGREE = 5
 """Order six: continuous up to the fourth derivative."""
+_THIRDS = np.array([0.20987654, 0.79012346])
+"""Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,11 @@ def phase_at(phases: tuple[Phase, ...], time: Array) -> Index:
     """Return which of the ``phases`` every instant (T,) s lies in."""
     starts = np.array([phase.start for phase in phases])
     return np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+
+
+def straight_via(start: Array, end: Array) -> Array:
+    """Return the via points (..., 2, n) of the moves of least jerk from ``start`` to ``end`` (..., n)."""
+    return np.asarray(start[..., None, :] + _THIRDS[:, None] * (end - start)[..., None, :])
 
 
 def path_in(phase: Phase, postures: Array, via: Array, time: Array) -> tuple[Array, Array, Array]:

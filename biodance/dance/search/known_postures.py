@@ -19,7 +19,7 @@ from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
-from biodance.dance.search.posture import counterpart
+from biodance.dance.search.postures import counterpart, describe
 from biodance.errors import BiodanceError
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
@@ -406,3 +406,49 @@ def _middle(stance: Stance) -> Array:
     """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
     along = stance if stance.over is None else stance.on(stance.over)
     return np.array([along.centre[0] - _BACK, stance.centre[1]])
+
+
+def nearest_in_words(table: PostureTable, limits: tuple[Limit, ...]) -> str:
+    """Return what forbids every posture of a table: the ``limits`` that the posture nearest to them breaks, joint and
+    number, and how much more would do.
+    """
+    short = _short(table, limits)
+    s = int(np.maximum(short, 0.0).sum(axis=0).argmin())
+    broken = _broken(table, s, limits, short[:, s])
+    if not broken:
+        limit = table.keeps(s, limits)[1].replace("_", " ")
+        return f"imprecise people leave too little of the limit on {limit} in all of them"
+    return f"the one nearest to all limits breaks that on {broken}"
+
+
+def words_never_kept(table: PostureTable, limits: tuple[Limit, ...]) -> tuple[str, ...]:
+    """Return a sentence for every word that no posture of a table can have, with what the nearest one would break."""
+    short, out = _short(table, limits), []
+    worst = np.maximum(short, 0.0).sum(axis=0)
+    for column, (part, words) in enumerate(table.words.items()):
+        for k, word in enumerate(words[1:], start=1):
+            rows = np.flatnonzero(table.index[:, column] == k)
+            if (worst[rows] > 0).all():
+                s = int(rows[worst[rows].argmin()])
+                text = singular(word.text.format(f"the {part.partition('_')[0]}"))
+                out.append(f"Left out: {text}; it would break the limit on {_broken(table, s, limits, short[:, s])}.")
+    return tuple(out)
+
+
+def _short(table: PostureTable, limits: tuple[Limit, ...]) -> Array:
+    """Return what every posture of a table lacks of each of the limits at rest, (limits, S) in their scale, at most 0
+    where it is kept.
+    """
+    rest = np.zeros_like(table.x)
+    state, rows = State(table.chain, table.stance, table.x, rest, rest, sloped=False), list[Array]()
+    for limit in (limit for limit in limits if limit.at_rest):
+        reserve = limit.straight_reserve(table.stance)
+        rows.append(reserve - limit.margins(state).value.min(axis=1, initial=np.inf) / limit.scale)
+    return np.array(rows)
+
+
+def _broken(table: PostureTable, s: int, limits: tuple[Limit, ...], short: Array) -> str:
+    """Return in words which limits posture ``s`` of a table breaks, where and by how much."""
+    asked, rest = [limit for limit in limits if limit.at_rest], np.zeros((1, table.chain.size))
+    held = State(table.chain, table.stance, table.x[s : s + 1], rest, rest, sloped=False)
+    return " and that on ".join(describe(held, limit) for limit, lack in zip(asked, short, strict=True) if lack > 0)

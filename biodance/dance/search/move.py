@@ -20,10 +20,10 @@ from biodance.dance.problem.nlp import (
     minimise,
     no_objective,
 )
-from biodance.dance.problem.splines import basis_at
+from biodance.dance.problem.splines import basis_at, straight_via
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import State
-from biodance.dance.search.posture import intermediate_posture
+from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError
 from biodance.records import Array
@@ -38,8 +38,6 @@ RESERVE = 0.04
 """Share of every limit's scale that is kept in reserve for the instants in between."""
 BETWEEN = 0.004
 """The same where a move is judged, for what is between those instants."""
-_THIRDS = np.array([0.20987654, 0.79012346])
-"""Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 _ATTEMPTS = ((0.2, 1.0, (14, 8, 8)), (0.0, 0.2, (40, 12, 12)))
 """Spread (rad) of the via points' start about the straight move, share of excitation in the objective, and iterations
 of the rounds.
@@ -62,11 +60,6 @@ _SPARE = 0.5
 """Fraction of what a limit's check forgives (`Limit.rounding`) that a move may use: the check of the whole dance
 samples other instants of it.
 """
-
-
-def straight_via(start: Array, end: Array) -> Array:
-    """Return the via points (..., 2, n) of the moves of least jerk from ``start`` to ``end`` (..., n)."""
-    return np.asarray(start[..., None, :] + _THIRDS[:, None] * (end - start)[..., None, :])
 
 
 @dataclass(frozen=True, eq=False)
