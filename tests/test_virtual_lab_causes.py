@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hidden_faults import about_centre, standing_recording
 from inject import inject
+from perfect_recordings import PERFECT_INSTRUMENTS
 from scipy.integrate import solve_ivp
 
 from biodance.effects import FAMILY
@@ -24,10 +25,9 @@ from biodance.virtual_lab.person.person import make_person
 from biodance.virtual_lab.recording.laboratory import Laboratory
 from biodance.virtual_lab.recording.visit import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.tolerances import instruments_perfect
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
-PERFECT = LabVisit(tolerances=instruments_perfect())
+PERFECT = LabVisit(tolerances=PERFECT_INSTRUMENTS)
 EXAMPLES = (
     "plate_offset:target=Fz,offset=20", "plate_gain:target=Fz,gain=0.04", "plate_crosstalk:target=Fz->My,ratio=0.02",
     "plate_drift:target=Mx,drift=8", "time_delay:delay=0.02", "clock_drift:stretch=0.03",
@@ -334,7 +334,7 @@ TRIAL = "standing_1"
 
 
 def recorded(folder: Path, texts: tuple[str, ...], *, plate_type: int = 2) -> Trial:
-    visit = LabVisit(laboratory=Laboratory(plate_type=plate_type), tolerances=instruments_perfect())
+    visit = LabVisit(laboratory=Laboratory(plate_type=plate_type), tolerances=PERFECT_INSTRUMENTS)
     return read_trial(standing_recording(folder, *texts, visit=visit))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from perfect_recordings import PERFECT_INSTRUMENTS
 
 from biodance import virtual_lab
 from biodance.errors import BiodanceError
@@ -29,11 +30,11 @@ from biodance.virtual_lab.recording.laboratory import (
 )
 from biodance.virtual_lab.recording.visit import LabVisit, perform_in, record, set_up
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.tolerances import REALISTIC, instruments_perfect
+from biodance.virtual_lab.tolerances import REALISTIC
 from biodance.virtual_lab.truth import sip_in_frames
 
 SUBJECT = Subject(58.0, 1.66, "F", 28.0, "S07")
-FAITHFUL = instruments_perfect()
+FAITHFUL = PERFECT_INSTRUMENTS
 
 
 @pytest.fixture(scope="module")
