@@ -169,9 +169,6 @@ def test_planted_feet_stand_still_and_forces_agree_with_the_regressor(planted):
     np.testing.assert_allclose(predict_wrench(BODY, motion).value, state.wrench, atol=1e-8)
 
 
-# ---- One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75
-
-
 # ---- Distances between solids
 
 
@@ -212,7 +209,7 @@ def test_the_nearest_place_on_a_line_is_found():
     assert (found <= best + 1e-7).all()
 
 
-# ---- One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75
+# ---- One number for every limit of a dance that a person works out by hand, for a woman of 65 kg and 1.75 m
 
 
 def upright(**angles: float) -> np.ndarray:

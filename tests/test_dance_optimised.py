@@ -132,9 +132,6 @@ def test_learned_is_the_textbook_update() -> None:
     )
 
 
-# ---- Postures in order
-
-
 # ---- A move that cannot be made
 
 WOMAN = human(Subject(60.0, 1.65, "F", 45.0))

@@ -62,9 +62,6 @@ def test_a_turned_joint_tells_of_its_centre_across_the_axis_only() -> None:
 
 # ---- Deep postures only on request
 
-
-# ---- Deep postures only on request
-
 _ON_BOTH, _ON_ONE, _CLOSED = 70.0, 45.0, 0.5
 """degrees: bounds of a posture that is not deep, and what closing the legs may add."""
 

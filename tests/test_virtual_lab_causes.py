@@ -223,12 +223,6 @@ def test_without_a_fault_nothing_hums() -> None:
     assert spectrum[np.abs(frequency - 50) < 1].max() < 0.2
 
 
-# ---- Hidden faults arrive in the files as they were asked for
-
-
-# ---- Faults written into copies of recordings
-
-
 # ---- Faults written into copies of recordings
 
 CLOCK = (0.1, 0.9)
