@@ -11,7 +11,7 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.diagnosis import Finding
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
@@ -33,7 +33,7 @@ from biodance.uncertainty.plates import around_zero
 if TYPE_CHECKING:
     import pandas as pd
 
-    from biodance.dance.scoring import PerformanceScore
+    from biodance.dance.expectation import PerformanceScore
 
 FITTED_ROLES: tuple[Role, ...] = ("fit",)
 KEPT_ROLES: tuple[Role, ...] = ("validate", "check")

@@ -29,10 +29,11 @@ from biodance.body.inertia import (
     stretch_inertia,
     turn_inertia,
 )
-from biodance.body.tables.anthropometry import Reference, error_size, proportion
+from biodance.body.tables.anthropometry import Reference, proportion
 from biodance.body.tables.choice import PARTS, measured_whole, regression, study_masses
 from biodance.body.tables.choice import lengths as reference_lengths
 from biodance.body.tables.choice import reference as reference_of
+from biodance.body.tables.error_sizes import error_size
 from biodance.records import Array, Sip, Subject
 
 _AXES = ("sagittal", "longitudinal", "transverse")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.body.human.scaling import Scaling
 from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
-from biodance.body.tables.anthropometry import error_size
+from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
