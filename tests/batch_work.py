@@ -9,6 +9,7 @@ from pathlib import Path
 
 from biodance.batch.outcome import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of
 from biodance.batch.work import process_session
+from biodance.lab.session.manifest import write_manifest
 
 
 def count(task: SessionTask) -> Outcome:
@@ -20,6 +21,7 @@ def count(task: SessionTask) -> Outcome:
     outcome = Outcome(task.name, task.fingerprint, SessionStatus.DONE, rows=({"trial": "walk", "status": "ok"},))
     Path(task.out).mkdir(parents=True, exist_ok=True)
     (Path(task.out) / OUTCOME).write_text(json.dumps(asdict(outcome)))
+    write_manifest(Path(task.out), Path(task.session), {})
     return outcome
 
 

@@ -311,7 +311,7 @@ def test_only_what_hangs_on_the_recordings_is_final(tmp_path: Path, monkeypatch,
     monkeypatch.setattr("biodance.batch.work._examined", fails)
     task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f")
     assert process_session(task).status == status
-    monkeypatch.setattr("biodance.batch.work._examined", lambda *_: (SessionStatus.DONE, "", ()))
+    monkeypatch.setattr("biodance.batch.work._examined", lambda *_: (SessionStatus.DONE, "", (), {}))
     assert process_session(task).status == ("done" if again else status)
 
 
@@ -330,10 +330,10 @@ def test_a_refusal_for_want_of_room_is_the_machines(tmp_path: Path, monkeypatch)
 
 
 def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monkeypatch) -> None:
-    def slow(*_: object) -> tuple[SessionStatus, str, tuple]:
+    def slow(*_: object) -> tuple[SessionStatus, str, tuple, dict]:
         steps: list = []
         attempt(steps, "track", lambda: time.sleep(20))
-        return SessionStatus.DONE, "ran on without its step", ()
+        return SessionStatus.DONE, "ran on without its step", (), {}
 
     monkeypatch.setattr("biodance.batch.work._examined", slow)
     task = SessionTask("s0", str(archive_of(tmp_path / "a", 1) / "s0"), str(tmp_path / "out" / "s0"), "f", limit=0.2)

@@ -19,7 +19,7 @@ from biodance.body.human.human import human
 from biodance.body.solids import segment_solids
 from biodance.cli.virtual import _simulated_anew
 from biodance.errors import FileRefused, SessionRefused
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import write_whole
 from biodance.lab.session.manifest import file_hash
 from biodance.lab.session.results_folder import whole_folder
 from biodance.lab.session.write import write_registered
@@ -219,10 +219,28 @@ def test_a_full_disk_in_the_middle_leaves_nothing(visit, tmp_path: Path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
-def test_a_single_file_is_whole_at_any_cut(tmp_path: Path) -> None:
-    for cut in range(4):
+@pytest.mark.parametrize("over", [False, True])
+def test_a_single_file_is_whole_at_any_cut(tmp_path: Path, over: bool) -> None:
+    for cut in range(6):
         path = tmp_path / f"model{cut}.osim"
-        ended = POWER.until(cut, tmp_path, lambda path=path: write_new(path, b"<whole/>"))
-        assert path.read_bytes() == b"<whole/>" if path.exists() else not ended
-    with pytest.raises(FileRefused, match="exists already"):
-        write_new(path, b"<other/>")
+        if over:
+            path.write_bytes(b"<old/>")
+        ended = POWER.until(cut, tmp_path, lambda path=path: write_whole(path, b"<whole/>", over=over))
+        assert (path.read_bytes() if path.exists() else b"") in (
+            (b"<whole/>",) if ended else (b"<old/>" * over, b"<whole/>")
+        )
+    if not over:
+        with pytest.raises(FileRefused, match="exists already"):
+            write_whole(path, b"<other/>")
+
+
+def test_a_file_on_a_full_disk_is_as_before(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "lab.toml").write_text("old")
+
+    def full(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("biodance.lab.plain_text.flush", full)
+    with pytest.raises(FileRefused, match="No space left on device"):
+        write_whole(tmp_path / "lab.toml", b"new", over=True)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]

@@ -8,7 +8,6 @@ import pytest
 
 from biodance.cli import run as command
 from biodance.errors import FileRefused, SessionRefused
-from biodance.lab.plain_text import write_new
 from biodance.lab.session import results_folder as rooms
 from biodance.lab.session.manifest import check_results, file_hash, read_manifest, refuse_mixture
 from biodance.lab.session.results_folder import inputs_of, results_folder
@@ -181,24 +180,3 @@ def test_verify_tells_whole_results_from_changed_ones(session: Path, tmp_path: P
     assert [(one["whole"], one["changed"]) for one in found] == [(True, []), (False, ["body.json"])]
     assert command(["verify", str(session)]) == 2
     assert "holds no results" in capsys.readouterr().err
-
-
-def test_a_new_file_is_whole_or_not_there(tmp_path: Path, monkeypatch) -> None:
-    path = tmp_path / "model.osim"
-
-    class Full:
-        def __init__(self, place: Path, *_: object) -> None:
-            os.close(os.open(place, os.O_CREAT))
-
-        def __enter__(self) -> "Full":
-            return self
-
-        def __exit__(self, *_: object) -> None: ...
-
-        def write(self, _: bytes) -> None:
-            raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("builtins.open", Full)
-    with pytest.raises(FileRefused, match="No space left on device"):
-        write_new(path, b"<whole/>")
-    assert not path.exists()

@@ -65,6 +65,10 @@ def _beside(
                     free.append(pool)
                     yield task, future.result()
     finally:
+        for _, pool in flying.values():  # stopped: what is at work would write while the next run clears up
+            for process in tuple(pool._processes.values()):
+                process.kill()
+                process.join()
         for pool in (*free, *(pool for _, pool in flying.values())):
             pool.shutdown(wait=False, cancel_futures=True)
 

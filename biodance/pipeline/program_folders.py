@@ -25,7 +25,7 @@ from biodance.lab.bids import (
 from biodance.lab.opensim.ground_forces import external_loads, ground_table, inverse_dynamics_setup
 from biodance.lab.opensim.mot import TimeTable, write_mot
 from biodance.lab.opensim.trc import write_trc
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import write_whole
 from biodance.lab.session.results_folder import made_folder, whole_folder
 from biodance.motion.contact.contact import Contact, foot_wrenches
 from biodance.motion.contact.soles import soles_from_body
@@ -244,7 +244,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     ground = {foot: Wrench(wrench.time, np.nan_to_num(wrench.value)) for foot, wrench in feet.items()}
     files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
     loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
-    files.append(write_new(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
+    files.append(write_whole(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
     span = _span(contact, motion)
     if span is None:
         return OpensimTrial(name, tuple(files), None, f"The plates do not measure all the ground does. {one.reason}")
@@ -257,7 +257,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
         between=between,
         out=f"{name}_opensim_torques.sto",
     )
-    files.append(write_new(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
+    files.append(write_whole(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
     files.append(write_mot(folder / f"{name}_torques.sto", _torques(body, motion, ground, span, name)).name)
     return OpensimTrial(name, tuple(files), between)
 

@@ -84,7 +84,6 @@ def _short(stance: Stance) -> str:
 
 def write_preview(dance: Dance, path: Path) -> None:
     """Write the dance as virtual markers."""
-    path.unlink(missing_ok=True)
     write_c3d(path, markers=preview_markers(dance), parameters=preview_parameters(dance))
 
 

@@ -16,6 +16,7 @@ from rich.console import Console
 
 from biodance.cycles.curves import normal_toml
 from biodance.errors import SessionRefused
+from biodance.lab.plain_text import write_whole
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.report.files import refuse_missing_folder
 from biodance.report.tables.laboratory import CARD_ROW, HARDLY, NORM_ROW
@@ -81,16 +82,10 @@ def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
 
     Raises
     ------
-    SessionRefused
+    FileRefused
         The file exists, or cannot be written.
     """
-    try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
-            stream.write(lab_file_text(found))
-    except FileExistsError:
-        refuse_existing(path)
-    except OSError as why:
-        raise SessionRefused(f"{path}: cannot be written ({why.strerror or why}). Choose another place.") from why
+    write_whole(path, lab_file_text(found).encode())
 
 
 def refuse_existing(path: Path) -> None:

@@ -9,6 +9,7 @@ from biodance.errors import FileRefused
 from biodance.lab.c3d.layout import Layout
 from biodance.lab.c3d.parameters import read_header, text_rows
 from biodance.lab.c3d.raw import open_c3d, point_labels, split_label
+from biodance.lab.plain_text import write_whole
 
 
 def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, str], Sequence[tuple[int, int]]]) -> Path:
@@ -35,14 +36,8 @@ def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, st
         else:
             _exchange_points(changed, layout, [columns[label] for label in pair], spans)
     _rename(changed, source, names)
-    if target.exists():
-        raise FileRefused(f"{target}: is there already and nothing is overwritten. Give another folder.")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(changed)
-    except OSError as error:
-        raise FileRefused(f"{target}: cannot be written ({error.strerror or error}).") from error
-    return target
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return write_whole(target, bytes(changed))
 
 
 def _exchange_points(

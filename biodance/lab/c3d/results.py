@@ -17,7 +17,7 @@ from biodance.lab.c3d.declared import texts
 from biodance.lab.c3d.raw import RawC3d, read_raw
 from biodance.lab.c3d.read import file_frame
 from biodance.lab.c3d.write import FileValue
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import refuse_present, write_whole
 from biodance.records import Array, assign, frozen_array
 
 _PATIENCE = 300.0
@@ -84,8 +84,7 @@ def write_results_c3d(
         exists.
     """
     path, original = Path(path), Path(original)
-    if path.exists():
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+    refuse_present(path)
     raw = read_raw(original)
     _refuse_unfitting(raw, outputs)
     metres, turn = file_frame(raw, subject=subject)
@@ -107,7 +106,7 @@ def write_results_c3d(
         np.save(Path(folder) / "values.npy", np.stack(scaled, axis=1) if scaled else np.empty((len(raw.points), 0, 3)))
         _run(original, made, question)
         _refuse_changed(raw, made)
-        return write_new(path, made.read_bytes())
+        return write_whole(path, made.read_bytes())
 
 
 def _refuse_unfitting(raw: RawC3d, outputs: Sequence[Output]) -> None:

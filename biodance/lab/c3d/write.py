@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import write_whole
 from biodance.records import Array, Markers, assign, freeze, frozen_array
 
 FileValue = str | Sequence[str] | ArrayLike
@@ -116,7 +116,7 @@ def write_c3d(
     header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
     rows = np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1)
     data = rows.astype("<f4").tobytes()
-    write_new(path, header + section + data + bytes(-len(data) % C3D_BLOCK))
+    write_whole(path, header + section + data + bytes(-len(data) % C3D_BLOCK))
 
 
 def _samples(path: Path, markers: Markers | None, plates: Sequence[PlateRecording], analog_rate: float) -> int:

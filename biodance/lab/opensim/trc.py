@@ -27,7 +27,7 @@ from biodance.lab.plain_text import (
     read_bytes,
     sha256,
     with_points,
-    write_new,
+    write_whole,
 )
 from biodance.records import Array, Markers, Role, Source, Trial
 
@@ -119,7 +119,7 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
         "\t".join([str(i), f"{t:.9g}", *("" if np.isnan(v) else f"{v:.6f}" for v in frame.ravel())])
         for i, (t, frame) in enumerate(zip(markers.time, xyz, strict=True), start=1)
     )
-    return write_new(path, ("\n".join([*header, *lines]) + "\n").encode())
+    return write_whole(path, ("\n".join([*header, *lines]) + "\n").encode())
 
 
 def _header(rows: list[str], path: Path) -> dict[str, str]:

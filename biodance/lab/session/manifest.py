@@ -17,8 +17,8 @@ MANIFEST = "manifest.json"
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` folder of the recordings as it was
-    given; SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
+    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` absolute folder of the
+    recordings; SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
     """
 
     run: str
@@ -47,12 +47,10 @@ class Verified:
         return not (self.missing or self.changed)
 
 
-def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str], *, growing: str = "") -> None:
-    """Bind the files in a ``folder`` to the recordings of a ``session``, whose ``inputs`` are name -> SHA-256; but for
-    a log that is still ``growing``.
-    """
-    outputs = {name: file_hash(folder / name) for name in files_in(folder) if name != growing}
-    one = Manifest(uuid.uuid4().hex, __version__, str(session), dict(inputs), outputs)
+def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str]) -> None:
+    """Bind the files in a ``folder`` to the recordings of a ``session``, whose ``inputs`` are name -> SHA-256."""
+    outputs = {name: file_hash(folder / name) for name in files_in(folder)}
+    one = Manifest(uuid.uuid4().hex, __version__, str(session.absolute()), dict(inputs), outputs)
     text = json.dumps(asdict(one), indent=1, sort_keys=True)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
 

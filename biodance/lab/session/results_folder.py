@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from biodance.errors import SessionRefused
+from biodance.lab.plain_text import flush
 from biodance.lab.readers import extensions
 from biodance.lab.session.manifest import MANIFEST, files_in, read_manifest, write_manifest
 from biodance.lab.session.recordings import RESULTS, TEXT
@@ -59,18 +60,19 @@ def inputs_of(paths: Mapping[Path, str], session: Path) -> dict[str, str]:
     return {os.path.relpath(path, session): sha for path, sha in paths.items() if sha}
 
 
-def put_in_place(part: Path, place: Path) -> None:
+def put_in_place(part: Path, place: Path, *, alone: bool = False) -> None:
     """Flush a finished folder to the disk and let it change places with what lies at ``place``, in one step; what lay
-    there is ``part`` then.
+    there is ``part`` then. ``alone``: no file of others is there.
     """
     for path in (*part.rglob("*"), part):
         flush(path)
     if part.parent == place:  # a disk of its own: its folder cannot change its name
-        earlier, new = read_manifest(place), (*files_in(part), MANIFEST)
-        for name in new:
+        earlier, new = read_manifest(place), files_in(part)
+        known = files_in(place) if alone else earlier.outputs if earlier else RESULTS
+        for name in (*new, *(one.name for one in part.glob(MANIFEST))):
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (part / name).replace(place / name)
-        for name in set(earlier.outputs if earlier else RESULTS) - set(new):
+        for name in set(known) - {*new, MANIFEST}:
             (place / name).unlink(missing_ok=True)
         shutil.rmtree(part)
     elif place.exists() and any(place.iterdir()):
@@ -78,15 +80,6 @@ def put_in_place(part: Path, place: Path) -> None:
     else:
         part.replace(place)
     flush(place.parent)
-
-
-def flush(path: Path) -> None:
-    """Return when a file or folder is on the disk."""
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _exchange(one: Path, other: Path) -> None:
@@ -188,7 +181,7 @@ def whole_folder(folder: Path, *, over: bool = False) -> Iterator[Path]:
     try:
         yield part
         (part / _LOCK).unlink(missing_ok=True)
-        put_in_place(part, place)
+        put_in_place(part, place, alone=True)
     except OSError as error:
         raise SessionRefused(
             f"{folder}: cannot be written ({error.strerror or error}). What was there is as before. Make room, or "

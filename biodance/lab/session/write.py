@@ -20,6 +20,7 @@ from biodance.lab.c3d.write import PlateRecording, write_c3d
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import GUESSED
 from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.session.file import FILES
 from biodance.lab.session.plate_lines import plate_lines
@@ -65,10 +66,8 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     _refuse_existing(target)
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
-    _refuse_existing(target)
     lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
-    with open(target, "x", encoding="utf-8") as stream:
-        stream.write("\n".join(lines) + "\n")
+    write_whole(target, ("\n".join(lines) + "\n").encode())
     return found
 
 
