@@ -344,13 +344,15 @@ def test_a_higher_limit_tries_again_and_no_step_swallows_it(tmp_path: Path, monk
     assert not found.is_final(replace(task, limit=0.3))
 
 
-@pytest.mark.parametrize("damage", ["deleted", "empty", "cut"])
+@pytest.mark.parametrize("damage", ["deleted", "empty", "cut", "changed"])
 def test_a_missing_or_damaged_outcome_is_done_again(tmp_path: Path, damage: str) -> None:
     archive, out = archive_of(tmp_path / "a", 3), tmp_path / "out"
     run_batch(archive, out, workers=1, pages=False)
     victim = out / "sessions" / "s1" / "outcome.json"
     if damage == "deleted":
         shutil.rmtree(victim.parent)
+    elif damage == "changed":
+        victim.write_text(victim.read_text().replace("refused", "done"))
     else:
         victim.write_bytes(victim.read_bytes()[: 0 if damage == "empty" else 40])
     again = run_batch(archive, out, workers=1, pages=False)
