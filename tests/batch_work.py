@@ -1,5 +1,6 @@
 """Stand-ins for the work on one session, for processes that import them: quick, deadly, slow."""
 
+import fcntl
 import json
 import os
 import signal
@@ -47,11 +48,15 @@ def die_beside(task: SessionTask) -> Outcome:
     return die_once(task) if task.name == "s1" else die_in_s2(task)
 
 
-def slow(task: SessionTask) -> Outcome:
-    """Go through a session that is refused, then wait to be killed with the one that asked."""
+def stuck(task: SessionTask) -> Outcome:
+    """Go through a session that is refused; in s3 wait to be killed with the one that asked."""
     if (found := outcome_of(task)) is None:
         found = process_session(replace(task, pages=False))
-    time.sleep(30.0 if task.name == "s3" else 0.0)
+    if task.name == "s3":
+        alive = (Path(task.session) / "alive").open("w")
+        fcntl.flock(alive, fcntl.LOCK_EX)
+        (Path(task.out).parent / ".part-at-work").mkdir()
+        signal.pause()
     return found
 
 

@@ -1,6 +1,7 @@
 """Archives go through whole: nothing twice, nothing lost, whatever dies."""
 
 import errno
+import fcntl
 import json
 import os
 import shutil
@@ -106,69 +107,31 @@ def test_processes_that_die_once_are_replaced(tmp_path: Path) -> None:
     assert worked(archive) == {f"s{k}": 1 for k in range(4)}
 
 
-def test_the_client_is_killed_and_its_processes_with_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_what_ends_the_client_ends_what_is_at_work_and_a_restart_goes_on(tmp_path: Path, how: signal.Signals) -> None:
     archive, out = archive_of(tmp_path / "a", 6), tmp_path / "out"
     program = (
         "import sys; sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
-        "if __name__ == '__main__': run_batch(sys.argv[1], sys.argv[2], workers=2, work=batch_work.slow)"
+        "if __name__ == '__main__':\n    run_batch(sys.argv[1], sys.argv[2], workers=2, work=batch_work.stuck,\n"
+        "        tell=lambda *said: print(*said, flush=True))"
     )
-    script = tmp_path / "client.py"
-    script.write_text(program)
-    client = subprocess.Popen([sys.executable, str(script), str(archive), str(out), str(Path(__file__).parent)])
-    finished = out / "sessions" / "s5" / "outcome.json"
-    give_up = time.monotonic() + 120
-    while not finished.exists() and client.poll() is None and time.monotonic() < give_up:
-        time.sleep(0.05)
-    with pytest.raises(BiodanceError, match="another run is writing here"):
-        Ledger(out, archive)
-    client.send_signal(signal.SIGKILL)
-    client.wait()
-    assert finished.exists()
-    while time.monotonic() < give_up and _alive(script):
-        time.sleep(0.05)
-    assert not _alive(script)
+    words = [sys.executable, "-c", program, str(archive), str(out), str(Path(__file__).parent)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as client:
+        next(line for line in client.stdout if line.startswith("s5"))
+        with pytest.raises(BiodanceError, match="another run is writing here"):
+            Ledger(out, archive)
+        client.send_signal(how)
+        try:
+            said = client.communicate(timeout=30)[1]
+        finally:
+            client.kill()
+    assert said.count("Traceback") == (how == signal.SIGINT), "that of the client alone, which is no command"
+    with (archive / "s3" / "alive").open("w") as alive:
+        fcntl.flock(alive, fcntl.LOCK_EX | (fcntl.LOCK_NB if how == signal.SIGINT else 0))
     found = run_batch(archive, out, workers=2, work=batch_work.count)
-    assert "s5" not in worked(archive), "what has an outcome is not worked on again"
-    assert found.counts["refused"] == 6 - found.fresh
-    assert sum(found.counts.values()) == 6
-
-
-def test_ctrl_c_ends_the_workers_without_a_word_and_a_restart_goes_on(tmp_path: Path) -> None:
-    archive, out = archive_of(tmp_path / "a", 6), tmp_path / "a" / "out"
-    program = (
-        "import sys; sys.path.insert(0, sys.argv[3]); import batch_work; from biodance.batch.run import run_batch\n"
-        "if __name__ == '__main__':\n    import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "    run_batch(sys.argv[1], sys.argv[2], workers=2, work=batch_work.slow)"
-    )
-    script = tmp_path / "client.py"
-    script.write_text(program)
-    client = subprocess.Popen(
-        [sys.executable, str(script), str(archive), str(out), str(Path(__file__).parent)],
-        stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
-    give_up = time.monotonic() + 120
-    while not (out / "sessions" / "s5" / "outcome.json").exists() and time.monotonic() < give_up:
-        time.sleep(0.05)
-    (out / "sessions" / ".part-xyz").mkdir()
-    os.killpg(client.pid, signal.SIGINT)
-    said = client.communicate(timeout=60)[1]
-    assert said.count("Traceback") == 1, "that of the client alone, which is no command"
-    assert "KeyboardInterrupt" in said
-    found = run_batch(archive, out, workers=2, work=batch_work.count)
+    assert set(worked(archive)) <= {"s3"}, "what has an outcome is not worked on again"
     assert sum(found.counts.values()) == 6
     assert not list((out / "sessions").glob(".part-*"))
-
-
-def _alive(script: Path) -> bool:
-    """Return whether a process of the client that was killed is left (they carry its name in their environment)."""
-    mine = str(script).encode()
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            if mine in path.read_bytes() and path.parent.name != str(os.getpid()):
-                return True
-        except OSError:
-            continue
-    return False
 
 
 def test_a_folder_that_is_taken_is_refused(tmp_path: Path) -> None:
