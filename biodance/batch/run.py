@@ -243,10 +243,11 @@ def _work_off(
         finished = run_on_dask(open_tasks, work, scheduler=workers)
     else:
         finished = run_here(open_tasks, work, workers=min(workers or os.cpu_count() or 1, len(open_tasks)))
-    for task, outcome in finished:
-        ledger.write(outcome)
-        done += 1
-        tell(f"{task.name}: {outcome.status}", done, len(tasks))
+    with closing(finished):  # Ctrl-C while a line is told ends what is at work, too
+        for task, outcome in finished:
+            ledger.write(outcome)
+            done += 1
+            tell(f"{task.name}: {outcome.status}", done, len(tasks))
     return len(open_tasks)
 
 
