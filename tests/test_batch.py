@@ -12,7 +12,7 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -231,7 +231,7 @@ def test_a_cluster_that_exists_is_used(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     archive = archive_of(tmp_path / "a", 3)
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.count)
         real = run_batch(archive, tmp_path / "real", workers=cluster.scheduler_address, pages=False)
@@ -245,11 +245,23 @@ def test_a_session_whose_worker_dies_on_a_cluster_is_tried_alone(tmp_path: Path)
     archive = archive_of(tmp_path / "a", 3)
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),  # a death blames all that the worker held
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster,
     ):
         found = run_batch(archive, tmp_path / "out", workers=cluster.scheduler_address, work=batch_work.die_beside)
     assert worked(archive) == {"s0": 1, "s1": 1}
     assert {one.name: one.status for one in found.outcomes if one.status != "done"} == {"s2": "failed"}
+
+
+def test_a_scheduler_that_goes_away_is_one_sentence(tmp_path: Path, monkeypatch) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def lost(*_: object) -> None:
+        raise distributed.CancelledError("scheduler-connection-lost")
+
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: nullcontext())
+    monkeypatch.setattr("biodance.batch.engines._on_cluster", lost)
+    with pytest.raises(BiodanceError, match=r"scheduler went away.*run the same command"):
+        run_batch(archive_of(tmp_path / "a", 1), tmp_path / "out", workers="tcp://x", work=batch_work.count)
 
 
 def test_an_address_where_nobody_answers_is_one_sentence(tmp_path: Path) -> None:

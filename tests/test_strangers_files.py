@@ -59,13 +59,12 @@ def test_a_huge_toml_is_not_read(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def dance_parts() -> dict[str, np.ndarray]:
+def dance_parts(tmp_path_factory) -> dict[str, np.ndarray]:
     from small_dances import small_dance
 
-    stream = io.BytesIO()
-    small_dance().save(stream)  # type: ignore[arg-type]
-    stream.seek(0)
-    with np.load(stream) as found:
+    path = tmp_path_factory.mktemp("dance") / "dance.npz"
+    small_dance().save(path)
+    with np.load(path) as found:
         return {name: found[name] for name in found.files}
 
 
@@ -142,6 +141,10 @@ def test_a_correction_that_no_plate_needs_is_refused(tmp_path: Path, line: str, 
         ("[norms.x]\nvalue = 0\nsd = -1.0", r"norms\.x\.sd = -1\.0"),
         ("[corection]", r"\[corection\] is nothing"),
         ('[tolerances]\norigin = "x"\nthreshold = 1\nnoise = [[1]]\nmovement = []', "noise"),
+        (
+            '[tolerances]\norigin = "x"\nthreshold = 1\nnoise = []\nmovement = []\nsizes = {"plate_gian Fz" = 0.1}',
+            "'plate_gian Fz' is the size of nothing",
+        ),
         ('[normal."gait knee_flexion"]\nunit = "deg"\npeople = 0\nmean = [1, 2]\nsd = [1, 2]', "people = 0"),
     ],
 )

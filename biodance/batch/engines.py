@@ -118,7 +118,7 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
     Raises
     ------
     BiodanceError
-        Dask is not installed, or nobody answers at the address.
+        Dask is not installed, nobody answers at the address, or the scheduler goes away.
     """
     try:
         import distributed as dask
@@ -128,10 +128,17 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
         client = dask.Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
         raise BiodanceError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}).") from error
-    with client:
-        waiting, alone = deque(tasks), deque[SessionTask]()
-        yield from _on_cluster(client, work, waiting, alone, lambda: _AHEAD * max(1, sum(client.nthreads().values())))
-        yield from _on_cluster(client, work, alone, None, lambda: 1)
+    waiting, alone = deque(tasks), deque[SessionTask]()
+    try:
+        with client:
+            places = lambda: _AHEAD * max(1, sum(client.nthreads().values()))  # noqa: E731
+            yield from _on_cluster(client, work, waiting, alone, places)
+            yield from _on_cluster(client, work, alone, None, lambda: 1)
+    except (dask.CancelledError, OSError) as error:
+        raise BiodanceError(
+            f"--scheduler {scheduler}: the Dask scheduler went away. What was done is kept: start it again, and run "
+            f"the same command."
+        ) from error
 
 
 def _on_cluster(

@@ -4,7 +4,6 @@ A dance is written in the coordinates of its `Chain`; planted legs are not writt
 planted feet stay where they are at every instant, not only at samples.
 """
 
-import io
 import json
 import zlib
 from dataclasses import asdict, dataclass
@@ -26,7 +25,7 @@ from biodance.dance.problem.splines import path_in
 from biodance.dance.problem.stance import Phase, Stance, phase_at, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.plain_text import write_whole
+from biodance.lab.plain_text import whole_file
 from biodance.library import refuse_large, refuse_special
 from biodance.records import SIDES, Array, Motion, Subject, freeze
 from biodance.threads import Sendable
@@ -246,11 +245,9 @@ class Dance(Sendable):
         words["unsafe"] = [asdict(margin) for margin in self.unsafe]
         words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
-        packed = io.BytesIO()
-        np.savez_compressed(
-            packed, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays
-        )  # type: ignore[arg-type]
-        write_whole(Path(path), packed.getvalue(), over=True)
+        arrays |= {"words": json.dumps(words), "body": body_text(self.body, self.protocol)}
+        with whole_file(Path(path), over=True) as part, part.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> "Dance":

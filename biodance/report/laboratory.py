@@ -82,9 +82,10 @@ def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
 
     Raises
     ------
-    FileRefused
+    SessionRefused, FileRefused
         The file exists, or cannot be written.
     """
+    refuse_existing(path)
     write_whole(path, lab_file_text(found).encode())
 
 
