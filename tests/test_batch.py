@@ -335,6 +335,23 @@ def test_a_missing_or_damaged_outcome_is_done_again(tmp_path: Path, damage: str)
     assert all(one.rows for one in again.outcomes)
 
 
+@pytest.mark.parametrize("damage", ["full", "no book"])
+def test_a_book_that_cannot_be_written_is_one_sentence_and_no_loss(tmp_path: Path, monkeypatch, damage: str) -> None:
+    archive, out = archive_of(tmp_path / "a", 2), tmp_path / "out"
+    with monkeypatch.context() as patch:
+        if damage == "full":
+            patch.setattr("biodance.batch.run._WRITE", "SELECT no such column")
+        else:
+            run_batch(archive, out, workers=1)
+            (out / LEDGER).write_text("no book " * 2000)
+        with pytest.raises(BiodanceError, match=r"ledger\.sqlite: .*run the same command: what is done is kept"):
+            run_batch(archive, out, workers=1)
+    if damage == "no book":
+        (out / LEDGER).unlink()
+    found = run_batch(archive, out, workers=1, work=batch_work.count)
+    assert (len(found.outcomes), "s0" in worked(archive)) == (2, False)
+
+
 def test_settings_and_times_of_files_belong_to_the_fingerprint(tmp_path: Path) -> None:
     session = archive_of(tmp_path / "a", 1) / "s0"
     before = fingerprint_of(session, ())

@@ -90,6 +90,14 @@ def test_no_command_runs_what_lies_in_the_working_folder(ended: dict[str, str], 
     assert ended[name] in ("0", "1", "2")
 
 
+def test_python_m_biodance_imports_nothing_of_the_working_folder(tmp_path: Path) -> None:
+    (tmp_path / "numpy.py").write_text("raise SystemExit(7)")
+    own = os.environ | {"PYTHONPATH": str(CHECKOUT), "PYTHONSAFEPATH": ""}
+    words = [sys.executable, "-m", "biodance", "inspect", "walk.c3d"]
+    done = subprocess.run(words, cwd=tmp_path, env=own, capture_output=True, text=True, check=False)
+    assert (done.returncode, "walk.c3d" in done.stderr) == (2, True), done.stderr
+
+
 def test_what_else_is_started_keeps_its_own_folder(monkeypatch) -> None:
     from biodance.batch.engines import _process
 

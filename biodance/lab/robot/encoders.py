@@ -81,7 +81,8 @@ def _lost(time: Array) -> tuple[str, ...]:
     late = np.flatnonzero(steps > _LATE * np.median(steps))
     if not late.size:
         return ()
-    first, places = float(time[late[0]]), f" and at {late.size - 1} other places" if late.size > 1 else ""
+    others = late.size - 1
+    first, places = float(time[late[0]]), f" and at {others} other place{'s' * (others > 1)}" if others else ""
     return (f"Samples are missing after {first:.3f} s{places}: up to {steps.max():.3g} s without one.",)
 
 
