@@ -58,11 +58,3 @@ def stuck(task: SessionTask) -> Outcome:
         (Path(task.out).parent / ".part-at-work").mkdir()
         signal.pause()
     return found
-
-
-def die_beside_slow(task: SessionTask) -> Outcome:
-    """Be killed in s2 each time, while all others are at work for longer."""
-    with (Path(task.session) / "begun.log").open("a") as log:
-        log.write(f"{os.getpid()}\n")
-    time.sleep(0.3 if task.name == "s2" else 0.6)
-    return die_in_s2(task)

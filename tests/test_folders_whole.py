@@ -330,15 +330,3 @@ def test_a_single_file_is_whole_at_any_cut(tmp_path: Path, over: bool) -> None:
     if not over:
         with pytest.raises(FileRefused, match="exists already"):
             write_whole(path, b"<other/>")
-
-
-def test_a_file_on_a_full_disk_is_as_before(tmp_path: Path, monkeypatch) -> None:
-    (tmp_path / "lab.toml").write_text("old")
-
-    def full(_: Path) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("biodance.lab.plain_text.flush", full)
-    with pytest.raises(FileRefused, match="No space left on device"):
-        write_whole(tmp_path / "lab.toml", b"new", over=True)
-    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]

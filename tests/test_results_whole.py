@@ -59,55 +59,6 @@ def test_results_of_a_version_without_manifest_are_replaced_too(session: Path, t
     assert content(out) == SECOND
 
 
-class Stopped(Exception):
-    """The power is cut."""
-
-
-def steps(monkeypatch: pytest.MonkeyPatch, stop_at: int) -> list[str]:
-    """Count every step that changes names or flushes, and stop before one of them."""
-    done: list[str] = []
-
-    def counted(what: str, act):
-        def wrapped(*words, **more):
-            if len(done) == stop_at:
-                raise Stopped
-            done.append(what)
-            return act(*words, **more)
-
-        return wrapped
-
-    for name in ("flush", "write_manifest", "_exchange", "_cleared"):
-        monkeypatch.setattr(rooms, name, counted(name, getattr(rooms, name)))
-    return done
-
-
-def test_a_stop_at_any_step_leaves_the_earlier_or_the_new_results(session: Path, tmp_path: Path, monkeypatch) -> None:
-    seen, number = set(), 0
-    while True:
-        out = tmp_path / f"out{number}"
-        run(session, out, FIRST)
-        with monkeypatch.context() as patch:
-            done = steps(patch, number)
-            try:
-                run(session, out, SECOND, force=True)
-                stopped = False
-            except Stopped:
-                stopped = True
-        now = content(out)
-        assert now in (FIRST, SECOND), done
-        found = check_results(out)
-        assert found is not None
-        assert found.whole
-        seen.add(now == SECOND)
-        run(session, out, SECOND, force=True)
-        assert content(out) == SECOND, "what was stopped can be done again"
-        if not stopped:
-            break
-        number += 1
-    assert seen == {True, False}
-    assert number >= 6
-
-
 def test_a_full_disk_leaves_what_was_there(session: Path, tmp_path: Path, monkeypatch) -> None:
     run(session, tmp_path / "out", FIRST)
 
