@@ -10,7 +10,7 @@ from biodance.cli import run as command
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session import results_folder as rooms
 from biodance.lab.session.manifest import check_results, file_hash, read_manifest, refuse_mixture
-from biodance.lab.session.results_folder import inputs_of, results_folder
+from biodance.lab.session.results_folder import inputs_of, results_folder, whole_folder
 
 
 @pytest.fixture
@@ -87,6 +87,22 @@ def test_a_place_that_is_a_disk_of_its_own_is_filled_from_within(session: Path, 
     assert content(out) == FIRST
     run(session, out, SECOND, force=True)
     assert content(out) == SECOND
+
+
+def test_a_folder_on_a_disk_of_its_own_holds_nothing_stale(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(os.path, "ismount", lambda path: Path(path) == tmp_path / "tables")
+    for names in (("angles.csv", "findings.csv"), ("angles.csv",)):
+        with whole_folder(tmp_path / "tables", over=True) as part:
+            for name in names:
+                (part / name).write_text("of this run")
+    assert [path.name for path in (tmp_path / "tables").iterdir()] == ["angles.csv"]
+
+
+def test_verify_finds_the_recordings_from_anywhere(session: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(Path("visit"), Path("out"), FIRST)
+    monkeypatch.chdir("/")
+    assert command(["verify", str(tmp_path / "out")]) == 0
 
 
 def test_the_manifest_binds_the_parts_and_the_recordings(session: Path, tmp_path: Path) -> None:
