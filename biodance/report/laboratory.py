@@ -10,15 +10,11 @@ that were accepted stand in ``[corrections]`` of the same file.
 import json
 import re
 from collections.abc import Mapping
-from pathlib import Path
 
 from rich.console import Console
 
 from biodance.cycles.curves import normal_toml
-from biodance.errors import SessionRefused
-from biodance.lab.plain_text import write_whole
 from biodance.pipeline.learn import LearnedLaboratory
-from biodance.report.files import refuse_missing_folder
 from biodance.report.tables.laboratory import CARD_ROW, HARDLY, NORM_ROW
 from biodance.report.tables.schema import Row
 from biodance.report.terminal import print_line, print_table
@@ -75,27 +71,6 @@ def _norms(found: LearnedLaboratory) -> list[str]:
             "",
         ]
     return lines
-
-
-def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
-    """Write lab.toml; refuse where there is a file already.
-
-    Raises
-    ------
-    SessionRefused, FileRefused
-        The file exists, or cannot be written.
-    """
-    refuse_existing(path)
-    write_whole(path, lab_file_text(found).encode())
-
-
-def refuse_existing(path: Path) -> None:
-    """Raise SessionRefused where ``path`` exists, BiodanceError where it has no folder: before long work starts, and
-    never over an existing file.
-    """
-    if path.exists():
-        raise SessionRefused(f"{path}: exists already and is never overwritten. Choose another name, or move it away.")
-    refuse_missing_folder(path)
 
 
 def _print_left_out(left_out: Mapping[str, str], console: Console) -> None:

@@ -43,16 +43,12 @@ class ResultsFolder:
         SessionRefused
             The disk is full, or the place cannot be written to; what was there is as before.
         """
-        try:
+        with _as_before(self.place):
             write_manifest(self.part, session, inputs)
             (self.part / _LOCK).unlink(missing_ok=True)
             put_in_place(self.part, self.place)
             return _cleared(self.part, ours=files_in(self.place)) if self.part.is_dir() else None
-        except OSError as error:
-            raise SessionRefused(
-                f"{self.place}: cannot be written ({error.strerror or error}). What was there is as before. Make room, "
-                f"or choose another --out, and run again."
-            ) from error
+        return None
 
 
 def inputs_of(paths: Mapping[Path, str], session: Path) -> dict[str, str]:
@@ -179,16 +175,24 @@ def whole_folder(folder: Path, *, over: bool = False) -> Iterator[Path]:
     part = place / ".part" if os.path.ismount(place) else place.with_name(f".{place.name}.part")
     _taken(part, place)
     try:
-        yield part
-        (part / _LOCK).unlink(missing_ok=True)
-        put_in_place(part, place, alone=True)
-    except OSError as error:
-        raise SessionRefused(
-            f"{folder}: cannot be written ({error.strerror or error}). What was there is as before. Make room, or "
-            f"choose another place, and run again."
-        ) from error
+        with _as_before(folder):
+            yield part
+            (part / _LOCK).unlink(missing_ok=True)
+            put_in_place(part, place, alone=True)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _as_before(place: Path) -> Iterator[None]:
+    """Say of what the disk refuses that ``place`` is as it was."""
+    try:
+        yield
+    except OSError as error:
+        raise SessionRefused(
+            f"{place}: cannot be written ({error.strerror or error}). What was there is as before. Make room, or "
+            f"choose another place, and run again."
+        ) from error
 
 
 def _taken(part: Path, place: Path) -> None:

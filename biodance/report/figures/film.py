@@ -16,6 +16,7 @@ from biodance.lab.plain_text import whole_file
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines
 from biodance.records import Array
+from biodance.report.files import refuse_file
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -46,8 +47,7 @@ def film_path(out: Path, *, force: bool = False) -> Path:
         raise BiodanceError(f"{out}: a film ends in {' or '.join(_FORMATS)}. Choose another --out.")
     if out.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise MissingLibrary(f"{out}: an .mp4 needs the program ffmpeg, which is not installed. Choose a .gif.")
-    if out.exists() and not force:
-        raise BiodanceError(f"{out}: exists already and is not overwritten. Choose another --out, or --force.")
+    refuse_file(out, force=force)
     return out
 
 
