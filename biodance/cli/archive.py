@@ -82,8 +82,7 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.plates import judge_plates
-    from biodance.report.laboratory import print_plates
-    from biodance.report.pages.plates import write_plates
+    from biodance.report.plates import print_plates, write_plates
 
     with progress() as tell:
         place = results_folder(out, archive_folder(archive), force=force)
@@ -112,8 +111,7 @@ def learn_command(
     from biodance.lab.plain_text import refuse_present, write_whole
     from biodance.pipeline.learn import learn_laboratory
     from biodance.report.files import refuse_missing_folder
-    from biodance.report.laboratory import lab_file_text, print_learned
-    from biodance.report.tables.laboratory import learned_document
+    from biodance.report.laboratory import lab_file_text, learned_document, print_learned
 
     refuse_present(out)
     refuse_missing_folder(out)

@@ -21,11 +21,10 @@ from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.family import SWINGING, soft_parts
-from biodance.virtual_lab.recording.laboratory import (
+from biodance.virtual_lab.recording.laboratory import SWINGING, Laboratory, soft_parts
+from biodance.virtual_lab.recording.visit import (
     FIRST_VISIT,
     Instruments,
-    Laboratory,
     LabVisit,
     perform_in,
     record,

@@ -13,14 +13,16 @@ from biodance.identification.sessions import certain_changes
 from biodance.identification.torques import Impact, TorqueBands
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNEL_TITLES, AngleState
-from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.session import bar_list
 from biodance.report.figures.vector import (
     LEFT_SIDE,
     MIDDLE_SIDE,
     RIGHT_SIDE,
     Axis,
+    Curve,
+    CurveFigure,
     Frame,
+    Strip,
     Stroke,
     around,
     panel,
@@ -43,7 +45,7 @@ from biodance.report.tables.schema import Row
 from biodance.report.wording import changed, parted_gain, signed
 
 if TYPE_CHECKING:
-    from biodance.dance.scoring import PerformanceScore
+    from biodance.dance.expectation import PerformanceScore
     from biodance.identification.sessions import Difference
 
 
