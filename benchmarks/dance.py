@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.people import Row
 from biodance.body.human.human import human
-from biodance.body.human.limits import joint_limits
+from biodance.body.human.skeleton import joint_limits
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.design import design

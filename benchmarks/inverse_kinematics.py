@@ -23,7 +23,7 @@ from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.readers.trc import write_trc
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
 from biodance.pipeline.program_folders import opensim_coordinates

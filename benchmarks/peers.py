@@ -23,7 +23,7 @@ from biodance.identification.information import information
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.paper_programme import paper_programme
 from biodance.identification.statistics import Fit
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array, Motion, Subject, Wrench
 from biodance.uncertainty.noise import Noise
 from biodance.virtual_lab.person.person import of_parameters, parameters_of_inertia, place_inertia

@@ -30,7 +30,7 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.dance.playback import _STEP, SETTLE, _Driver, _floor_wrench, bearing, floor_model, planned_torques
 from biodance.dance.robot import person_sized, shrunk
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import CHANNELS, Array, Sip
 from biodance.spatial import point_mass
 

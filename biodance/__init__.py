@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from biodance.errors import TrialRefused as TrialRefused
     from biodance.errors import UnknownName as UnknownName
     from biodance.identification.identification import Identification as Identification
-    from biodance.lab.c3d.read import read_c3d as read_c3d
     from biodance.lab.read import read_trial as read_trial
+    from biodance.lab.readers.c3d import read_c3d as read_c3d
     from biodance.lab.session.read import read_session as read_session
-    from biodance.motion.regressor import predict_wrench as predict_wrench
+    from biodance.motion.dynamics import predict_wrench as predict_wrench
     from biodance.motion.track import track as track
     from biodance.pipeline.dance_result import DanceResult as DanceResult
     from biodance.pipeline.diagnosis import SessionDiagnosis as SessionDiagnosis
@@ -80,10 +80,10 @@ HOMES = {
     "diagnosis.diagnosis": ("Diagnosis", "Finding"),
     "errors": ("BiodanceError", "FileRefused", "MissingLibrary", "SessionRefused", "TrialRefused", "UnknownName"),
     "identification.identification": ("Identification",),
-    "lab.c3d.read": ("read_c3d",),
+    "lab.readers.c3d": ("read_c3d",),
     "lab.read": ("read_trial",),
     "lab.session.read": ("read_session",),
-    "motion.regressor": ("predict_wrench",),
+    "motion.dynamics": ("predict_wrench",),
     "motion.track": ("track",),
     "pipeline.dance_result": ("DanceResult",),
     "pipeline.diagnosis": ("SessionDiagnosis",),

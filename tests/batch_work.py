@@ -10,7 +10,7 @@ from pathlib import Path
 
 from biodance.batch.outcome import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of
 from biodance.batch.work import process_session
-from biodance.lab.session.manifest import write_manifest
+from biodance.lab.session.results_folder import write_manifest
 
 
 def count(task: SessionTask) -> Outcome:

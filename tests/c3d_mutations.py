@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from biodance.errors import BiodanceError
-from biodance.lab.c3d import read
 from biodance.lab.c3d.raw import RawC3d, read_raw
+from biodance.lab.readers import c3d
 from biodance.records import Trial
 
 
@@ -32,7 +32,7 @@ def original(path: Path):
     """Return a sound file with what its bytes and its parameters mean."""
     raw = read_raw(path)
     gain, offset = transform(raw, raw.analog.shape[1])
-    return Original(path.read_bytes(), raw, read.read_c3d(path), raw.analog / gain + offset)
+    return Original(path.read_bytes(), raw, c3d.read_c3d(path), raw.analog / gain + offset)
 
 
 def transform(raw, channels):
@@ -104,8 +104,8 @@ def judge(first: Original, content: bytes, path: Path):
     path.write_bytes(content)
     try:
         raw = read_raw(path)
-        with patch.object(read, "read_raw", return_value=raw):  # once is enough: a second judge is a process of its own
-            trial = read.read_c3d(path)
+        with patch.object(c3d, "read_raw", return_value=raw):  # once is enough: a second judge is a process of its own
+            trial = c3d.read_c3d(path)
     except BiodanceError as refusal:
         assert len(str(refusal)) > 20  # noqa: PT017
         return "refused"

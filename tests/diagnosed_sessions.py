@@ -12,7 +12,7 @@ from biodance.body.human.human import human
 from biodance.diagnosis.evidence import LinearPosterior
 from biodance.diagnosis.problem import TrialWindow
 from biodance.effects import wrench_about_origin
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import CHANNELS, Motion, Plate, Source, Subject, Trial, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.tolerances import Tolerances

@@ -8,7 +8,7 @@ from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 
 from biodance.effects import Case, QualityCheck, Recorded
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Plate, Session, Source, Subject, Trial, Wrench
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from biodance.diagnosis.consequence import Adequacy
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding
 from biodance.diagnosis.reasons import Reason
-from biodance.lab.markers.gaps import MarkerGaps
+from biodance.lab.markers.signals import MarkerGaps
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.provenance import provenance
 from biodance.pipeline.results import SessionResult

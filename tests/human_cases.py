@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.effects import Case
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Plate, Source, Subject, Trial, Wrench
 

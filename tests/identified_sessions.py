@@ -13,7 +13,7 @@ from biodance.body.human.human import human
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.loads import compact_load
 from biodance.identification.unloaded_body import scaled_to_mass
-from biodance.motion.regressor import compare, predict_wrench
+from biodance.motion.dynamics import compare, predict_wrench
 from biodance.pipeline.identification import identify_trials
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult, WrenchComparison, trial_fit

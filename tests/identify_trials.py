@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.body import Body
 from biodance.identification.statistics import Fit
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Sip, Wrench
 
 

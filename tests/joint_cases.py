@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.human.human import human
-from biodance.body.human.limits import joint_limits
 from biodance.body.human.scaling import Scaling, measure_static
+from biodance.body.human.skeleton import joint_limits
 from biodance.motion.ik.joint_unknowns import (
     SIZE,
     JointUnknowns,

@@ -14,18 +14,19 @@ from lab_sessions import person, plate, table_of
 from robots import biped
 from small_dances import BODY, small_dance
 
-from biodance.body.body_file import body_text, read_body
+from biodance.body.body import body_text, read_body
 from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
 from biodance.errors import BiodanceError
-from biodance.lab.amti.read import read_amti_ascii, read_bsf
-from biodance.lab.c3d.read import read_c3d
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.lab.opensim.mot import read_mot, write_mot
-from biodance.lab.opensim.trc import read_trc, write_trc
-from biodance.lab.robot.encoders import read_encoders
+from biodance.lab.opensim_tables import read_mot, write_mot
+from biodance.lab.readers.amti_text import read as read_amti_ascii
+from biodance.lab.readers.bsf import read as read_bsf
+from biodance.lab.readers.c3d import read_c3d
+from biodance.lab.readers.trc import read_trc, write_trc
+from biodance.lab.robot import read_encoders
 from biodance.lab.session.file import read_session_file
-from biodance.lab.session.manifest import check_results, write_manifest
+from biodance.lab.session.results_folder import check_results, write_manifest
 from biodance.pipeline.lab_file import read_lab
 from biodance.records import Trial
 from biodance.report.laboratory import to_toml

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Subject, Trial, Wrench
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 

@@ -13,7 +13,7 @@ from biodance.body.body import Body
 from biodance.body.export import write_model
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.urdf import read_urdf
-from biodance.lab.robot.recording import read_robot_recording
+from biodance.lab.robot import read_robot_recording
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.records import Array, Sip
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.human.human import human
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import Motion, Plate, Source, Subject, Trial, Wrench
 

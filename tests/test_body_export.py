@@ -16,10 +16,9 @@ from biodance.body.export.urdf import roll_pitch_yaw
 from biodance.body.human.human import human
 from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError, FileRefused, UnknownName
-from biodance.lab.opensim.mot import read_mot, write_mot
-from biodance.motion.dynamics import joint_torques
+from biodance.lab.opensim_tables import read_mot, write_mot
+from biodance.motion.dynamics import joint_torques, regressor
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import regressor
 from biodance.pipeline.program_folders import opensim_coordinates
 from biodance.records import Motion, Sip, Subject
 

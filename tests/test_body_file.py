@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biodance.body.body_file import body_text, read_body
+from biodance.body.body import body_text, read_body
 from biodance.body.human.human import human
 from biodance.body.parts import JointError
 from biodance.body.robot.hoap3 import hoap3

@@ -8,11 +8,11 @@ import pytest
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.limits import standing_tilt
 from biodance.body.human.measures import (
     Measures,
 )
 from biodance.body.human.scaling import chain_angles, measure_static
+from biodance.body.human.skeleton import standing_tilt
 from biodance.body.human.static_centres import arm_centres
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.errors import SessionRefused, TrialRefused

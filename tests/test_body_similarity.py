@@ -16,9 +16,8 @@ from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.similarity import SimilarityScale, reframed, similar_body, sole_normal, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
-from biodance.motion.dynamics import joint_torques
+from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Motion
 
 HOAP = hoap3()

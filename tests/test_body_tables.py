@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.body.human.limits import peak_torque
 from biodance.body.human.prior import disagreement, primitive_covariance, scaled_lumps
-from biodance.body.human.skeleton import SEGMENTS, generic_skeleton
+from biodance.body.human.skeleton import SEGMENTS, generic_skeleton, peak_torque
 from biodance.body.inertia import (
     TENSOR,
     RigidInertia,
@@ -18,9 +17,7 @@ from biodance.body.inertia import (
     smallest_eigenvalues,
 )
 from biodance.body.tables.anthropometry import COUNT, KINDS, read_table
-from biodance.body.tables.choice import measured_whole, reference, table_names
-from biodance.body.tables.de_leva import PARTS
-from biodance.body.tables.published import regression
+from biodance.body.tables.choice import PARTS, measured_whole, reference, regression, table_names
 from biodance.body.tables.segment_data import read_segment_table
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names, read_toml

@@ -16,8 +16,8 @@ from biodance.body.parts import UPRIGHT
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError, FileRefused, UnknownName
+from biodance.motion.dynamics import regressor
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import regressor
 from biodance.records import Subject
 
 FEET = ("right_foot", "left_foot")

@@ -8,7 +8,7 @@ import pytest
 
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
-from biodance.motion.contact.support import carried_elsewhere
+from biodance.motion.contact import carried_elsewhere
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine

@@ -10,7 +10,7 @@ from standing_markers import OWN, stand
 from biodance.cli import run
 from biodance.errors import SessionRefused
 from biodance.lab.inspect import inspect_paths
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
 from biodance.lab.session.write import init_session
 

@@ -14,9 +14,8 @@ from browser import Page
 from scipy.stats import t as student
 
 from biodance.cli import run
-from biodance.cycles.curves import CycleCurve
+from biodance.cycles.curves import CycleCurve, key_values, leading_foot, stride_values
 from biodance.cycles.cut import PERCENT, Cycle, Stride
-from biodance.cycles.key_values import key_values, leading_foot, stride_values
 from biodance.cycles.movement import TrialMovement
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import SessionMovement

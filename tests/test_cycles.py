@@ -14,18 +14,28 @@ from biodance.cycles.curves import (
     angle_curves,
     group_curves,
     lab_curves,
+    load_curves,
     normal_curves,
     normal_of,
     normal_toml,
 )
-from biodance.cycles.cut import Cycle, gait_cycles, mean_values, repetitions, strides
-from biodance.cycles.events import FootEvent, agreement_of_events, joined_events, kinematic_events
-from biodance.cycles.file_outputs import compare_angles, compare_events
-from biodance.cycles.loads import load_curves
+from biodance.cycles.cut import (
+    Cycle,
+    FootEvent,
+    agreement_of_events,
+    compare_angles,
+    compare_events,
+    gait_cycles,
+    joined_events,
+    kinematic_events,
+    mean_values,
+    repetitions,
+    strides,
+)
 from biodance.lab.c3d.subject import FileEvent, FileOutputs
-from biodance.motion.contact.soles import soles_from_body
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses
+from biodance.motion.soles import soles_from_body
 from biodance.pipeline.trial import movement_of
 from biodance.records import Motion, Subject, Wrench
 

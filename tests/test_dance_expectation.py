@@ -30,7 +30,7 @@ from biodance.identification.knowledge import segment_quantities
 from biodance.identification.mismatch import mismatch, temper
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, statistics
-from biodance.motion.regressor import predict_wrench, regressor
+from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.pipeline.dance_result import DanceResult
 from biodance.records import Motion, Subject
 from biodance.report.dance import dance_document

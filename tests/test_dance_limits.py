@@ -17,8 +17,8 @@ from biodance.dance.problem.stance import Stance, holding, seat, stance
 from biodance.dance.problem.state import State, close_legs
 from biodance.dance.search.postures import Exciting, initial_guess
 from biodance.errors import BiodanceError
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 
 BLOCKS = excitation_blocks(BODY)
 STEP = 1e-6

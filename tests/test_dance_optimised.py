@@ -28,7 +28,7 @@ from biodance.dance.search.postures import KEPT, alike, initial_guess, solve
 from biodance.dance.verify import Margin
 from biodance.errors import BiodanceError
 from biodance.identification.posterior import prior_factor
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))

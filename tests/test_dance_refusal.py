@@ -9,7 +9,7 @@ import pytest
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.limits import joint_limits
+from biodance.body.human.skeleton import joint_limits
 from biodance.dance.design import safe_stretch
 from biodance.dance.limits import family
 from biodance.dance.performers import PerformersResult

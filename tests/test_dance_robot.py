@@ -32,7 +32,7 @@ from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.identification.base_parameters import estimate_base, structural_base
 from biodance.identification.information import Information, fold
-from biodance.motion.regressor import predict_wrench, regressor
+from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.pipeline.dance import robot_dancer
 from biodance.records import Subject
 

@@ -10,8 +10,8 @@ from biodance.body.changes import move_joint, move_marker, recentre_joint
 from biodance.body.human.human import human
 from biodance.body.inertia import shift_matter
 from biodance.effects import effect
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Subject
 from biodance.spatial import point_mass

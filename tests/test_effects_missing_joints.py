@@ -18,10 +18,9 @@ from biodance.effects.head_joint import HeadJoint
 from biodance.effects.shoulder_girdle import ShoulderGirdle
 from biodance.effects.trunk_joint import TrunkJoint
 from biodance.identification.identification import identify_body
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
-from biodance.motion.smoothing import smooth
-from biodance.motion.track import track
+from biodance.motion.track import smooth, track
 from biodance.records import Array, Markers, Plate, Source, Subject, Trial
 
 KINDS = {

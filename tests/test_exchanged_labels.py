@@ -17,8 +17,8 @@ from biodance.effects import Recorded
 from biodance.effects._base.wrists import back_of_hand, middle
 from biodance.effects.labels_swapped import LabelsSwapped, exchanges, refuted, renamed
 from biodance.errors import FileRefused
-from biodance.lab.c3d.exchanged import write_exchanged
 from biodance.lab.c3d.raw import read_raw
+from biodance.lab.c3d.results import write_exchanged
 from biodance.lab.session.read import read_session
 from biodance.pipeline.accepted import with_right_labels, write_mended
 from biodance.pipeline.session import examine

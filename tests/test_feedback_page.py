@@ -18,8 +18,8 @@ from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import MovementInformation, expect, movement_information
 from biodance.errors import BiodanceError
+from biodance.motion.dynamics import regressor
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import regressor
 from biodance.records import Array, Motion
 from biodance.report.pages import feedback
 from biodance.report.pages.feedback import follow_scene, scene_of, write_feedback

@@ -26,8 +26,7 @@ from biodance.body.solids import segment_solids
 from biodance.cli.virtual import _simulated_anew
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.plain_text import write_whole
-from biodance.lab.session.manifest import check_results, file_hash
-from biodance.lab.session.results_folder import results_folder, whole_folder
+from biodance.lab.session.results_folder import check_results, file_hash, results_folder, whole_folder
 from biodance.lab.session.write import write_registered
 from biodance.pipeline.accepted import CORRECTED, write_corrected
 from biodance.pipeline.program_folders import write_bids_folder, write_opensim_folder
@@ -202,7 +201,7 @@ def _of_one_run(out: Path) -> object:
     """Return whose results a folder holds, and which; all of them are of one run."""
     found = check_results(out)
     assert found is not None
-    assert (found.missing, found.changed, found.foreign) == ((), (), ())
+    assert (found.missing, found.changed) == ((), ())
     return sorted(found.manifest.outputs), json.loads((out / "results.json").read_text())["subject"]["mass_kg"]
 
 

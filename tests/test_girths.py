@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from generated_people import GeneratedPerson, generate_person, measured_lengths
 
-from biodance.body.body_file import parse_body
-from biodance.body.human.girths import stadium, stadium_stack
+from biodance.body.body import parse_body
 from biodance.body.human.human import human
+from biodance.body.human.opinions import stadium, stadium_stack
 from biodance.body.human.prior import prior
 from biodance.body.human.skeleton import SEGMENTS, generic_skeleton
 from biodance.body.tables.choice import reference
@@ -113,7 +113,7 @@ def test_what_no_girth_speaks_of_keeps_the_tables_opinion() -> None:
 
 
 def test_body_file_keeps_the_girths() -> None:
-    from biodance.body.body_file import body_text
+    from biodance.body.body import body_text
 
     body = human(replace(MAN, girths={"thigh": 0.5}))
     assert parse_body(body_text(body, source="test"), "here")[0].girths == body.girths

@@ -6,7 +6,7 @@ from random_bodies import random_body, random_motion
 
 from biodance.identification.base_parameters import estimate_base, structural_base
 from biodance.identification.information import information
-from biodance.motion.regressor import predict_wrench, regressor
+from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.uncertainty.noise import Noise
 
 

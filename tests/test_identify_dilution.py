@@ -15,7 +15,7 @@ from biodance.identification.information import Information
 from biodance.identification.loads import compact_load
 from biodance.identification.posterior import find_posterior
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Sip, Subject, Wrench
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.caution import widened_prior

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from biodance.identification.information import information
 from biodance.identification.paper_programme import _solve, directions, inequalities, paper_programme
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Wrench
 from biodance.uncertainty.noise import Noise
 

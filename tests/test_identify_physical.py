@@ -15,7 +15,7 @@ from biodance.identification import physical
 from biodance.identification.information import Information, fold, information
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.posterior import BodyPosterior, find_posterior
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from joint_cases import displaced, hidden, scaling
 
-from biodance.body.body import Body
-from biodance.body.body_file import body_text, parse_body
+from biodance.body.body import Body, body_text, parse_body
 from biodance.body.inertia import rigid_inertia
 from biodance.body.parts import JointError
 from biodance.identification.information import Information

@@ -10,7 +10,7 @@ from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
 from biodance.identification.information import information
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import find_posterior
-from biodance.motion.regressor import predict_wrench, regressor
+from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.records import Sip, Wrench
 from biodance.uncertainty.noise import Noise
 

@@ -15,7 +15,7 @@ from biodance.identification.loads import compact_load, with_unknown_load
 from biodance.identification.sessions import differences
 from biodance.identification.statistics import layout_for, standing_point, statistics
 from biodance.identification.validation import residual_ratio, validate
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Sip, Wrench
 from biodance.uncertainty.caution import about_true_centres, widened_prior
 

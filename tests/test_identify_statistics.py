@@ -10,7 +10,7 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.information import information
 from biodance.identification.learning import learn_noise
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Sip, Wrench
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.noise import Noise

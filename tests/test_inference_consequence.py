@@ -10,7 +10,7 @@ from inferred_sessions import inferred
 from biodance.diagnosis.consequence import LEAST_FORCE, LEAST_MOMENT, Adequacy, least, matters
 from biodance.diagnosis.reasons import Reason
 from biodance.effects import Case, effects
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Motion, Wrench
 from biodance.uncertainty.tolerances import shipped, table_sizes, without_habits
 

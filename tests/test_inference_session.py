@@ -15,7 +15,7 @@ from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.statistics import standing_point
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Sip, Wrench
 
 FAST = (

@@ -8,7 +8,7 @@ import pytest
 from joint_cases import displaced, hidden, moving, scaling
 from standing_markers import stand
 
-from biodance.body.human.standing import standing
+from biodance.body.human.measures import standing
 from biodance.motion.ik.functional_joints import functional_joints
 from biodance.motion.ik.joint_unknowns import SIZE, JointUnknowns, own_centre, own_turn
 from biodance.records import Array, Markers, Source, Trial

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from biodance.errors import FileRefused
-from biodance.lab.amti.bsf import INSTRUMENT, MAIN
-from biodance.lab.amti.read import read_amti_ascii, read_bsf
+from biodance.lab.readers.amti_text import read as read_amti_ascii
 from biodance.lab.readers.amti_text import sniff
+from biodance.lab.readers.bsf import INSTRUMENT, MAIN
+from biodance.lab.readers.bsf import read as read_bsf
 
 POUND, INCH = 4.4482216152605, 0.0254
 IMPERIAL = np.array([POUND] * 3 + [POUND * INCH] * 3)

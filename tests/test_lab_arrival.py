@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from biodance.lab.markers.arrival import camera_instants
+from biodance.lab.markers.time_axis import camera_instants
 
 CAMERAS = 100.0
 

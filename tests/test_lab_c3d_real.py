@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.c3d.read import read_c3d
+from biodance.lab.readers.c3d import read_c3d
 
 ZOO = {"HC030A": ("01", "05", 45.8, 1.48), "HC032A": ("01", "03", 60.3, 1.58), "HC038A": ("01", "11", 56.8, 1.74)}
 
@@ -27,8 +27,8 @@ def test_every_file_has_the_numbers_that_another_library_reads(data):
 
 def test_the_judge_in_its_child_process_confirms_every_file(data):
     from biodance.lab.c3d.layout import read_layout
-    from biodance.lab.c3d.numbers import second_opinion
     from biodance.lab.c3d.parameters import read_header
+    from biodance.lab.c3d.raw import second_opinion
 
     files = sorted(data.rglob("*.c3d"))
     assert len(files) >= 14

@@ -6,8 +6,8 @@ from c3d_files import File, real, text, whole
 
 from biodance.errors import FileRefused
 from biodance.lab.c3d.raw import model_outputs
-from biodance.lab.c3d.read import read_c3d
 from biodance.lab.inspect import inspect_file
+from biodance.lab.readers.c3d import read_c3d
 
 
 def _sided(*places):

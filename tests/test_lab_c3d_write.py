@@ -9,8 +9,8 @@ import pytest
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.c3d.read import read_c3d
 from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.readers.c3d import read_c3d
 from biodance.records import Markers
 
 RATE, SAMPLES, FRAMES = 100.0, 10, 30

@@ -9,7 +9,7 @@ import pytest
 from plate_trials import CENTRE, CORNERS, FORCE, POINT, TIME, trial
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.ezc3d_object import write_trial
+from biodance.lab.c3d.write import write_trial
 from biodance.lab.corrections import (
     PlateCorrection,
     corrected_session,

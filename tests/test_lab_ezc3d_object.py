@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.c3d.ezc3d_object import from_ezc3d, to_ezc3d
-from biodance.lab.c3d.read import read_c3d
+from biodance.lab.readers.c3d import from_ezc3d, read_c3d, to_ezc3d
 from biodance.records import Markers, Plate, Source, Trial, Wrench
 
 RATE, SAMPLES, FRAMES = 100.0, 10, 120

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError
-from biodance.lab.filters import LowPass, left_raw, low_pass
+from biodance.lab.prepare import LowPass, left_raw, low_pass
 from biodance.records import runs
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from biodance.lab.markers.gaps import fill_gaps, report_gaps
 from biodance.lab.markers.sets import read_marker_set
+from biodance.lab.markers.signals import fill_gaps, report_gaps
 from biodance.records import Markers
 
 RATE = 100.0

@@ -11,9 +11,9 @@ from lab_sessions import GRAVITY, MASS, table_of, write_trial
 
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file, inspect_paths
-from biodance.lab.opensim.mot import write_mot
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.opensim_tables import write_mot
 from biodance.lab.read import read_trial
+from biodance.lab.readers.trc import write_trc
 
 KEYS = {
     "file", "status", "reason", "format", "frames", "rate_hz", "analog_rate_hz", "markers", "marker_set",

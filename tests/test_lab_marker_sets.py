@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
-from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS
-from biodance.lab.markers.sets import FOLDER, canonical, landmark, read_marker_set, recognise
+from biodance.lab.markers.sets import _SEGMENTS, FOLDER, LANDMARKS, canonical, landmark, read_marker_set, recognise
 from biodance.library import names
 from biodance.records import Markers
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from plate_emulator import RATE, Emulated, channels, random_pose, raw_file, step, yaw
 
-from biodance.errors import TrialRefused
 from biodance.lab.plates.decode import decode_plates
 from biodance.lab.plates.parameters import declared_plates
-from biodance.lab.plates.read import read_plates, total_wrench
+from biodance.lab.plates.read import read_plates
 from biodance.lab.plates.sense import pressure_point
 from biodance.records import Markers
 
@@ -32,7 +31,7 @@ def made(kind, rng, *, reaction=True, z_up=False, polynomial=None):
 
 
 def largest_error(plates, truth):
-    return np.abs(total_wrench(plates).value - truth).max()
+    return np.abs(sum(plate.wrench.value for plate in plates) - truth).max()
 
 
 @pytest.mark.parametrize("kind", [1, 2, 3, 4, 5, 6, 7])
@@ -203,11 +202,6 @@ def test_an_unloaded_plate_takes_the_sign_of_the_others():
     read, _, *_ = read_plates(raw, metres=0.001)
     np.testing.assert_allclose(read[1].wrench.force[500:800, 2].mean(), 8, atol=0.5)
     assert "Never loaded" in read[1].decisions[-1]
-
-
-def test_total_wrench_needs_plates():
-    with pytest.raises(TrialRefused, match="at least one plate"):
-        total_wrench(())
 
 
 def test_centre_of_pressure_is_unknown_without_load():

@@ -11,10 +11,10 @@ from lab_sessions import GRAVITY, PLUG_IN_GAIT, person
 from plate_emulator import RATE, Emulated, channels, raw_file
 
 from biodance.effects import check_quality
-from biodance.lab.c3d.read import read_c3d
 from biodance.lab.inspect import inspect_file
-from biodance.lab.markers.still import standing_mass
+from biodance.lab.markers.upright import standing_mass
 from biodance.lab.plates.read import read_plates
+from biodance.lab.readers.c3d import read_c3d
 from biodance.records import Markers, Session, Source, Subject, Trial
 
 MASS, SECONDS = 64.0, 4.0

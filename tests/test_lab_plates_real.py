@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from biodance.lab.c3d.read import read_c3d
-from biodance.lab.markers.still import standing_mass
+from biodance.lab.markers.upright import standing_mass
+from biodance.lab.readers.c3d import read_c3d
 
 
 @pytest.mark.parametrize("subject", ["HC030A", "HC032A", "HC038A"])

@@ -14,12 +14,12 @@ from walkers import WEIGHT, Stand, plate, walker
 
 from biodance.errors import SessionRefused
 from biodance.lab.inspect import inspect_paths
+from biodance.lab.plates.corners import Told, ToldPlate, as_told
 from biodance.lab.plates.read import read_plates
-from biodance.lab.plates.told import Told, ToldPlate, as_told
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
 from biodance.lab.session.write import init_session, write_registered
-from biodance.motion.contact.contact import ground_contact
+from biodance.motion.contact import ground_contact
 from biodance.records import Plate, Source, Trial, Wrench
 
 PAGE = Path(__file__).parents[1] / "docs" / "session_folder.md"

@@ -9,9 +9,9 @@ import pytest
 from biodance.errors import FileRefused
 from biodance.lab.c3d import results as results_c3d
 from biodance.lab.c3d.raw import read_raw
-from biodance.lab.c3d.read import read_c3d
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
 from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.readers.c3d import read_c3d
 from biodance.records import Markers
 
 FRAMES, RATE = 50, 100.0

@@ -7,7 +7,7 @@ import pytest
 from c3d_files import DEC, INTEL, MIPS, File, real, text, whole
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d import numbers as second_opinion
+from biodance.lab.c3d import raw as second_opinion
 from biodance.lab.c3d.raw import read_raw
 
 

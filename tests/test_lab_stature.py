@@ -9,7 +9,7 @@ from lab_sessions import person
 from biodance import read_session
 from biodance.lab.markers.sets import recognise
 from biodance.lab.read import read_trial
-from biodance.lab.session.stature import stature_of_markers, stature_of_movement
+from biodance.lab.session.subject import stature_of_markers, stature_of_movement
 from biodance.records import Markers, Source, Trial
 
 RUNNERS = {"S001": 1.81, "S003": 1.77, "S005": 1.69, "S009": 1.732, "S012": 1.786, "S016": 1.675, "S017": 1.835,

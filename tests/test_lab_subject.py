@@ -5,8 +5,8 @@ import pytest
 from lab_sessions import MASS, STATURE, person, plate, roles, said, two_trials, write_trial
 
 from biodance.errors import SessionRefused
-from biodance.lab.markers.still import is_still, movement, standing_mass
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.markers.upright import is_still, movement, standing_mass
+from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.read import read_session
 from biodance.records import Source, Trial

@@ -12,10 +12,10 @@ import biodance
 from biodance.errors import FileRefused
 from biodance.lab.inspect import inspect_file
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.plates.told import Told, ToldPlate
+from biodance.lab.plates.corners import Told, ToldPlate
 from biodance.lab.read import read_trial, reader_of
+from biodance.lab.readers._table_forces import Load, table_plates
 from biodance.lab.session.write import init_session
-from biodance.lab.tables.forces import Load, table_plates
 
 EVEN = 0.2 + np.arange(100) / 60
 POINT = np.array([0.9, 0.47, 0.0])
@@ -207,7 +207,7 @@ def test_a_table_as_a_session_is_begun_without_a_word(tmp_path):
 def test_wrong_tables_are_refused_in_a_sentence(tmp_path, change, sentence):
     path = write_table(tmp_path / "squat.csv", EVEN, {}, Style())
     path.write_text(change(path.read_text()))
-    from biodance.lab.tables.read import read_marker_table
+    from biodance.lab.readers.table import read as read_marker_table
 
     with pytest.raises(FileRefused, match=sentence):
         read_marker_table(path, role="fit")

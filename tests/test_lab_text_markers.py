@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import FileRefused, TrialRefused
-from biodance.lab.opensim.trc import read_trc, write_trc
+from biodance.lab.readers.trc import read_trc, write_trc
 from biodance.records import Markers
 
 NAMES = ("HEAD", "LASI", "RASI", "LTOE")

@@ -10,8 +10,7 @@ from biodance.lab.session.read import read_session
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
 from biodance.records import LeftOut
-from biodance.records.attention import Judged
-from biodance.records.left_out import seconds_left_out
+from biodance.records.attention import Judged, seconds_left_out
 from biodance.report.tables.diagnosis import JUDGED_ROW
 from biodance.virtual_lab.faults.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol

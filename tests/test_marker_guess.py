@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from standing_markers import OWN, stand
 
-from biodance.lab.markers.guess import dress, guess_set
+from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.markers.up_axis import axis_to_head
+from biodance.lab.markers.upright import axis_to_head
 from biodance.lab.read import read_trial
+from biodance.lab.session.read import dress
 from biodance.records import Markers, Source, Trial
 
 

@@ -7,8 +7,7 @@ import pytest
 from standing_markers import OWN, stand
 
 from biodance.lab.markers.guess import guess_set
-from biodance.lab.markers.names import meanings_of
-from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.markers.names import meanings_of, plain_labels
 from biodance.records import Markers
 
 DEEP = 0.09

@@ -2,8 +2,7 @@
 
 import pytest
 
-from biodance.lab.markers.names import joints_from_video, meanings, meanings_of
-from biodance.lab.markers.spelling import plain_labels
+from biodance.lab.markers.names import joints_from_video, meanings, meanings_of, plain_labels
 
 
 @pytest.mark.parametrize(

@@ -15,10 +15,9 @@ from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.lab.markers.set_file import _SEGMENTS, LANDMARKS, segment_of
-from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.markers.sets import _SEGMENTS, LANDMARKS, read_marker_set, segment_of
 from biodance.lab.read import read_trial
+from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
 from biodance.observations import recording
 from biodance.pipeline.session import examine

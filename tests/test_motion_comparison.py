@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.motion.regressor import compare
+from biodance.motion.dynamics import compare
 from biodance.records import Wrench
 
 

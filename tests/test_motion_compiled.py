@@ -17,7 +17,8 @@ from scipy.spatial.transform import Rotation
 import biodance.motion
 from biodance.body.human.human import human
 from biodance.motion.ik.compiled import ball_step, newton
-from biodance.motion.ik.compiled.chain import (
+from biodance.motion.ik.compiled.ball_step import smooth_at
+from biodance.motion.ik.compiled.newton import (
     _LENGTH,
     add_up,
     add_up_model,
@@ -29,7 +30,6 @@ from biodance.motion.ik.compiled.chain import (
     step_from,
     sums_of,
 )
-from biodance.motion.ik.compiled.interpolation import smooth_at
 from biodance.records import Array, Subject
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
@@ -240,7 +240,7 @@ def test_a_second_process_takes_the_kept_machine_code():
     code = (
         "from biodance.motion.ik.compiled import newton\nfrom biodance.body.human.human import human\nfrom "
         "biodance.records import Subject\n"
-        "from biodance.motion.ik.compiled.chain import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, "
+        "from biodance.motion.ik.compiled.newton import chain_of\nimport numpy as np\nb = human(Subject(58.3, 1.64, "
         "'F', 31.0))\n"
         "c = chain_of(b, list(b.markers.segment), b.markers.position)\n"
         "newton.fill_distances(c, np.zeros((1, len(c.slot), 3)), b.neutral[None].copy(), np.empty((1, len(c.slot))))\n"

@@ -12,8 +12,8 @@ from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
-from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
+from biodance.motion.contact import foot_wrenches, ground_contact
+from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
 from biodance.records import Markers, Motion, Subject, Wrench
 
 MASS = WEIGHT / 9.80665

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from biodance.body.human.human import human
-from biodance.lab.filters import LowPass
-from biodance.motion.cutoff import own_cutoff, with_own_cutoff
+from biodance.lab.prepare import LowPass
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
-from biodance.motion.smoothing import smooth
+from biodance.motion.track import own_cutoff, smooth, with_own_cutoff
 from biodance.records import Array, Markers, Motion, Source, Subject, Trial
 from biodance.settings import USUAL
 

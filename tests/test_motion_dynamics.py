@@ -8,9 +8,8 @@ from random_bodies import random_body, random_motion
 
 from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName
-from biodance.motion.dynamics import distribute, joint_torques
+from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Wrench
 
 pin = pytest.importorskip("pinocchio")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from biodance.cycles.events import foot_events
-from biodance.motion.contact.contact import Contact
+from biodance.cycles.cut import foot_events
+from biodance.motion.contact import Contact
 from biodance.records import Wrench
 
 TIME = np.arange(200) / 100

@@ -18,10 +18,9 @@ from biodance.diagnosis.observability import placing_leaves
 from biodance.errors import TrialRefused
 from biodance.lab.prepare import prepare
 from biodance.lab.session.read import read_session
-from biodance.motion.ik.elsewhere import MarkerSlopes, elsewhere
 from biodance.motion.ik.functional_joints import functional_joints
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.ik.joint_fit import evaluate_joints, spread_postures
+from biodance.motion.ik.joint_fit import MarkerSlopes, elsewhere, evaluate_joints, spread_postures
 from biodance.motion.ik.joint_unknowns import (
     FAULTY,
     HINGES,

@@ -17,8 +17,7 @@ from biodance.body.robot.hoap3 import hoap3
 from biodance.body.robot.similarity import SimilarityScale, similar_body, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.errors import BiodanceError
-from biodance.motion.ik.general_legs import GeneralLeg
-from biodance.motion.ik.legs import Leg
+from biodance.motion.ik.legs import GeneralLeg, Leg
 from biodance.motion.kinematics import poses
 from biodance.records import Array, Subject
 

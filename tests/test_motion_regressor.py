@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from random_bodies import random_body, random_motion
 
+from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.motion.kinematics import poses, segment_motion
-from biodance.motion.regressor import predict_wrench, regressor
 
 pin = pytest.importorskip("pinocchio")
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.human.human import human
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.smoothing import smooth
+from biodance.lab.prepare import LowPass, low_pass
+from biodance.motion.track import smooth
 from biodance.records import Array, Subject
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from biodance.lab.markers.sets import read_marker_set
-from biodance.motion.contact.over import distance_to_hull, inside
-from biodance.motion.contact.soles import soles_from_markers
+from biodance.motion.soles import distance_to_hull, inside, soles_from_markers
 from biodance.records import Markers, Plate, Wrench
 
 

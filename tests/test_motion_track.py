@@ -10,7 +10,7 @@ from perfect_recordings import PERFECT_INSTRUMENTS
 from standing_markers import PERSON
 
 from biodance.body.human.human import human
-from biodance.body.human.limits import with_tracking_limits
+from biodance.body.human.skeleton import with_tracking_limits
 from biodance.errors import TrialRefused
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses

@@ -10,7 +10,7 @@ from random_bodies import random_body, random_motion
 
 from biodance.body.human.human import human
 from biodance.errors import TrialRefused
-from biodance.lab.markers.gaps import MarkerGaps
+from biodance.lab.markers.signals import MarkerGaps
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.quiet_standing import QuietStanding, facing, quiet_run, quiet_standing
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks

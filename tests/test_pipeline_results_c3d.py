@@ -11,8 +11,8 @@ from biodance.errors import TrialRefused
 from biodance.identification.torques import ground_torques, torque_regressor
 from biodance.lab.c3d.raw import read_raw
 from biodance.lab.session.read import read_session
-from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.contact import foot_wrenches, ground_contact
+from biodance.motion.soles import soles_from_body
 from biodance.pipeline.session import examine
 from biodance.pipeline.trial_files import results_into_c3d
 from biodance.records import Subject

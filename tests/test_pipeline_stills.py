@@ -15,8 +15,8 @@ from biodance.body.solids import shape_parts
 from biodance.child_process import run_python
 from biodance.identification.added_mass import added_mass
 from biodance.identification.load_posterior import MASSES, LoadPosterior
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.session_frames import frames_of
 from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers

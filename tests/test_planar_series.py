@@ -8,7 +8,7 @@ from planar_chain import RANGES, planar_chain
 from series import VIA, paper_series, planar_base, planar_problem, seeded_series
 
 from biodance.errors import UnknownName
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Motion
 
 PRINTED = (

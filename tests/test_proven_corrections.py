@@ -21,7 +21,7 @@ from biodance.identification.statistics import Fit
 from biodance.identification.validation import validate
 from biodance.lab.corrections import PlateCorrection, corrected_trial, correction_doubts
 from biodance.lab.plates.faults import OFFSET
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.gains import proven
 from biodance.records import Plate, Source, Trial, Wrench
 from biodance.spatial import wrench_about_origin

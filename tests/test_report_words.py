@@ -121,7 +121,7 @@ def test_a_doubt_about_a_load_points_to_the_cause_that_was_found():
 def test_pelvis_markers_lean_backwards_by_a_positive_angle():
     from human_cases import human_case
 
-    from biodance.body.human.limits import standing_tilt, widen_limits
+    from biodance.body.human.skeleton import standing_tilt, widen_limits
 
     body = human_case().body
     q = np.array(body.neutral)

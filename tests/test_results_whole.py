@@ -9,8 +9,15 @@ import pytest
 from biodance.cli import run as command
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session import results_folder as rooms
-from biodance.lab.session.manifest import check_results, file_hash, read_manifest, refuse_mixture
-from biodance.lab.session.results_folder import inputs_of, results_folder, whole_folder
+from biodance.lab.session.results_folder import (
+    check_results,
+    file_hash,
+    inputs_of,
+    read_manifest,
+    refuse_mixture,
+    results_folder,
+    whole_folder,
+)
 
 
 @pytest.fixture
@@ -123,7 +130,7 @@ def test_the_manifest_binds_the_parts_and_the_recordings(session: Path, tmp_path
     (session / "walk.c3d").write_bytes(b"exported again")
     found = check_results(out)
     assert found is not None
-    assert (found.changed, found.missing, found.foreign) == (("body.json",), ("subject.html",), ("motions.npz",))
+    assert (found.changed, found.missing) == (("body.json",), ("subject.html",))
     assert [Path(one).name for one in found.inputs_changed] == ["walk.c3d"]
     assert not found.whole
 

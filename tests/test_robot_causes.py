@@ -17,11 +17,9 @@ from biodance.body.robot.urdf import read_urdf
 from biodance.diagnosis.robot import robot_causes
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.robot import RobotMotion, robot_fit
-from biodance.lab.robot.recording import read_robot_recording
-from biodance.motion.base_seen import base_of_markers
-from biodance.motion.clocks import PlateFit, from_plate
-from biodance.motion.grounded import ground
-from biodance.motion.regressor import predict_wrench
+from biodance.lab.robot import read_robot_recording
+from biodance.motion.dynamics import predict_wrench
+from biodance.motion.grounded import PlateFit, base_of_markers, from_plate, ground
 from biodance.pipeline.robot_trials import bring_together
 from biodance.pipeline.robot_words import cause_words
 from biodance.records import Array, Markers

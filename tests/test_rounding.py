@@ -15,15 +15,15 @@ from scipy.interpolate import CubicSpline
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.limits import with_tracking_limits
+from biodance.body.human.skeleton import with_tracking_limits
 from biodance.identification.identification import identify_body
 from biodance.identification.statistics import Fit
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.compiled.ball_step import continue_angles
-from biodance.motion.ik.compiled.chain import chain_of
+from biodance.motion.ik.compiled.newton import chain_of
 from biodance.motion.ik.inverse_kinematics import solve_ik
-from biodance.motion.ik.marker_problem import Minimum, better
+from biodance.motion.ik.search import Minimum, better
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Sip, Source, Subject, Trial, Wrench
 

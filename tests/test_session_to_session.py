@@ -11,7 +11,7 @@ from plate_trials import CORNERS, POINT, trial
 from small_dances import small_dance
 
 import biodance
-from biodance.body.body_file import body_text
+from biodance.body.body import body_text
 from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.diagnosis.diagnosis import Alias, Diagnosis, Estimate, Finding, Gain

@@ -10,12 +10,11 @@ import biodance
 from biodance.cli import run
 from biodance.cli.app import DONE, NOT_DONE
 from biodance.errors import BiodanceError, SessionRefused, UnknownName
-from biodance.lab.filters import LowPass, force_filter, low_pass, motion_filter
-from biodance.lab.markers.still import is_still, movement, standing_mass
-from biodance.lab.prepare import prepare
+from biodance.lab.markers.upright import is_still, movement, standing_mass
+from biodance.lab.prepare import LowPass, force_filter, low_pass, motion_filter, prepare
 from biodance.lab.session.file import read_session_file
-from biodance.motion.contact.contact import ground_contact
-from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.contact import ground_contact
+from biodance.motion.soles import soles_from_body
 from biodance.pipeline.checks import trial_checks
 from biodance.pipeline.provenance import provenance
 from biodance.report.tables.session import PROVENANCE_ROW

@@ -14,14 +14,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biodance.body.body_file import body_text, read_body
+from biodance.body.body import body_text, read_body
 from biodance.cli.app import say
 from biodance.dance.dance import Dance
 from biodance.errors import FileRefused, without_codes
 from biodance.lab.corrections import read_corrections
 from biodance.lab.plain_text import for_spreadsheet
-from biodance.lab.robot.encoders import read_encoders
-from biodance.lab.session.manifest import read_manifest
+from biodance.lab.robot import read_encoders
+from biodance.lab.session.results_folder import read_manifest
 from biodance.library import read_toml
 from biodance.pipeline.lab_file import read_lab
 from biodance.report.files import write_tables
@@ -243,8 +243,8 @@ def test_a_closed_tab_leaves_no_traceback(capfd) -> None:
 def test_a_mass_that_nobody_has_is_said(tmp_path: Path, mass: float) -> None:
     from lab_sessions import person
 
-    from biodance.lab.c3d.read import read_c3d
     from biodance.lab.c3d.write import write_c3d
+    from biodance.lab.readers.c3d import read_c3d
 
     said = {"PROCESSING": {"Bodymass": mass, "Height": 1750.0}}
     write_c3d(tmp_path / "walk.c3d", markers=person(frames=10), plates=[], analog_rate=1000.0, parameters=said)

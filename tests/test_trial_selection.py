@@ -11,7 +11,7 @@ from biodance.body.tables.error_sizes import error_size
 from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.own_tolerances import UNREST, own_tolerances, soft_tissue, unrest
 from biodance.diagnosis.problem import TrialWindow
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.judged_trials import chosen_windows, left_out
 from biodance.pipeline.trial_result import Step, TrialResult, WrenchComparison
 from biodance.records import Array, Motion, Role, Wrench

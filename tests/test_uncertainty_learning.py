@@ -6,7 +6,7 @@ import pytest
 from identify_trials import noisy_fit, person, smooth_motion
 
 from biodance.identification.statistics import layout_for, statistics
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.learning import Moments, floor, maximise, moments_of, noise_of, sizes_of
 

@@ -28,12 +28,12 @@ SAYS_A_SIZE = re.compile(
 )
 CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position", "clock_drift", "joint_centre")
 ELSEWHERE = {
-    "body/human/scaling.py:TILT": "deg, a warning's threshold",
-    "body/human/limits.py:HAND_TURN": "a joint's range",
-    "virtual_lab/recording/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
-    "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
-    "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
-    "body/robot/prior.py:_COM_SD": "robots",
+    "body/human/scaling.py:_TILT": "deg, a warning's threshold",
+    "body/human/skeleton.py:_HAND_TURN": "a joint's range",
+    "virtual_lab/recording/visit.py:tilt": "a fault that a visit is given, 0 by default",
+    "body/robot/similarity.py:_RELATIVE_MASS_SD": "robots: what a data sheet is worth",
+    "body/robot/similarity.py:_RELATIVE_INERTIA_SD": "robots",
+    "body/robot/similarity.py:_COM_SD": "robots",
     "body/robot/hoap3.py:_COM_SD": "robots",
     "uncertainty/session_noise.py:_GAIN": "of a difference filter",
     "identification/physical.py:RELATIVE_FLOOR": "share of an eigenvalue",

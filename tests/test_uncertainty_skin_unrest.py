@@ -12,8 +12,8 @@ from scipy.interpolate import make_interp_spline
 from biodance.body.parts import GRAVITY
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.problem import TrialWindow
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
 from biodance.records import Array, Markers, Motion, Wrench
 from biodance.spatial import wrench_about_origin, wrench_about_point

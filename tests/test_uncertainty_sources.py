@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from biodance.body.changes import recentre_joint
 from biodance.body.inertia import rigid_inertia
 from biodance.body.parts import GRAVITY
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import chains, neighbours, poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion
 from biodance.uncertainty.joints import Centre, Tilt, joint_of
 from biodance.uncertainty.response import ErrorSource, Response, derivatives

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from biodance.body.human.human import human
-from biodance.body.human.limits import joint_limits
+from biodance.body.human.skeleton import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import Chain

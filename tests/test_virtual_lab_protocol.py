@@ -8,9 +8,9 @@ import pytest
 from biodance.body.parts import GRAVITY
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import names
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.legs import Leg, soft_limit
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import SIDES, Subject
 from biodance.virtual_lab.movement.performance import perform
 from biodance.virtual_lab.movement.posing import septic

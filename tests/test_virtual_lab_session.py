@@ -12,7 +12,7 @@ from perfect_recordings import PERFECT_INSTRUMENTS
 
 from biodance import virtual_lab
 from biodance.errors import BiodanceError
-from biodance.lab.c3d.read import read_c3d
+from biodance.lab.readers.c3d import read_c3d
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
@@ -242,7 +242,7 @@ TESTED = (
     "biodance.identification",
     "biodance.uncertainty",
     "biodance.spatial",
-    "biodance.motion.regressor",
+    "biodance.motion.dynamics",
     "biodance.motion.ik.inverse_kinematics",
     "biodance.body.tables.anthropometry",
     "biodance.body.human.prior",

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from squatting import BODY, TIME, squat
 
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Session, Source, Subject, Trial, Wrench
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")

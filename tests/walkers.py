@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from biodance.lab.markers.sets import read_marker_set
-from biodance.motion.contact.soles import Soles, soles_from_markers
+from biodance.motion.soles import Soles, soles_from_markers
 from biodance.records import Markers, Plate, Source, Trial, Wrench
 
 RATE = 100.0

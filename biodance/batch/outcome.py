@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.errors import FileRefused
-from biodance.lab.session.manifest import read_manifest, refuse_mixture
+from biodance.lab.session.results_folder import read_manifest, refuse_mixture
 from biodance.library import parse_json
 from biodance.version import __version__
 

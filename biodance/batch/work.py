@@ -28,8 +28,7 @@ from biodance.batch.outcome import (
     untold,
 )
 from biodance.errors import BiodanceError
-from biodance.lab.session.manifest import write_manifest
-from biodance.lab.session.results_folder import inputs_of, put_in_place
+from biodance.lab.session.results_folder import inputs_of, put_in_place, write_manifest
 
 PART = ".part-"
 """Beginning of the name of a folder that is still being written."""

@@ -6,24 +6,90 @@ by +90 deg about x. A joint with several degrees of freedom is a chain of one-do
 no segment.
 """
 
+import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance import display
 from biodance.body.parts import GRAVITY, Foot, Joint, JointError, JointLimits, JointTree, Part, SegmentMarkers
-from biodance.body.pinocchio_model import build
-from biodance.errors import BiodanceError
+from biodance.errors import BiodanceError, FileRefused, MissingLibrary
+from biodance.library import parse_json, refuse_special
 from biodance.records import Array, Sip, freeze
 from biodance.threads import Sendable
 
 if TYPE_CHECKING:
     import pandas as pd
     import pinocchio as pin
+
+
+def load_pinocchio() -> Any:
+    """Import pinocchio.
+
+    Raises
+    ------
+    MissingLibrary
+        It does not load; on slim Linux containers the cause is the absent system library libgomp1.
+    """
+    try:
+        import pinocchio
+    except ImportError as error:
+        cure = (
+            "Install it: apt-get install libgomp1."
+            if "libgomp" in str(error)
+            else "Install biodance again with its constraints.txt."
+        )
+        raise MissingLibrary(f"pinocchio does not load ({error}). {cure}") from error
+    return pinocchio
+
+
+def build(
+    name: str,
+    joints: tuple[Joint, ...],
+    limits: JointLimits,
+    *,
+    inertias: tuple[tuple[int, Array], ...],
+    gravity: Array,
+    free: bool,
+) -> "pin.Model":
+    """Return a pinocchio model with ``joints`` in order, on a ``free`` root or on the ground; ``gravity`` (3,) m/s².
+
+    ``inertias``: of every segment the index of the joint that carries it (-1: the root) and its ten parameters.
+    """
+    pin = load_pinocchio()
+    model = pin.Model()
+    model.name = name
+    model.gravity.linear = np.array(gravity)
+    root = 0
+    if free:
+        root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    ids: list[int] = []
+    for i, joint in enumerate(joints):
+        parent = root if joint.parent < 0 else ids[joint.parent]
+        placement = pin.SE3(np.array(joint.rotation), np.array(joint.translation))
+        effort = max(-limits.torque_lower[i], limits.torque_upper[i])
+        one = np.ones(1)
+        ids.append(
+            model.addJoint(
+                parent,
+                pin.JointModelRevoluteUnaligned(np.array(joint.axis)),
+                placement,
+                joint.name,
+                effort * one,
+                limits.velocity[i] * one,
+                limits.lower[i] * one,
+                limits.upper[i] * one,
+            )
+        )
+    for carrier, parameters in inertias:
+        inertia = pin.Inertia.FromDynamicParameters(np.array(parameters))
+        model.appendBodyToJoint(root if carrier < 0 else ids[carrier], inertia, pin.SE3.Identity())
+    return model
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,3 +266,97 @@ class Body(JointTree, Sendable):
             gravity=self.gravity,
             free=bool(self.n_root),
         )
+
+
+_VERSION = 1
+_HEAVIEST = 1000.0  # kg of a whole body: people, and robots that stand on force plates
+_FARTHEST = 10.0  # m of a place in a segment, or of a joint from its parent
+
+
+def body_text(body: Body, source: str) -> str:
+    """Return the file's text; ``source`` says in a sentence where the parameters come from."""
+    return json.dumps({"biodance_body": _VERSION, "source": source, **asdict(body)}, default=np.ndarray.tolist) + "\n"
+
+
+def read_body(path: str | Path) -> tuple[Body, str]:
+    """Return the body of a file that ``body_text`` made, and its source.
+
+    Raises
+    ------
+    FileRefused
+        The file cannot be read, is of another version, or is not such a file.
+    """
+    refuse_special(Path(path))
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileRefused(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error}).") from error
+    return parse_body(text, str(path))
+
+
+def parse_body(text: str, where: str) -> tuple[Body, str]:
+    """Return the body and its source from the ``text`` of `body_text`; ``where`` it was found, for messages.
+
+    Raises
+    ------
+    FileRefused
+        The text is of another version or is not such a body.
+    """
+    try:
+        raw: dict[str, Any] = parse_json(text)
+        if raw.get("biodance_body") != _VERSION:
+            raise FileRefused(f"{where}: is no body of version {_VERSION}. Run biodance identify again.")
+        return _possible(_body(raw)), str(raw["source"])
+    except FileRefused:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, BiodanceError) as error:
+        raise FileRefused(
+            f"{where}: is not a body that biodance wrote ({error}). Run biodance identify again."
+        ) from error
+
+
+def _body(raw: dict[str, Any]) -> Body:
+    worn = raw["markers"]
+    place = np.reshape(worn["position"], (-1, 3))  # a robot may have none
+    return Body(
+        name=raw["name"],
+        segments=tuple(raw["segments"]),
+        joints=tuple(Joint(**joint) for joint in raw["joints"]),
+        sip=Sip(**raw["sip"]),
+        limits=JointLimits(**raw["limits"]),
+        markers=SegmentMarkers(tuple(worn["names"]), tuple(worn["segment"]), place, np.array(worn["weight"])),
+        boxes=raw["boxes"],
+        com_boxes=raw["com_boxes"],
+        feet={side: Foot(**foot) for side, foot in raw["feet"].items()},
+        root=raw["root"],
+        notes=tuple(raw["notes"]),
+        joint_errors=tuple(JointError(*error) for error in raw["joint_errors"]),
+        **({"gravity": raw["gravity"]} if "gravity" in raw else {}),
+        at_joint=Sip(**raw["at_joint"]) if raw.get("at_joint") else None,
+        girths={segment: tuple(names) for segment, names in raw.get("girths", {}).items()},
+        parts=tuple(Part(**part) for part in raw.get("parts", ())),
+    )
+
+
+def _possible(body: Body) -> Body:
+    """Return the body."""
+    sip = body.sip
+    places = {
+        "centre of mass": sip.com,
+        "place of a joint": np.array([joint.translation for joint in body.joints]),
+        "place of a marker": body.markers.position,
+    }
+    for what, array in {"parameters": sip.phi, "covariance of the parameters": sip.covariance, **places}.items():
+        if not np.isfinite(array).all():
+            raise ValueError(f"{what}: {np.ravel(array)[~np.isfinite(np.ravel(array))][0]} is no number")
+    for what, array in places.items():
+        if np.abs(array).max(initial=0.0) > _FARTHEST:
+            raise ValueError(f"{what}: {np.abs(array).max():.3g} m; legal are up to {_FARTHEST:g} m")
+    if not np.allclose(sip.covariance, sip.covariance.T, rtol=1e-6, atol=1e-15):
+        raise ValueError("covariance of the parameters: what two have in common stands there twice, and differs")
+    worst, whole = float(sip.mass.min()), float(sip.mass.sum())
+    if worst < 0 or not 0 < whole <= _HEAVIEST:
+        raise ValueError(
+            f"mass: {whole:.3g} kg in all, least {worst:.3g}; legal are up to {_HEAVIEST:g} kg, none below 0"
+        )
+    return body

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.frames import written_in
 from biodance.body.inertia import (
     PSEUDO_INERTIA,
     RigidInertia,
@@ -20,10 +19,53 @@ from biodance.body.parts import Joint, JointLimits, Part, SegmentMarkers
 from biodance.records import Array, Sip
 
 
-def move_joint(body: Body, joint: int, shift: Array) -> Body:
-    """Return the body with the origin of ``joint`` (an index) moved by ``shift`` (3,) m in its parent's frame; all that
-    hangs on it goes along.
+def place_at_zero(body: Body, joint: int) -> tuple[Array, Array]:
+    """Return turn (3, 3) and place (3,) m of a joint's frame in the root's at zero angles."""
+    turn, place = np.eye(3), np.zeros(3)
+    while joint >= 0:
+        one = body.joints[joint]
+        turn, place, joint = one.rotation @ turn, one.translation + one.rotation @ place, one.parent
+    return turn, place
+
+
+def written_in(body: Body, segment: int, turn: Array, shift: Array) -> Body:
+    """Return the body with all that is written in the frame of one segment written in a frame with the axes ``turn``
+    (3, 3) = old_R_new and the origin ``shift`` (3,) m in the old one: parameters with covariance, the joints that hang
+    on it, markers, boxes, soles. Its own joint, and with it the place of all these, is the caller's.
     """
+    carrier = body.segment_joint[segment]
+    joints = tuple(
+        replace(joint, rotation=turn.T @ joint.rotation, translation=turn.T @ (joint.translation - shift))
+        if joint.parent == carrier
+        else joint
+        for joint in body.joints
+    )
+    ten, table = slice(10 * segment, 10 * segment + 10), np.eye(body.sip.phi.size)
+    table[ten, ten] = shift_matter(-turn.T @ shift, turn.T)
+    feet = {
+        side: replace(foot, outline=(foot.outline - shift) @ turn) if foot.segment == segment else foot
+        for side, foot in body.feet.items()
+    }
+    on = (np.array(body.markers.segment, dtype=int) == segment)[:, None]
+    place = np.where(on, (body.markers.position - shift) @ turn, body.markers.position)
+    boxes, com_boxes = np.array(body.boxes), np.array(body.com_boxes)
+    for some in (boxes, com_boxes):
+        low, high = some[segment] - shift
+        corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+        some[segment] = (corners @ turn).min(axis=0), (corners @ turn).max(axis=0)
+    return replace(
+        body,
+        joints=joints,
+        sip=Sip(body.segments, table @ body.sip.phi, table @ body.sip.covariance @ table.T),
+        markers=replace(body.markers, position=place),
+        boxes=boxes,
+        com_boxes=com_boxes,
+        feet=feet,
+    )
+
+
+def move_joint(body: Body, joint: int, shift: Array) -> Body:
+    """Return the body with ``joint`` moved by ``shift`` (3,) m in its parent's frame, with all that hangs on it."""
     joints = list(body.joints)
     joints[joint] = replace(joints[joint], translation=joints[joint].translation + np.asarray(shift))
     return replace(body, joints=tuple(joints))
@@ -60,11 +102,11 @@ def neutral_turn(body: Body, joint: int) -> Array:
     return np.asarray(turn.T)
 
 
-_RANGE, _SPEED, TORQUE = 1.2, 10.0, 100.0
+_RANGE, _SPEED, _TORQUE = 1.2, 10.0, 100.0
 """rad either way, rad/s, N·m: wide enough for any joint that is put in to follow markers."""
-SPLIT = 0.2
+_SPLIT = 0.2
 """Relative standard deviation of the lighter part: what a cut leaves on which side (assumed; a vertebra up or down)."""
-GRAM, GYRATION = 1e-3, 0.03
+_GRAM, _GYRATION = 1e-3, 0.03
 """kg and m: mass and radius of gyration of a part to which nothing is assigned, so that it has a centre of mass."""
 _FLAT, _MOST = 1e-9, 0.95
 """Share of a pseudo-inertia's largest eigenvalue that counts as none, and of a whole that a part may take."""
@@ -98,7 +140,7 @@ def branch_off(body: Body, cut: Cut) -> Body:
     The new joints follow the segment's own in ``Body.joints``; the new segment is the last one.
     """
     if not cut.phi.any():
-        cut = replace(cut, phi=GRAM * inertial_parameters(RigidInertia(1.0, cut.place, GYRATION**2 * np.eye(3))))
+        cut = replace(cut, phi=_GRAM * inertial_parameters(RigidInertia(1.0, cut.place, _GYRATION**2 * np.eye(3))))
     old, new = body.segment_index(cut.segment), len(body.segments)
     names = (*body.segments, cut.name)
     return replace(
@@ -119,7 +161,7 @@ def with_part(body: Body, cut: Cut) -> Body:
     segment, phi = body.segment_index(cut.segment), cut.phi
     share = shift_matter(-cut.place) @ phi / body.sip.phi[10 * segment]
     if not phi.any():
-        share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), GYRATION**2 * np.eye(3)))
+        share = _TRACE * inertial_parameters(RigidInertia(1.0, np.zeros(3), _GYRATION**2 * np.eye(3)))
     jointed = _jointed(body, cut, segment, len(body.links))
     return replace(jointed, parts=(*body.parts, Part(cut.name, segment, share)))
 
@@ -151,7 +193,9 @@ def parts_as_segments(body: Body) -> Body:
         _, origin = body.place_on_segment(body.segment_joint[count + k])
         whole, own = boxes[part.segment], np.zeros((2, 3))
         if part.share[0] > _TRACE:
-            own, boxes[part.segment] = _parted(whole, origin[1], above=bool(part.share[2] > 0))
+            low, high = np.array(whole), np.array(whole)
+            low[1, 1] = high[0, 1] = np.clip(origin[1], *whole[:, 1])
+            own, boxes[part.segment] = (high, low) if part.share[2] > 0 else (low, high)
             own = own - origin
         boxes.append(own)
         rooms.append(own)
@@ -169,10 +213,7 @@ def parts_as_segments(body: Body) -> Body:
 
 
 def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
-    """Take from the part what the rest of its segment lacks to be made of real mass.
-
-    ``phi`` (10 N,) is changed at both, ``moved`` (10, 10) takes the part into the segment's frame.
-    """
+    """Take from the part what the rest of its segment lacks to be made of real mass."""
     rows = [slice(10 * i, 10 * i + 10) for i in (rest, part)]
     if smallest_eigenvalues(phi[rows[0]])[0] > 0:
         return
@@ -187,17 +228,8 @@ def _leave_possible(phi: Array, rest: int, part: int, moved: Array) -> None:
     phi[rows[1]] = np.linalg.solve(moved, left)
 
 
-def _parted(box: Array, height: float, *, above: bool) -> tuple[Array, Array]:
-    """Return the two pieces (2, 3) m of a ``box`` cut at ``height`` along y, the one ``above`` (or below) first."""
-    low, high = np.array(box), np.array(box)
-    low[1, 1] = high[0, 1] = np.clip(height, *box[:, 1])
-    return (high, low) if above else (low, high)
-
-
 def _room_for(body: Body, cut: Cut) -> Body:
-    """Return the body whose parts stand one further in ``links``, so that one more segment finds its place before them;
-    parts whose joints go with the cut are pieces of the new segment.
-    """
+    """Return the body with room for one more segment before its parts; parts on cut joints are its pieces."""
     count, gone = len(body.segments), float(cut.phi[0] / body.sip.phi[10 * body.segment_index(cut.segment)])
     parts = []
     for k, part in enumerate(body.parts):
@@ -230,7 +262,7 @@ def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
     for index in cut.joints:
         moved = body.joints[index]
         shifted[index] = replace(moved, parent=first + count - 1, translation=moved.translation - cut.place)
-    wide = {"lower": -_RANGE, "upper": _RANGE, "velocity": _SPEED, "torque_lower": -TORQUE, "torque_upper": TORQUE}
+    wide = {"lower": -_RANGE, "upper": _RANGE, "velocity": _SPEED, "torque_lower": -_TORQUE, "torque_upper": _TORQUE}
     limits = {
         key: np.insert(getattr(body.limits, key), first, np.full(count, value, dtype=float))
         for key, value in wide.items()
@@ -240,18 +272,14 @@ def _jointed(body: Body, cut: Cut, old: int, new: int) -> Body:
 
 
 def _sip(body: Body, cut: Cut, names: tuple[str, ...]) -> Sip:
-    """Return the parameters of both parts.
-
-    If the whole is heavier than thought, both are in proportion; what else it may be off by they share by mass; and
-    what one has more at the cut, the other has less. Nothing of this for a gram.
-    """
+    """Return the parameters of both parts."""
     old = slice(10 * body.segment_index(cut.segment), 10 * body.segment_index(cut.segment) + 10)
     whole, moved = body.sip.phi[old], shift_matter(-cut.place)
     rest, part, split = whole - cut.phi, np.zeros((10, 10)), np.zeros(10)
-    if cut.phi[0] > GRAM:
+    if cut.phi[0] > _GRAM:
         share = cut.phi[0] / whole[0]
         part = share * np.eye(10) + np.outer(cut.phi - share * whole, np.eye(10)[0]) / whole[0]
-        split = SPLIT * (cut.phi if cut.phi[0] < rest[0] else rest)
+        split = _SPLIT * (cut.phi if cut.phi[0] < rest[0] else rest)
     spread = np.eye(body.sip.phi.size + 10, body.sip.phi.size)
     spread[old, old], spread[-10:, old] = np.eye(10) - part, moved @ part
     across = np.zeros(len(spread))

@@ -12,7 +12,7 @@ from biodance.records import Array, freeze
 from biodance.settings import STANDARD_GRAVITY
 
 NO_SEGMENT = -1
-NO_JOINT = -1
+_NO_JOINT = -1
 UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """(3, 3) lab_R_segment of a neutral upright body facing lab x: x -> lab x, y (up) -> lab z, z (right) -> lab -y."""
 GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
@@ -160,7 +160,7 @@ class JointTree:
     def segment_joint(self) -> tuple[int, ...]:
         """Index in `joints` of the joint that carries each of the `links`, (N + P); -1 for the root's segment."""
         carried = {joint.segment: i for i, joint in enumerate(self.joints) if joint.segment != NO_SEGMENT}
-        return tuple(carried.get(i, NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
+        return tuple(carried.get(i, _NO_JOINT) for i in range(len(self.segments) + len(self.parts)))
 
     @cached_property
     def paths(self) -> tuple[tuple[int, ...], ...]:
@@ -190,7 +190,7 @@ class JointTree:
         6
         """
         carrier = self.segment_joint[link]
-        return self.paths[carrier] if carrier != NO_JOINT else ()
+        return self.paths[carrier] if carrier != _NO_JOINT else ()
 
     def place_on_segment(self, joint: int) -> tuple[int, Array]:
         """Return which segment a joint hangs on, and where.

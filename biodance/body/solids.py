@@ -19,14 +19,13 @@ if TYPE_CHECKING:
 
 SegmentSolids = Mapping[str, "Trimesh"]
 """A closed mesh by the name of its segment."""
-MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
+_MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".dae")
 """Mesh files that are read, by the ending of their name."""
 ROUNDNESS = 4.0
 """Exponent of the solid in a box, |x/a|^p + |y/b|^p + |z/c|^p = 1: 2 is an ellipsoid, infinity the box."""
 _HEAD, _SHOULDER = 0.7, 0.3
 """Of the height over the shoulders: the head from the vertex down, and how far the trunk reaches up (they meet)."""
-HEAD_BREADTH, HEAD_DEPTH = 0.68, 0.85
-"""Of the height of the head."""
+_HEAD_BREADTH, _HEAD_DEPTH = 0.68, 0.85  # Of the height of the head
 
 
 def box_solid(box: Array) -> "Trimesh":
@@ -65,7 +64,7 @@ def shape_parts(body: Body) -> list[tuple[int, Array]]:
 
 def _head_in(box: Array, height: float) -> Array:
     """Return the box (2, 3) m of a head of some ``height`` (m) at the top of a ``box``."""
-    middle, half = (box[0] + box[1]) / 2, height * np.array([HEAD_DEPTH, 1.0, HEAD_BREADTH]) / 2
+    middle, half = (box[0] + box[1]) / 2, height * np.array([_HEAD_DEPTH, 1.0, _HEAD_BREADTH]) / 2
     head = np.stack([middle - half, middle + half])
     head[:, 1] = box[1, 1] - height, box[1, 1]
     return head
@@ -82,8 +81,8 @@ def read_mesh(path: str | Path, *, scale: float | Array = 1.0) -> "Trimesh":
     import trimesh
 
     path = Path(path)
-    if path.suffix.lower() not in MESHES:
-        raise FileRefused(f"{path}: is no mesh that is read. Legal are {', '.join(MESHES)}.")
+    if path.suffix.lower() not in _MESHES:
+        raise FileRefused(f"{path}: is no mesh that is read. Legal are {', '.join(_MESHES)}.")
     if not path.is_file():
         raise FileRefused(f"{path}: there is no such file. Check the path.")
     try:
@@ -131,7 +130,7 @@ def _mesh_files(body: Body, folder: Path) -> dict[str, Path]:
         )
     found: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
-        if path.suffix.lower() not in MESHES:
+        if path.suffix.lower() not in _MESHES:
             continue
         if path.stem not in body.segments:
             raise FileRefused(f"{path}: is named like no segment. Legal are {', '.join(body.segments)}.")

@@ -134,7 +134,7 @@ def verify_command(place: Path, *, json: JsonOption = False) -> int:
     from dataclasses import asdict
 
     from biodance.errors import BiodanceError
-    from biodance.lab.session.manifest import check_results, results_below
+    from biodance.lab.session.results_folder import check_results, results_below
 
     folders = results_below(place) if place.is_dir() else ()
     if not folders:

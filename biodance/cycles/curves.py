@@ -1,16 +1,18 @@
 """Curves over a cycle, 0 to 100 %: joint angles, pelvis and foot in the lab, centre of mass."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.cycles.cut import PERCENT, Cycle, place_at
-from biodance.cycles.events import heel_and_toe
-from biodance.motion.contact.soles import Soles
-from biodance.motion.kinematics import Poses, centre_of_mass, poses
-from biodance.records import SIDES, Array, Motion, freeze
+from biodance.cycles.cut import PERCENT, STRIDE_UNITS, Cycle, Stride, heel_and_toe, place_at
+from biodance.identification.torques import ground_torques, torque_regressor_of_links
+from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
+from biodance.motion.soles import Soles
+from biodance.records import SIDES, Array, Motion, Sip, Wrench, freeze
+from biodance.records.motion import BY_FRAME
 
 _TRAVELS = 0.3
 """m that the pelvis goes in a cycle from which its way, not the way it faces, is the direction of walking."""
@@ -56,7 +58,7 @@ class CurveGroup:
         return f"CurveGroup({self.quantity} {self.side}, {count}, {self.unit})"
 
 
-def over_cycle(
+def _over_cycle(
     cycle: Cycle, quantity: str, side: str, unit: str, time: Array, value: Array, sd: Array | None = None
 ) -> CycleCurve:
     """Return a quantity (T,) of a trial over one of its cycles; NaN beside frames in which it is NaN."""
@@ -73,12 +75,12 @@ def group_curves(curves: Sequence[CycleCurve]) -> tuple[CurveGroup, ...]:
     groups = []
     for (kind, quantity, side), some in same.items():
         values = np.stack([one.value for one in some])
-        parameters_sd, _ = mean_and_sd(np.stack([one.sd for one in some]))
-        groups.append(CurveGroup(kind, quantity, side, some[0].unit, values, *mean_and_sd(values), parameters_sd))
+        parameters_sd, _ = _mean_and_sd(np.stack([one.sd for one in some]))
+        groups.append(CurveGroup(kind, quantity, side, some[0].unit, values, *_mean_and_sd(values), parameters_sd))
     return tuple(groups)
 
 
-def mean_and_sd(values: Array) -> tuple[Array, Array]:
+def _mean_and_sd(values: Array) -> tuple[Array, Array]:
     """Return mean and standard deviation (101,) over the rows (n, 101) that are known; NaN for fewer than one, two."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
@@ -97,12 +99,12 @@ def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurv
     """
     angle = motion.known_angles
     for j, joint in enumerate(body.joints):
-        if (seen := seen_from(cycle, joint.name)) is not None:
+        if (seen := _seen_from(cycle, joint.name)) is not None:
             side, quantity, sign = seen
-            yield over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
+            yield _over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
 
 
-def seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
+def _seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
     """Return side, name without it and sign with which a joint belongs to a cycle; None where it does not."""
     first, _, rest = joint.partition("_")
     side, name = (first, rest) if first in SIDES else ("middle", joint)
@@ -126,23 +128,29 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
     frame = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
     middle, mirror = "middle" if cycle.side == "both" else cycle.side, -1.0 if cycle.side == "left" else 1.0
     known = np.where(motion.determined, 1.0, np.nan)
+    rotation = frame @ pose.rotation[:, 0]
+    turn = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
+    over = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
+    tilt = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
     for name, angle in zip(
-        ("tilt", "obliquity", "rotation"), _pelvis(frame @ pose.rotation[:, 0], mirror), strict=True
+        ("tilt", "obliquity", "rotation"),
+        (-np.degrees(tilt), -mirror * np.degrees(over), mirror * np.degrees(turn)),
+        strict=True,
     ):
-        yield over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
+        yield _over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
     heel, toe = heel_and_toe(body, soles.outline)
     for foot, side in enumerate(SIDES):
         if cycle.side in (side, "both"):
             ahead, aside = ((toe - heel)[:, foot] @ frame[k] for k in (0, 2))
             inwards = -np.degrees(np.arctan2(aside, ahead)) * (-1.0 if side == "left" else 1.0)
             stands = np.where((time > cycle.off) & (cycle.side == side), np.nan, known)
-            yield over_cycle(cycle, "foot_progression", side, "deg", time, stands * inwards)
+            yield _over_cycle(cycle, "foot_progression", side, "deg", time, stands * inwards)
     centre = centre_of_mass(body, motion)
     began = place_at(centre, time, cycle.start) * np.array([1.0, 1.0, 0.0])
     ground = float(np.percentile(soles.outline[..., 2].min(axis=(1, 2)), 5))
     for name, axis, sign, zero in (("ahead", 0, 1.0, 0.0), ("aside", 2, mirror, 0.0), ("height", 1, 1.0, ground)):
         path = sign * ((centre - began) @ frame[axis]) - zero
-        yield over_cycle(cycle, f"centre_of_mass_{name}", middle, "m", time, known * path)
+        yield _over_cycle(cycle, f"centre_of_mass_{name}", middle, "m", time, known * path)
 
 
 def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
@@ -155,27 +163,13 @@ def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
     return np.asarray(chosen / np.linalg.norm(chosen))
 
 
-def _pelvis(rotation: Array, mirror: float) -> tuple[Array, Array, Array]:
-    """Return tilt, obliquity and rotation (T,) deg of the pelvis (T, 3, 3) in the frame forward, up, right; ``mirror``
-    -1 for the left side.
-    """
-    turn = np.arctan2(rotation[:, 0, 2], rotation[:, 2, 2])
-    over = -np.arcsin(np.clip(rotation[:, 1, 2], -1.0, 1.0))
-    tilt = np.arctan2(rotation[:, 1, 0], rotation[:, 1, 1])
-    return -np.degrees(tilt), -mirror * np.degrees(over), mirror * np.degrees(turn)
-
-
-FEWEST_PEOPLE = 3
-"""People without whom there is no band."""
-_EVERY = 5
-"""% between two values of a band in a file."""
+_FEWEST_PEOPLE = 3  # People without whom there is no band
+_EVERY = 5  # % between two values of a band in a file
 
 
 @dataclass(frozen=True, eq=False)
 class NormalCurve:
-    """One quantity of one kind of cycle over ``people``: ``mean`` and ``sd`` between them (101,) at `PERCENT` in
-    ``unit``; both sides together.
-    """
+    """One quantity over ``people``: ``mean`` and ``sd`` between them (101,) at `PERCENT` in ``unit``."""
 
     kind: str
     quantity: str
@@ -189,7 +183,7 @@ class NormalCurve:
 
 
 def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCurve, ...]:
-    """Return the bands of all quantities that at least `FEWEST_PEOPLE` have all through the cycle.
+    """Return the bands of all quantities that at least `_FEWEST_PEOPLE` have all through the cycle.
 
     ``people`` by name, with the curves of all their trials; a person's own mean is over trials and sides.
     """
@@ -199,9 +193,9 @@ def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCur
             means.setdefault((one.kind, one.quantity, one.unit), {}).setdefault(name, []).append(one.mean)
     bands = []
     for (kind, quantity, unit), own in means.items():
-        whole = [mean for some in own.values() if np.isfinite(mean := mean_and_sd(np.stack(some))[0]).mean() > 0.9]
-        if len(whole) >= FEWEST_PEOPLE:
-            bands.append(NormalCurve(kind, quantity, unit, len(whole), *mean_and_sd(np.stack(whole))))
+        whole = [mean for some in own.values() if np.isfinite(mean := _mean_and_sd(np.stack(some))[0]).mean() > 0.9]
+        if len(whole) >= _FEWEST_PEOPLE:
+            bands.append(NormalCurve(kind, quantity, unit, len(whole), *_mean_and_sd(np.stack(whole))))
     return tuple(bands)
 
 
@@ -232,3 +226,202 @@ def normal_of(raw: Mapping[str, Mapping[str, object]]) -> tuple[NormalCurve, ...
         mean, sd = (np.interp(PERCENT, PERCENT[::_EVERY], np.asarray(row[key], dtype=float)) for key in ("mean", "sd"))
         bands.append(NormalCurve(kind, quantity, str(row["unit"]), int(str(row["people"])), mean, sd))
     return tuple(bands)
+
+
+_ENOUGH = 0.8  # Share of a cycle in which a moment or a power must be known
+_BEYOND = 0.05  # s before and behind a cycle that are looked at for its first and last per cent
+
+
+def load_curves(
+    cycle: Cycle, body: Body, sip: Sip, motion: Motion, feet: Mapping[str, Wrench], known: NDArray[np.bool_]
+) -> Iterator[CycleCurve]:
+    """Yield the moments (N·m/kg) and powers (W/kg) of a cycle, those of its own side and of the trunk in a gait cycle.
+
+    ``feet`` the wrenches on the right and the left foot, ``known`` (T, 2) where they are known: elsewhere the leg's
+    values are NaN. A curve of which less than `_ENOUGH` is known is left out: a mean over cycles of which one shows the
+    stance and others the swing would be nobody's. ``sip`` parameters with covariance, whose total is the body mass. A
+    moment is what the muscles do about a joint's axis, positive as its angle; a power sums over the axes of a joint,
+    positive where they give energy.
+
+    Notes
+    -----
+    With torque = Y phi - c (`identification.torques`) a power is sum(v torque) over the axes, so that its variance is
+    y' C y with y = sum(v Y): the axes of a joint are not independent.
+    """
+    near = (motion.time >= cycle.start - _BEYOND) & (motion.time <= cycle.end + _BEYOND)
+    motion, known = replace(motion, **{name: getattr(motion, name)[near] for name in BY_FRAME}), known[near]
+    ground = {
+        f"{side}_foot": Wrench(motion.time, np.where(known[:, foot, None], feet[f"{side}_foot"].value[near], 0.0))
+        for foot, side in enumerate(SIDES)
+    }
+    names, rows, given = _moments_and_powers(body, motion, ground)
+    own = [(k, seen) for k, (joint, _) in enumerate(names) if (seen := _seen_from(cycle, joint)) is not None]
+    columns, share = [k for k, _ in own], np.eye(sip.phi.size) if body.sharing is None else body.sharing
+    rows, given, mass = rows[:, columns], given[:, columns], float(sip.mass.sum())
+    variance = np.sum((rows @ (share @ sip.covariance @ share.T)) * rows, axis=-1)
+    value, sd = (rows @ (share @ sip.phi) - given) / mass, np.sqrt(np.maximum(variance, 0.0)) / mass
+    for column, (k, (side, joint, sign)) in enumerate(own):
+        kind = names[k][1]
+        of_leg = joint.startswith(("hip", "knee", "ankle"))  # which needs its own foot, trunk and arms nothing
+        use = motion.determined & (known[:, SIDES.index(side)] if of_leg else True)
+        shown, sign = np.where(use, 1.0, np.nan), sign if kind == "moment" else 1.0
+        unit = "N·m/kg" if kind == "moment" else "W/kg"
+        curves = sign * shown * value[:, column], shown * sd[:, column]
+        one = _over_cycle(cycle, f"{joint}_{kind}", side, unit, motion.time, *curves)
+        if np.isfinite(one.value).mean() > _ENOUGH:
+            yield one
+
+
+def _moments_and_powers(
+    body: Body, motion: Motion, ground: Mapping[str, Wrench]
+) -> tuple[list[tuple[str, str]], Array, Array]:
+    """Return joint, kind ("moment", "power"), rows (T, m, 10N) and given (T, m): value = rows phi - given."""
+    regressor, given = torque_regressor_of_links(body, motion), ground_torques(body, motion, ground)
+    rates, groups = motion.v[:, body.n_root :], [list(chain) for chain in chains(body)]
+    rows = [np.einsum("tj,tjp->tp", rates[:, axes], regressor[:, axes]) for axes in groups]
+    work = [np.sum(rates[:, axes] * given[:, axes], axis=1) for axes in groups]
+    names = [(joint.name, "moment") for joint in body.joints]
+    names += [(body.joints[axes[-1]].name.rpartition("_")[0], "power") for axes in groups]
+    stacked = np.concatenate([regressor, np.stack(rows, axis=1)], axis=1)
+    return names, stacked, np.concatenate([given, np.stack(work, axis=1)], axis=1)
+
+
+ANGLE_PANELS = (
+    *("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation", "hip_flexion", "hip_adduction", "hip_rotation"),
+    *("knee_flexion", "ankle_dorsiflexion", "foot_progression", "trunk_flexion", "trunk_bending", "trunk_rotation"),
+)
+"""Angles that are shown and of which key values are told."""
+LOAD_PANELS = (
+    *("hip_flexion_moment", "knee_flexion_moment", "ankle_dorsiflexion_moment", "hip_adduction_moment"),
+    *("hip_power", "knee_power", "ankle_power"),
+)
+"""The same of moments and powers."""
+_KNOWN = 0.8  # Share of a cycle that must be known for its peaks
+_OF_STANCE = "foot_progression"  # Known while the foot stands only: its mean is told
+_INSTANTS: Mapping[str, tuple[str, str]] = {
+    "gait": ("at_strike", "at_off"),
+    "squat": ("at_start", "at_lowest"),
+    "sit_to_stand": ("at_start", "at_seat_off"),
+}
+"""What the beginning and ``Cycle.off`` of each kind of cycle are called."""
+_OF_A_FOOT = ("step_length", "step_time", "stance")
+"""Spatio-temporal values that each foot has of its own; all others are told of the person."""
+_TURNS: Mapping[str, str] = {"ankle": "ankle_dorsiflexion"}
+"""Joint -> the angle that tells how fast it turns, where it is not its flexion."""
+
+
+_Curve = tuple[Cycle, str, str]  # Cycle, side and quantity of a curve
+
+
+@dataclass(frozen=True)
+class KeyValue:
+    """One number of one ``cycle``: its ``quantity``, which ``key`` of it ("maximum", "minimum", "range", "mean", or the
+    instant; "" where the quantity is a number), ``side``, ``value`` in ``unit``; ``sd`` what the inertial parameters
+    leave uncertain in it; ``rate`` 1/s: how fast the joint turns there (rad/s, powers), or one over the cycle's
+    duration (spatio-temporal values); of an angle ``span`` deg that it goes through in the cycle, and ``beside`` deg,
+    the root of the sum of squares of what the other angles of its joint go through.
+    """
+
+    cycle: Cycle
+    quantity: str
+    key: str
+    side: str
+    unit: str
+    value: float
+    sd: float = 0.0
+    rate: float = 0.0
+    span: float = 0.0
+    beside: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """``knee_flexion_maximum``, or the quantity alone."""
+        return f"{self.quantity}_{self.key}" if self.key else self.quantity
+
+
+def key_values(curves: Sequence[CycleCurve]) -> tuple[KeyValue, ...]:
+    """Return the key values of all cycles: of angles (deg) maximum, minimum, range and the values at both instants of
+    the cycle; of moments (N·m/kg) and powers (W/kg) maximum and minimum.
+
+    A curve of which less than `_KNOWN` is known has none.
+    """
+    angles = {(one.cycle, one.side, one.quantity): one for one in curves if one.unit == "deg"}
+    spans = {about: _span(one) for about, one in angles.items()}
+    found: list[KeyValue] = []
+    for one in curves:
+        if one.quantity == _OF_STANCE:
+            if np.isfinite(one.value).any():
+                found.append(_key(one, "mean", float(np.nanmean(one.value))))
+        elif np.isfinite(one.value).mean() <= _KNOWN:
+            continue
+        elif one.quantity in ANGLE_PANELS:
+            found += _of_angle(one, spans)
+        elif one.quantity in LOAD_PANELS:
+            found += _of_load(one, angles)
+    return tuple(found)
+
+
+def _key(one: CycleCurve, key: str, value: float, **more: float) -> KeyValue:
+    return KeyValue(one.cycle, one.quantity, key, one.side, one.unit, value, **more)
+
+
+def _span(one: CycleCurve) -> float:
+    """Return what a curve goes through in its cycle; 0 where nothing of it is known."""
+    known = one.value[np.isfinite(one.value)]
+    return float(np.ptp(known)) if known.size else 0.0
+
+
+def _of_angle(one: CycleCurve, spans: Mapping[_Curve, float]) -> Iterator[KeyValue]:
+    joint, span = one.quantity.partition("_")[0], _span(one)
+    others = [
+        size
+        for (cycle, side, name), size in spans.items()
+        if (cycle, side) == (one.cycle, one.side) and name != one.quantity and name.partition("_")[0] == joint
+    ]
+    beside = float(np.linalg.norm(others))
+    found = {"maximum": float(np.nanmax(one.value)), "minimum": float(np.nanmin(one.value)), "range": span}
+    for key, at in zip(_INSTANTS[one.cycle.kind], (0.0, one.cycle.off_percent), strict=True):
+        found[key] = float(np.interp(at, PERCENT, one.value))
+    yield from (_key(one, key, value, span=span, beside=beside) for key, value in found.items() if np.isfinite(value))
+
+
+def _of_load(one: CycleCurve, angles: Mapping[_Curve, CycleCurve]) -> Iterator[KeyValue]:
+    """Yield both extremes with their uncertainty, and how fast the joint turns there if it is a power."""
+    joint = one.quantity.partition("_")[0]
+    turn = angles.get((one.cycle, one.side, _TURNS.get(joint, f"{joint}_flexion")))
+    for key, at in (("maximum", int(np.nanargmax(one.value))), ("minimum", int(np.nanargmin(one.value)))):
+        rate = float(_turning(turn)[at]) if turn is not None and one.unit == "W/kg" else 0.0
+        sd, rate = np.nan_to_num([one.sd[at], rate]).tolist()
+        yield _key(one, key, float(one.value[at]), sd=sd, rate=rate)
+
+
+def _turning(one: CycleCurve) -> Array:
+    """Return how fast (101,) rad/s a joint turns over its cycle."""
+    return np.abs(np.gradient(np.radians(one.value), one.cycle.times()))
+
+
+def stride_values(strides: Sequence[Stride], *, leading: str) -> tuple[KeyValue, ...]:
+    """Return the spatio-temporal values of all strides: step length, step time and stance of each foot; all others
+    once, under the side "both", from the strides of the ``leading`` foot: those of the other one share their time and
+    would count twice.
+    """
+    return tuple(
+        KeyValue(
+            one.cycle,
+            name,
+            "",
+            one.cycle.side if name in _OF_A_FOOT else "both",
+            STRIDE_UNITS[name],
+            value,
+            rate=1 / one.cycle.duration,
+        )
+        for one in strides
+        for name, value in one.values.items()
+        if name in _OF_A_FOOT or one.cycle.side == leading
+    )
+
+
+def leading_foot(visits: Sequence[Sequence[Stride]]) -> str:
+    """Return the side, "right" or "left", of which the visit with fewest strides has most."""
+    least = {side: min(sum(one.cycle.side == side for one in some) for some in visits) for side in SIDES}
+    return max(SIDES, key=least.__getitem__)

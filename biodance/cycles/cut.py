@@ -2,7 +2,7 @@
 of walking: cadence, speed, stride and step length, step width, stance and double support.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -11,26 +11,249 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.cycles.events import FootEvent, heel_and_toe, thigh_and_shank
-from biodance.motion.contact.soles import Soles
+from biodance.lab.c3d.subject import FileEvent, FileOutputs
+from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
-from biodance.records import SIDES, Array, Motion, runs
+from biodance.motion.soles import Soles, soles_from_body
+from biodance.records import SIDES, Array, Mask, Motion, Wrench, runs
 
-CycleKind = Literal["gait", "squat", "sit_to_stand"]
+# Zeni et al. (2008, doi:10.1016/j.gaitpost.2007.07.007): a foot strikes where its heel is farthest ahead of the pelvis
+# and leaves where its toes are farthest behind it. There the foot still moves with the pelvis, not with the ground; the
+# strike is therefore taken where the heel has `_STRIKES`, the leaving where the toes still have `_LEAVES` of the
+# ground's speed under the pelvis. Ahead is where the pelvis faces in that frame, so that turns and treadmills are
+# walked, too. The body follows the markers, so that a marker that is lost for a moment costs no event.
+
+_THRESHOLD = 20.0
+"""N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007, use
+the same).
+"""
+_SHORTEST = 0.05  # s: a shorter contact, or a shorter time without, is noise
+
+
+@dataclass(frozen=True)
+class FootEvent:
+    """``time`` s on the clock of the trial; ``side`` "right" or "left"; ``down`` True where the foot comes down,
+    False where it leaves; ``source`` "force" where a plate saw it, "markers" where the movement of the feet tells it.
+    """
+
+    time: float
+    side: str
+    down: bool
+    source: Literal["force", "markers"] = "force"
+
+
+def foot_events(feet: Mapping[str, Wrench], contact: Contact) -> tuple[FootEvent, ...]:
+    """Return when each foot came down on a plate or left it, in the order of time.
+
+    ``feet`` the wrenches on the right and the left foot. An event is where the vertical force passes `_THRESHOLD`,
+    between two frames in which the plates tell what the ground does to this foot and the other one is not over the same
+    plate: a force that two feet share tells nothing of one.
+    """
+    events = []
+    for foot, side in enumerate(SIDES):
+        wrench = feet[f"{side}_foot"]
+        shared = (contact.on_plate[:, foot] & contact.on_plate[:, 1 - foot]).any(axis=1)
+        sure, force = contact.told[:, foot] & ~shared, wrench.force[:, 2]
+        shortest = _SHORTEST * wrench.rate
+        loaded = _without_short(np.nan_to_num(force) > _THRESHOLD, shortest)
+        for i in np.flatnonzero(loaded[1:] != loaded[:-1]) if loaded.size > 1 else ():
+            if not (sure[i] and sure[i + 1]):
+                continue
+            share = (_THRESHOLD - force[i]) / (force[i + 1] - force[i])
+            time = wrench.time[i] + np.clip(share, 0, 1) * (wrench.time[i + 1] - wrench.time[i])
+            events.append(FootEvent(float(time), side, bool(loaded[i + 1])))
+    return tuple(sorted(events, key=lambda event: event.time))
+
+
+def _without_short(loaded: Mask, shortest: float) -> Mask:
+    """Return ``loaded`` (T,) without gaps and contacts shorter than ``shortest`` frames; the ends stay."""
+    kept = loaded.copy()
+    for value in (False, True):
+        for start, stop in runs(kept == value):
+            if stop - start < shortest and start > 0 and stop < len(kept):
+                kept[start:stop] = not value
+    return kept
+
+
+_SWING = 0.25
+"""Of the leg's length: a foot that does not travel as far ahead of the other and back makes no step."""
+_APART = 0.5  # s between two strikes of one foot, at least
+_STRIKES, _LEAVES = 0.8, 0.6
+"""Of the ground's speed under the pelvis. With them 57 strikes and 59 leavings of seven children, which their lab
+set by hand and force, are met to -4 and 0 ms in the mean (sd 15, 16 ms); with Zeni's extremes to -34 and +20 ms.
+"""
+_EVENT_CUTOFF = 8.0
+"""Hz of the low-pass on the paths of the feet, of which only the extremes are looked for."""
+_TOGETHER = 0.1  # s: events of force and of markers that are nearer than this are one event
+
+
+def kinematic_events(body: Body, motion: Motion) -> tuple[FootEvent, ...]:
+    """Return strikes and leavings of both feet by the tracked body, in the order of time; () where nobody steps.
+
+    Raises
+    ------
+    TrialRefused
+        The body has no two feet.
+    """
+    outline, pose = soles_from_body(body, motion).outline, poses(body, motion.q)
+    forward = pose.rotation[:, 0, :2, 0]
+    forward = forward / np.linalg.norm(forward, axis=1, keepdims=True)
+    places = (place[..., :2] - pose.position[:, :1, :2] for place in heel_and_toe(body, outline))
+    heel, toe = (np.einsum("tfk,tk->tf", place, forward) for place in places)  # m ahead of the pelvis, (T, 2)
+    least = _SWING * _thigh_and_shank(body)
+    if motion.time.size < 0.5 * motion.rate or not np.ptp(heel[:, 0] - heel[:, 1]) > least:
+        return ()
+    events = []
+    for foot, side in enumerate(SIDES):
+        for path, down in ((heel, True), (toe, False)):
+            times = _turning_points(path[:, foot], motion, down=down, prominence=least / 2)
+            events += [FootEvent(time, side, down, "markers") for time in times]
+    return tuple(sorted(events, key=lambda event: event.time))
+
+
+def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
+    """Return the backmost and the foremost part (T, 2, 3) m of the soles (T, 2, P, 3) m, right foot first."""
+    heel, toe = np.empty((2, len(outline), 2, 3))
+    for foot, side in enumerate(SIDES):
+        length = body.feet[side].outline[:, 0]
+        reach = length.max() - length.min()
+        heel[:, foot] = outline[:, foot, length < length.min() + 0.1 * reach].mean(axis=1)
+        toe[:, foot] = outline[:, foot, length > length.max() - 0.1 * reach].mean(axis=1)
+    return heel, toe
+
+
+def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[Array, Array]:
+    """Return by how much strikes and leavings (n,) s come later by markers than by forces, both seen."""
+    late = [(event.down, _delay_of_nearest(markers, event)) for event in force]
+    strikes, leavings = ([s for d, s in late if d is down and abs(s) < _TOGETHER] for down in (True, False))
+    return np.array(strikes), np.array(leavings)
+
+
+def _delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent) -> float:
+    """Return by how many s the nearest of ``events`` of this kind and foot comes later; infinity without."""
+    kind = event.side, event.down
+    return min((one.time - event.time for one in events if (one.side, one.down) == kind), key=abs, default=np.inf)
+
+
+def joined_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[FootEvent, ...]:
+    """Return the events of both, in the order of time: the force's where a plate saw it, else the markers'."""
+    kept = [event for event in markers if not abs(_delay_of_nearest(force, event)) < _TOGETHER]
+    return tuple(sorted((*force, *kept), key=lambda event: event.time))
+
+
+def _thigh_and_shank(body: Body) -> float:
+    """Return the length, m, of thigh and shank together, mean of both legs."""
+    ends = ("knee_flexion", "ankle_dorsiflexion")
+    return float(sum(np.linalg.norm(one.translation) for one in body.joints if one.name.endswith(ends))) / 2
+
+
+def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: float) -> list[float]:
+    """Return the times s at which a foot begins (``down``) or ends to go with the ground, by its ``path``."""
+    from scipy.signal import butter, find_peaks, sosfiltfilt
+
+    rate = motion.rate
+    if rate > 2.5 * _EVENT_CUTOFF:
+        path = sosfiltfilt(butter(2, _EVENT_CUTOFF, fs=rate, output="sos"), path, padlen=min(20, path.size - 1))
+    speed = np.gradient(path, motion.time)
+    ground = float(np.median(speed[speed < 0]))
+    tops, _ = find_peaks(path if down else -path, prominence=prominence, distance=max(1, round(_APART * rate)))
+    step, level = (1, _STRIKES * ground) if down else (-1, _LEAVES * ground)
+    times = []
+    for top in tops[motion.determined[tops]]:
+        here = top
+        while 0 < here < path.size - 1 and speed[here] > level:
+            here += step
+        before = here - step
+        share = (speed[before] - level) / (speed[before] - speed[here]) if speed[here] <= level else 1.0
+        times.append(float(motion.time[before] + step * share / rate))
+    return times
+
+
+_PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
+    "hip_flexion": ("HipAngles", 0),
+    "hip_adduction": ("HipAngles", 1),
+    "hip_rotation": ("HipAngles", 2),
+    "knee_flexion": ("KneeAngles", 0),
+    "ankle_dorsiflexion": ("AnkleAngles", 0),
+}
+"""Our angle -> the label (with L or R before it) and component of plug-in gait's, where both have the same positive
+sense. Its knee has two more angles, which ours has not; the turn of its foot is that of a line, not of a body.
+"""
+_NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
+_FEWEST = 20  # Frames without which nothing is compared
+
+
+@dataclass(frozen=True)
+class AngleComparison:
+    """One joint angle beside that of the file: ``offset`` deg the mean of ours less the file's, ``sd`` deg of the
+    difference about it, ``correlation`` (NaN where one does not move), over ``frames``.
+    """
+
+    joint: str
+    label: str
+    offset: float
+    sd: float
+    correlation: float
+    frames: int
+
+
+@dataclass(frozen=True)
+class EventComparison:
+    """Our strikes (``down``) or leavings beside the file's: ``late`` s, the mean of ours less the file's, ``sd`` s over
+    ``count`` events; ``missed`` events of the file without one of ours.
+    """
+
+    down: bool
+    late: float
+    sd: float
+    count: int
+    missed: int
+
+
+def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[AngleComparison, ...]:
+    """Return every angle that both have, over the frames in which both are known."""
+    comparisons = []
+    for j, joint in enumerate(body.joints):
+        side, _, name = joint.name.partition("_")
+        label, axis = _PLUG_IN_GAIT.get(name, ("", 0))
+        label = f"{side[:1].upper()}{label}"
+        theirs = outputs.angles.get(label)
+        if name not in _PLUG_IN_GAIT or theirs is None or len(theirs) != motion.time.size:
+            continue
+        known = motion.determined & np.isfinite(theirs).all(axis=1)
+        ours, other = motion.angles[known, j], theirs[known, axis]
+        if ours.size < _FEWEST:
+            continue
+        moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
+        correlation = float(np.corrcoef(ours, other)[0, 1]) if moves else float("nan")
+        apart, label = ours - other, f"{label} {'xyz'[axis]}"
+        mean, sd = float(apart.mean()), float(apart.std())
+        comparisons.append(AngleComparison(joint.name, label, mean, sd, correlation, ours.size))
+    return tuple(comparisons)
+
+
+def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple[EventComparison, ...]:
+    """Return how our events lie beside those that the file holds; () where it holds none."""
+    comparisons = []
+    for down in (True, False):
+        delays = [_delay_of_nearest(events, one) for one in outputs.events if one.down is down]
+        late = [delay for delay in delays if abs(delay) < _NEAR_EVENT]
+        if delays:
+            mean, sd = (float(np.mean(late)), float(np.std(late))) if late else (np.nan, np.nan)
+            comparisons.append(EventComparison(down, mean, sd, len(late), len(delays) - len(late)))
+    return tuple(comparisons)
+
+
+_CycleKind = Literal["gait", "squat", "sit_to_stand"]
 PERCENT = np.linspace(0.0, 100.0, 101)
 """% of a cycle at which its curves are given."""
-_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5
-"""s of a gait cycle."""
-_DEEP = 0.15
-"""Of the leg's length by which the pelvis goes down in a squat, at least."""
-_UP = 0.1
-"""Of a repetition's depth within which the pelvis counts as up."""
+_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.4, 2.5  # s of a gait cycle
+_DEEP = 0.15  # Of the leg's length by which the pelvis goes down in a squat, at least
+_UP = 0.1  # Of a repetition's depth within which the pelvis counts as up
 _SEATED = 0.03
 """m that the centre of mass lies behind the heels of somebody who sits: standing so, one falls."""
-_MOVES = 0.05
-"""m/s of the centre of mass from which a rise has begun."""
-_SLIDES = 0.1
-"""m that a foot may travel in a squat or a rise."""
+_MOVES = 0.05  # m/s of the centre of mass from which a rise has begun
+_SLIDES = 0.1  # m that a foot may travel in a squat or a rise
 
 
 @dataclass(frozen=True)
@@ -41,7 +264,7 @@ class Cycle:
     """
 
     trial: str
-    kind: CycleKind
+    kind: _CycleKind
     side: str
     start: float
     end: float
@@ -89,7 +312,7 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
     height, time = poses(body, motion.q).position[:, 0, 2], motion.time
     top, centre = float(np.percentile(height, 98)), centre_of_mass(body, motion)
     seated, cycles = _seated(body, soles, centre), list[Cycle]()
-    for first, stop in runs(height < top - _DEEP * thigh_and_shank(body)):
+    for first, stop in runs(height < top - _DEEP * _thigh_and_shank(body)):
         lowest = first + int(np.argmin(height[first:stop]))
         up = np.flatnonzero(height >= top - _UP * (top - height[lowest]))
         before, after = up[up < first], up[up >= stop]
@@ -100,7 +323,9 @@ def repetitions(trial: str, body: Body, motion: Motion, soles: Soles) -> tuple[C
             continue
         if seated[first:stop].any():
             leaves = first + int(np.flatnonzero(seated[first:stop])[-1])
-            instants = time[[_still_before(centre, motion, leaves), after[0], leaves]]
+            speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
+            rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
+            instants = time[[int(rest[-1]) if rest.size else 0, after[0], leaves]]
             cycles.append(Cycle(trial, "sit_to_stand", "both", *instants.tolist()))
         elif before.size:
             cycles.append(Cycle(trial, "squat", "both", *time[[before[-1], after[0], lowest]].tolist()))
@@ -116,19 +341,8 @@ def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
     return np.asarray(behind > _SEATED)
 
 
-def _still_before(centre: Array, motion: Motion, leaves: int) -> int:
-    """Return the last frame before ``leaves`` at which the centre of mass was at rest; the first of the trial without
-    one.
-    """
-    speed = np.linalg.norm(np.gradient(centre, motion.time, axis=0), axis=1)
-    rest = np.flatnonzero(speed[: leaves + 1] < _MOVES)
-    return int(rest[-1]) if rest.size else 0
-
-
-_BELT = 0.15
-"""m/s of a standing foot from which the ground is a belt."""
-_FLAT = (20.0, 40.0)
-"""% of a cycle in which the foot stands flat and tells how fast the ground moves."""
+_BELT = 0.15  # m/s of a standing foot from which the ground is a belt
+_FLAT = (20.0, 40.0)  # % of a cycle in which the foot stands flat and tells how fast the ground moves
 STRIDE_UNITS: Mapping[str, str] = {
     "cadence": "steps/min",
     "speed": "m/s",

@@ -9,15 +9,29 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
-from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves
-from biodance.cycles.cut import PERCENT, Cycle, Stride, gait_cycles, mean_values, repetitions, strides
-from biodance.cycles.events import FootEvent, agreement_of_events, foot_events, joined_events, kinematic_events
-from biodance.cycles.file_outputs import AngleComparison, EventComparison, compare_angles, compare_events
-from biodance.cycles.loads import load_curves
+from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves, load_curves
+from biodance.cycles.cut import (
+    PERCENT,
+    AngleComparison,
+    Cycle,
+    EventComparison,
+    FootEvent,
+    Stride,
+    agreement_of_events,
+    compare_angles,
+    compare_events,
+    foot_events,
+    gait_cycles,
+    joined_events,
+    kinematic_events,
+    mean_values,
+    repetitions,
+    strides,
+)
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import FileOutputs
-from biodance.motion.contact.contact import Contact, foot_wrenches
-from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.contact import Contact, foot_wrenches
+from biodance.motion.soles import soles_from_body
 from biodance.records import Array, Motion, Sip, Trial
 
 if TYPE_CHECKING:

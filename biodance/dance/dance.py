@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from biodance import display
-from biodance.body.body import Body
-from biodance.body.body_file import body_text, parse_body
+from biodance.body.body import Body, body_text, parse_body
 from biodance.dance.limits._checked import Margin
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.splines import Phase, path_in, phase_at

@@ -28,7 +28,7 @@ from biodance.identification.mismatch import Mismatch, Sizes, mismatch, temper
 from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.identification.statistics import Fit, statistics
 from biodance.library import locate, read_toml
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Wrench
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import BANDS, Bands

@@ -15,9 +15,8 @@ from biodance.dance.limits.floor import LowParts
 from biodance.dance.problem.splines import phase_at
 from biodance.dance.problem.stance import support_depth
 from biodance.errors import BiodanceError, MissingLibrary
-from biodance.motion.dynamics import distribute, joint_torques
+from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Wrench
 from biodance.spatial import quaternion_matrix, wrench_of_force
 

@@ -31,7 +31,7 @@ from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold
 from biodance.identification.posterior import find_posterior
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array, Motion
 
 _WHERE = 4

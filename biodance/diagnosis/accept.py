@@ -13,7 +13,7 @@ from biodance.effects import Case, NamedCause, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
 from biodance.identification.validation import BLOCK_SECONDS, FEWEST, block_interval, removed_share
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS

@@ -17,8 +17,8 @@ from biodance.diagnosis.observability import Visibility, detection_limits, hidde
 from biodance.diagnosis.problem import TrialWindow, problem
 from biodance.discovery import Chosen
 from biodance.effects import Effect
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Trial
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped

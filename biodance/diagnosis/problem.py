@@ -21,7 +21,7 @@ from biodance.discovery import Chosen
 from biodance.effects import Case, Effect, effects
 from biodance.identification.posterior import prior_factor
 from biodance.identification.statistics import Fit, usable
-from biodance.motion.regressor import regressor_of
+from biodance.motion.dynamics import regressor_of
 from biodance.records import Array, Motion, Sip, Trial, Wrench, runs
 from biodance.uncertainty.caution import widened_prior
 from biodance.uncertainty.sources import Errors, forward, of_clusters

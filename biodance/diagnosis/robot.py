@@ -18,7 +18,7 @@ from biodance.identification.posterior import prior_factor
 from biodance.identification.robot import RobotMotion, robot_start
 from biodance.identification.robot_errors import THINNED, place_changes, slow_wrench
 from biodance.identification.statistics import Statistics, empty
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array
 from biodance.threads import one_thread
 from biodance.uncertainty.learning import maximise, noise_of

@@ -8,8 +8,8 @@ from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, R
 from biodance.effects._base.words import RECORD_AGAIN, About, CauseWords, CheckKind
 from biodance.effects.clipping import clipped
 from biodance.identification.posterior import prior_factor
-from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.regressor import predict_wrench, regressor
+from biodance.lab.prepare import LowPass, low_pass
+from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.records import Array, Motion
 from biodance.spatial import skew
 from biodance.uncertainty.caution import widened_prior

@@ -11,8 +11,7 @@ from biodance.effects._base.words import ACCEPT, About, CauseWords
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import read_marker_set
 from biodance.lab.prepare import prepare
-from biodance.motion.contact.over import distance_to_hull
-from biodance.motion.contact.soles import Soles, soles_from_markers
+from biodance.motion.soles import Soles, distance_to_hull, soles_from_markers
 from biodance.records import Array, Plate, Trial, Wrench
 from biodance.settings import COP_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point

@@ -5,9 +5,8 @@ import numpy as np
 from biodance.effects._base.case import Case
 from biodance.effects._base.quality_check import DiscreteEffect, QualityCheck, Recorded
 from biodance.effects._base.words import About, CauseWords
-from biodance.motion.contact.contact import ground_contact
-from biodance.motion.contact.soles import soles_from_body
-from biodance.motion.contact.support import share_lacking
+from biodance.motion.contact import ground_contact, share_lacking
+from biodance.motion.soles import soles_from_body
 from biodance.records import Array, LeftOut, Mask
 
 _HELD = ("pelvis", "left_forearm_hand", "right_forearm_hand")

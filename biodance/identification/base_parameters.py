@@ -13,8 +13,8 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.identification.information import Information, fold
+from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion, freeze
 
 PARAMETERS = ("M", "MX", "MY", "MZ", "XX", "XY", "YY", "XZ", "YZ", "ZZ")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.errors import TrialRefused
-from biodance.motion.regressor import regressor
+from biodance.motion.dynamics import regressor
 from biodance.records import Array, Motion, Wrench
 from biodance.uncertainty.noise import Noise
 

@@ -19,8 +19,8 @@ from biodance.body.inertia import shift_matter
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.statistics import Fit
+from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Index, Motion, Sip
 from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.caution import shift_slope

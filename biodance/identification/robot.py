@@ -17,8 +17,8 @@ from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import Mismatch, long_runs
 from biodance.identification.robot_errors import THINNED, place_changes, places_of, zero_changes
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
+from biodance.motion.dynamics import regressor
 from biodance.motion.grounded import Grounded
-from biodance.motion.regressor import regressor
 from biodance.records import Array, Wrench
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import WHITE, Bands

@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.body import Body
-from biodance.body.pinocchio_model import load_pinocchio
-from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.dynamics import distribute, joint_torques
+from biodance.body.body import Body, load_pinocchio
+from biodance.lab.prepare import LowPass, low_pass
+from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.grounded import Grounded, ground_again
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import SIDES, Array, Motion, Wrench
 from biodance.spatial import cross, quaternion_matrix, wrench_about_point
 

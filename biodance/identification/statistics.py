@@ -13,8 +13,8 @@ from scipy.ndimage import binary_dilation, maximum_filter1d
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.information import Information
+from biodance.motion.dynamics import predict_wrench, regressor_of
 from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import predict_wrench, regressor_of
 from biodance.records import Array, Motion, Wrench
 from biodance.settings import Settings
 from biodance.spatial import wrench_about_point

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import QUANTITIES, SIGMAS, segment_quantities
-from biodance.motion.contact.contact import foot_wrenches, ground_contact
-from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.contact import foot_wrenches, ground_contact
+from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import below, in_blocks, poses, segment_motion
-from biodance.motion.regressor import regressor_of
+from biodance.motion.soles import soles_from_body
 from biodance.records import Array, Motion, Trial, Wrench
 from biodance.spatial import cross
 from biodance.threads import one_thread

@@ -15,7 +15,7 @@ from scipy.special import ndtri, stdtrit
 from biodance.body.body import Body
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
-from biodance.motion.regressor import Agreement, compare, predict_wrench
+from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.records import Array, Wrench
 from biodance.spatial import wrench_about_point
 

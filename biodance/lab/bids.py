@@ -1,7 +1,5 @@
-"""BIDS motion (BEP 029): recordings as tab-separated text with their description, for sharing.
-
-One trial is a task of a subject: ``_motion.tsv`` (numbers without header), ``_channels.tsv`` (one row a column),
-``_motion.json``, and where there are some ``_events.tsv``. https://bids-specification.readthedocs.io, version 1.10.
+"""BIDS motion (BEP 029), https://bids-specification.readthedocs.io, version 1.10: one trial is a task of a subject;
+``_motion.tsv`` (numbers without header), ``_channels.tsv`` (one row a column), ``_motion.json``, ``_events.tsv``.
 """
 
 import json

@@ -60,9 +60,7 @@ class PlateCorrection:
 
 
 def _free(plate: Plate, one: PlateCorrection) -> Plate:
-    """Return a plate as it would have recorded without the cause, at the same times: held constant beyond the first and
-    last known sample, NaN beside samples between them that are.
-    """
+    """Return a plate as it would have recorded without the cause, at the same times."""
     free = one.fault.undone(plate, one.target.rpartition(":")[2], one.value)
     time, moved = plate.wrench.time, free.wrench.time
     if moved is time:
@@ -106,9 +104,7 @@ def _said(one: PlateCorrection) -> str:
 
 
 def corrected_session(session: Session, corrections: tuple[PlateCorrection, ...]) -> Session:
-    """Return a session as read, with the corrections of its laboratory made; those that its folder says it has already
-    (`APPLIED`) are not made twice.
-    """
+    """Return a session as read with its laboratory's corrections made, but not those that it has (`APPLIED`)."""
     path = session.folder / APPLIED
     done = {(one.effect, one.target) for one in read_corrections(path)} if path.is_file() else set()
     told = [line for trial in session.trials for line in trial.history]

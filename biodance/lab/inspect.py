@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.markers.gaps import report_gaps
 from biodance.lab.markers.guess import guess_set, said_of
 from biodance.lab.markers.sets import GUESSED, MarkerSet, canonical, read_marker_set
-from biodance.lab.markers.still import standing_mass
-from biodance.lab.plates.told import Told
+from biodance.lab.markers.signals import report_gaps
+from biodance.lab.markers.upright import standing_mass
+from biodance.lab.plates.corners import Told
 from biodance.lab.read import read_trial, reader_of
 from biodance.lab.session.file import read_session_file
 from biodance.lab.session.recordings import recordings_below
@@ -67,9 +67,7 @@ def inspect_paths(
 
 
 def _said_in(folder: Path) -> tuple[MarkerSet | None, Told, str]:
-    """Return the marker set that the session.toml of a folder names, None without one, what it says of the plates, and
-    what is wrong with it.
-    """
+    """Return the marker set that a session.toml names, what it says of the plates, and what is wrong with it."""
     try:
         said = read_session_file(folder)
         return (read_marker_set(said.marker_set) if said.marker_set else None), said.told, ""

@@ -15,8 +15,7 @@ from pathlib import Path
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
 
-_LARGEST = 2**31
-"""Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB."""
+_LARGEST = 2**31  # Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2000 Hz has 2.1 GB
 LARGEST_NUMBER = 1e12
 """In any unit: of what cameras and plates record nothing comes near, and squares of it can still be computed with."""
 _TEXT_LOOKS_BINARY = b"\x00"
@@ -179,9 +178,7 @@ def with_points(text: str) -> tuple[str, bool]:
 
 
 def cells(line: str) -> list[str]:
-    """Return the cells of one row: between tabs where there are tabs (a cell may be empty), else between runs of
-    blanks.
-    """
+    """Return the cells of one row: between tabs where there are any (a cell may be empty), else between blanks."""
     return [cell.strip() for cell in line.rstrip("\r\n").split("\t")] if "\t" in line else line.split()
 
 

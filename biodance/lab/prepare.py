@@ -5,19 +5,133 @@ The markers are NOT low-passed: the joint coordinates are, later and with the sa
 pass it exactly once.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.lab import filters
-from biodance.lab.filters import LowPass, force_filter
-from biodance.lab.markers.gaps import Gap, fill_gaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
-from biodance.lab.markers.signals import faulty_markers, without_faults
+from biodance.lab.markers.signals import Gap, faulty_markers, fill_gaps, report_gaps, without_faults
 from biodance.lab.markers.time_axis import LONGEST_STEP
-from biodance.records import Array, Markers, Plate, Trial, Wrench
-from biodance.settings import GapSettings
+from biodance.records import Array, Markers, Plate, Trial, Wrench, runs
+from biodance.settings import FilterKind, FilterSettings, GapSettings, Settings
+
+USUAL_CUTOFF = 10.0
+"""Hz: the cut-off until a trial's own is known, and the highest that is chosen for one."""
+_NAMES: dict[FilterKind, str] = {"butterworth": "Butterworth", "critically_damped": "critically damped"}
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """Low-pass of a ``kind``: ``order`` of one of two passes, ``cutoff`` Hz where both are 3 dB down."""
+
+    order: int = FilterSettings.order
+    cutoff: float = USUAL_CUTOFF
+    kind: FilterKind = FilterSettings.kind
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.order <= 10:
+            raise BiodanceError(f"The low-pass has the order {self.order}; legal is 1 to 10. Use 5.")
+        if not (np.isfinite(self.cutoff) and self.cutoff > 0):
+            raise BiodanceError(f"The low-pass has the cut-off {self.cutoff} Hz; it must be positive. Use 10 Hz.")
+
+    def __str__(self) -> str:
+        down = f"3 dB down at {self.cutoff:g} Hz in both passes together"
+        return f"{_NAMES[self.kind]} low-pass of order {self.order}, forwards and backwards, {down}"
+
+    def gain(self, frequency: Array, rate: float) -> Array:
+        """Return the gain (n,) of both passes together at each ``frequency`` (n,) Hz below half the ``rate`` Hz."""
+        relative = np.tan(np.pi * np.asarray(frequency) / rate) / self._raised(rate)
+        if self.kind == "critically_damped":
+            return np.asarray((1 + relative**2) ** -float(self.order))
+        return np.asarray(1 / (1 + relative ** (2 * self.order)))
+
+    def _raised(self, rate: float) -> float:
+        """Return tan(pi f / rate) of the frequency f that one pass is designed for."""
+        wanted = float(np.tan(np.pi * self.cutoff / rate))
+        if self.kind == "critically_damped":
+            return wanted / float(np.sqrt(2 ** (0.5 / self.order) - 1))
+        return wanted * float((np.sqrt(2) - 1) ** (-0.5 / self.order))
+
+    def shortest(self, rate: float) -> int:
+        """Return the shortest run of samples that is filtered: one period of the cut-off frequency."""
+        return int(np.ceil(rate / self.cutoff)) + 1
+
+
+def motion_filter(settings: Settings) -> LowPass:
+    """Return the low-pass of the joint coordinates: with the chosen cut-off, else the usual one."""
+    chosen = settings.filter.cutoff
+    return LowPass(settings.filter.order, USUAL_CUTOFF if chosen == "auto" else float(chosen), settings.filter.kind)
+
+
+def force_filter(settings: Settings) -> LowPass:
+    """Return the low-pass of the forces: that of the joint coordinates, unless another cut-off was chosen."""
+    chosen, same = settings.filter.force_cutoff, motion_filter(settings)
+    return same if chosen == "same" else replace(same, cutoff=float(chosen))
+
+
+@lru_cache(maxsize=32)
+def _design_low_pass(settings: LowPass, rate: float) -> Array:
+    """Return the second-order sections (S, 6) of one of the two passes at the sampling ``rate`` in Hz."""
+    if not (np.isfinite(rate) and rate > 0):
+        raise BiodanceError(f"The sampling rate is {rate} Hz, which must be positive. Correct the rate in the file.")
+    if settings.cutoff >= rate / 2:
+        raise BiodanceError(
+            f"The cut-off {settings.cutoff:g} Hz is not below half the sampling rate ({rate:g} Hz). Choose a cut-off "
+            f"below {rate / 2:g} Hz."
+        )
+    designed = np.arctan(settings._raised(rate)) * rate / np.pi
+    if settings.kind == "critically_damped":
+        return np.tile(butter(1, designed, fs=rate, output="sos"), (settings.order, 1))
+    return butter(settings.order, designed, fs=rate, output="sos")
+
+
+def low_pass(values: Array, rate: float, settings: LowPass) -> Array:
+    """Return ``values`` (T, ...) low-passed along time without delay; NaN stay NaN.
+
+    ``rate`` in Hz. Every column is filtered from gap to gap, never across one; a run shorter than
+    ``settings.shortest(rate)`` samples is returned as it is (``left_raw`` tells which). The ends are continued by point
+    reflection over one period of the cut-off.
+
+    Raises
+    ------
+    BiodanceError
+        The rate or the cut-off is not legal, or the whole signal is shorter than the shortest run.
+    """
+    sections = _design_low_pass(settings, rate)
+    values = np.asarray(values, dtype=float)
+    need = settings.shortest(rate)
+    if values.shape[0] < need:
+        raise BiodanceError(
+            f"{values.shape[0]} samples at {rate:g} Hz are too short for a low-pass at {settings.cutoff:g} Hz: at "
+            f"least {need} are needed. Record longer or leave the signal as it is."
+        )
+    columns = values.reshape(values.shape[0], -1)
+    whole = ~np.isnan(columns).any(axis=0)
+    if whole.all():
+        return np.asarray(sosfiltfilt(sections, columns, axis=0, padlen=need - 1)).reshape(values.shape)
+    out = columns.copy()
+    if whole.any():
+        out[:, whole] = sosfiltfilt(sections, columns[:, whole], axis=0, padlen=need - 1)
+    for column in np.flatnonzero(~whole):
+        for start, stop in runs(~np.isnan(columns[:, column])):
+            if stop - start >= need:
+                out[start:stop, column] = sosfiltfilt(sections, columns[start:stop, column], padlen=need - 1)
+    return out.reshape(values.shape)
+
+
+def left_raw(values: Array, rate: float, settings: LowPass) -> NDArray[np.bool_]:
+    """Return where ``low_pass`` leaves a number as it is: its run is too short; shape of ``values``."""
+    columns = np.asarray(values, dtype=float).reshape(len(values), -1)
+    out = np.zeros(columns.shape, dtype=bool)
+    for column in np.flatnonzero(np.isnan(columns).any(axis=0)):
+        for start, stop in runs(~np.isnan(columns[:, column])):
+            out[start:stop, column] = stop - start < settings.shortest(rate)
+    return out.reshape(np.shape(values))
+
 
 _PREPARED = "Prepared for the model."
 
@@ -37,18 +151,18 @@ def prepare(trial: Trial) -> Trial:
     """
     if _PREPARED in trial.history:
         return trial
-    low_pass = force_filter(trial.settings)
+    filtering = force_filter(trial.settings)
     history, warnings = [_PREPARED], []
     markers = trial.markers
     try:
         if markers is not None:
             if markers.time.size > 1 and not _postures(markers.time):
-                filters.design_low_pass(low_pass, markers.rate)
+                _design_low_pass(filtering, markers.rate)
             markers, said = _common_time(markers, trial)
             history += said
             markers, said, warned = _fill(markers, trial.marker_set, trial.settings.gaps)
             history, warnings = history + said, warned
-        plates = tuple(at_marker_times(plate, markers, low_pass) for plate in trial.plates)
+        plates = tuple(at_marker_times(plate, markers, filtering) for plate in trial.plates)
     except TrialRefused:
         raise
     except BiodanceError as error:
@@ -120,18 +234,18 @@ def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
     return said or ["No marker has a gap."]
 
 
-def at_marker_times(plate: Plate, markers: Markers | None, low_pass: LowPass) -> Plate:
+def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
     if _postures(wrench.time):
         how = "not filtered, every row is a posture"
-    elif wrench.time.size < 2 or wrench.time.size < low_pass.shortest(wrench.rate):
+    elif wrench.time.size < 2 or wrench.time.size < filtering.shortest(wrench.rate):
         mean = np.broadcast_to(wrench.value.mean(axis=0), wrench.value.shape)
         wrench, how = Wrench(wrench.time, mean), f"mean of {wrench.time.size} samples, too few for the low-pass"
     else:
-        raw = filters.left_raw(wrench.value, wrench.rate, low_pass).any(axis=1).sum()
-        wrench = Wrench(wrench.time, filters.low_pass(wrench.value, wrench.rate, low_pass))
-        how = f"{low_pass}" + (f"; {raw} samples between gaps left unfiltered" if raw else "")
+        raw = left_raw(wrench.value, wrench.rate, filtering).any(axis=1).sum()
+        wrench = Wrench(wrench.time, low_pass(wrench.value, wrench.rate, filtering))
+        how = f"{filtering}" + (f"; {raw} samples between gaps left unfiltered" if raw else "")
     if markers is None:
         return replace(plate, wrench=wrench, decisions=(*plate.decisions, f"{how}; no markers, own times kept."))
     value, sampled = _sample(wrench, markers.time)

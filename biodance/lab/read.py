@@ -15,21 +15,18 @@ import numpy as np
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.markers.gaps import unseen_at_origin
 from biodance.lab.markers.sets import MarkerSet, wearing
-from biodance.lab.plates.told import Told, as_told
+from biodance.lab.markers.signals import unseen_at_origin
+from biodance.lab.plates.corners import Told, as_told
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
 from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
 
-_FEWEST = 4
-"""Markers that must be seen; fewer may rest on something, or be rounded to the same digits."""
-_LASTING = 5
-"""Frames in a row; shorter runs come from a slower camera whose frames were repeated."""
+_FEWEST = 4  # Markers that must be seen; fewer may rest on something, or be rounded to the same digits
+_LASTING = 5  # Frames in a row; shorter runs come from a slower camera whose frames were repeated
 _ABRUPT = 0.5
 """Share of the step beside it (m a frame) that the last step before a rest or the first behind it has at least."""
-_FELT = 1e-5
-"""m: smaller steps are the last digits of a computed movement."""
+_FELT = 1e-5  # m: smaller steps are the last digits of a computed movement
 
 
 def frozen_frames(xyz: Array) -> Mask:
@@ -59,7 +56,7 @@ def _abrupt(steps: Array, start: int, stop: int) -> bool:
     )
 
 
-def without_origin(trial: Trial) -> Trial:
+def _without_origin(trial: Trial) -> Trial:
     """Return the trial with markers unseen where they lie on the lab's origin, and how many samples in its history."""
     if trial.markers is None:
         return trial
@@ -68,9 +65,7 @@ def without_origin(trial: Trial) -> Trial:
 
 
 def without_frozen(trial: Trial) -> Trial:
-    """Return the trial with its markers unseen where they are frozen, and a warning that says so; as it is where none
-    are.
-    """
+    """Return the trial with its markers unseen where they are frozen, and a warning that says so."""
     markers = trial.markers
     frozen = np.zeros(0, dtype=bool) if markers is None else frozen_frames(markers.xyz)
     if markers is None or not frozen.any():
@@ -86,8 +81,7 @@ def without_frozen(trial: Trial) -> Trial:
 
 
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}
-_HEAD = 8192
-"""Bytes of a file that are looked at to find its reader."""
+_HEAD = 8192  # Bytes of a file that are looked at to find its reader
 
 
 def reader_of(path: str | Path, *, chosen: Chosen[Reader] = None) -> Reader:
@@ -197,7 +191,7 @@ def read_trial(
     path = Path(path)
     reader = reader_of(path, chosen=readers)
     try:
-        trial = without_frozen(without_origin(_read(reader, path, role, subject, told)))
+        trial = without_frozen(_without_origin(_read(reader, path, role, subject, told)))
         return wearing(trial, markers) if markers else trial
     except BiodanceError:
         raise

@@ -15,10 +15,8 @@ from biodance.errors import SessionRefused
 from biodance.library import locate
 from biodance.records import SIDES, Array, FootSizes
 
-_ALIASES = {"calf": "shank"}
-"""What else a girth is called."""
-_LEGAL = (0.4, 2.2)
-"""Of the usual girth: smaller or larger ones are another unit or a slip of the pen."""
+_ALIASES = {"calf": "shank"}  # What else a girth is called
+_LEGAL = (0.4, 2.2)  # Of the usual girth: smaller or larger ones are another unit or a slip of the pen
 _MIDDLE = ("hip", "waist", "chest", "neck", "head")
 
 
@@ -74,10 +72,8 @@ def _refuse_impossible(said: str, value: float, usual: float) -> None:
     )
 
 
-_LEGAL_SIZES = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}
-"""m."""
-_HEEL = 0.15
-"""Share of the length, from the heel, at which its breadth is measured."""
+_LEGAL_SIZES = {"length": (0.12, 0.36), "breadth": (0.05, 0.15), "heel_breadth": (0.03, 0.11)}  # m
+_HEEL = 0.15  # Share of the length, from the heel, at which its breadth is measured
 
 
 def typed_outline(given: Mapping[str, float]) -> dict[str, FootSizes]:

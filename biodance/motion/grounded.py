@@ -8,20 +8,90 @@ first standing sole: origin in its middle, x forwards, y left, z up.
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.body.parts import UPRIGHT
 from biodance.body.robot.similarity import sole_normal
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass, low_pass
-from biodance.motion.base_seen import BaseSeen
+from biodance.lab.prepare import LowPass, low_pass
 from biodance.motion.kinematics import poses
-from biodance.motion.smoothing import smooth
-from biodance.records import SIDES, Array, Motion, runs
+from biodance.motion.track import smooth
+from biodance.records import SIDES, Array, Markers, Motion, Wrench, runs
 from biodance.records.motion import Encoders
-from biodance.spatial import elementary_rotation
+from biodance.spatial import cross, elementary_rotation, rigid_fit, skew, wrench_about_point
+
+_LEAST = 3  # Markers that fix a posture
+_FAR = 0.02  # m RMS: markers so far from where they are said to be are not those
+
+
+@dataclass(frozen=True, eq=False)
+class BaseSeen:
+    """The base at T instants: ``rotation`` (T, 3, 3), of which an IMU knows the upward direction alone, and its
+    ``position`` (T, 3) m, None from an IMU.
+    """
+
+    rotation: Array
+    position: Array | None = None
+
+    def __getitem__(self, pick: slice) -> "BaseSeen":
+        """Return some of the instants."""
+        return BaseSeen(self.rotation[pick], None if self.position is None else self.position[pick])
+
+    def corrected(self, rotation: Array, position: Array, foot: Array) -> tuple[Array, Array]:
+        """Return turn (T, 3, 3) and place (T, 3) m of the base, given those that follow from the standing foot, whose
+        middle is at ``foot`` (T, 3) m: inclinations turn all about that.
+        """
+        if self.position is not None:
+            return self.rotation, self.position
+        up = np.einsum("tij,tkj,k->ti", rotation, self.rotation, np.array([0.0, 0.0, 1.0]))
+        axis = cross(up, np.array([0.0, 0.0, 1.0]))  # of the smallest turn that brings `up` upright
+        K = skew(axis)
+        turn = np.asarray(np.eye(3) + K + K @ K / (1 + up[:, 2])[:, None, None])
+        return turn @ rotation, foot + np.einsum("tij,tj->ti", turn, position - foot)
+
+
+def base_of_markers(markers: Markers, places: dict[str, tuple[float, float, float]], where: str) -> tuple[Array, Array]:
+    """Return turn (T, 3, 3) and place (T, 3) m of the base, NaN where too few markers were seen.
+
+    ``places`` m of the markers from the root link's origin: forwards, left, up.
+
+    Raises
+    ------
+    TrialRefused
+        Markers are missing, too few, or not where they are said to be.
+    """
+    lacks = [name for name in places if name not in markers.names]
+    if lacks or len(places) < _LEAST:
+        what = f"markers {', '.join(lacks)} are missing" if lacks else f"{len(places)} markers tell no posture"
+        raise TrialRefused(f"{where}: {what}; recording.toml [base] markers needs three and more of those recorded.")
+    local = np.array(list(places.values())) @ UPRIGHT
+    seen = markers.xyz[:, [markers.names.index(name) for name in places]]
+    whole = np.isfinite(seen).all(axis=(1, 2))
+    if not whole.any():
+        raise TrialRefused(f"{where}: at no time all markers of the base were seen.")
+    rotation, position = np.full((len(seen), 3, 3), np.nan), np.full((len(seen), 3), np.nan)
+    turn, position[whole] = rigid_fit(local, seen[whole])
+    rotation[whole] = turn
+    off = seen[whole] - position[whole][:, None] - np.einsum("tij,kj->tki", turn, local)
+    rms = float(np.sqrt(np.mean(np.sum(off**2, axis=2))))
+    if rms > _FAR:
+        raise TrialRefused(
+            f"{where}: the markers of the base are {1000 * rms:.0f} mm RMS from where recording.toml says; legal are "
+            f"{1000 * _FAR:.0f} mm. Give m from the root link's origin: forwards, left, up."
+        )
+    return rotation, position
+
+
+def base_of_inclinations(roll: Array, pitch: Array) -> BaseSeen:
+    """Return the base of an IMU: ``roll`` (T,) rad, right side down, and ``pitch`` (T,) rad, front down, about the
+    base's own axes (heading, then pitch, then roll).
+    """
+    return BaseSeen(elementary_rotation("y", pitch) @ elementary_rotation("x", roll) @ UPRIGHT)
+
 
 UNDER = (0.02, 0.008)
 """Of the leg's length: how far the other sole may lie under the ground of the standing one (encoders, soft soles);
@@ -29,8 +99,7 @@ the second where a step is so low that the first does not see it.
 """
 _AROUND = 0.25
 """s around a change of the standing foot that do not count: what the soles are off shows as a jump there."""
-_SHORT = 0.5
-"""s: shorter stances are looked over."""
+_SHORT = 0.5  # s: shorter stances are looked over
 RATE = 100.0
 """Hz at which motion and wrench are compared."""
 
@@ -117,10 +186,7 @@ def ground(
 def _q(
     angle: Array, turn: Array, place: Array, foot: NDArray[np.intp], *, base: BaseSeen | None, tilt: Array | None = None
 ) -> Array:
-    """Return the configurations (T, nq) of a robot that stands on ``foot`` (T,), its soles at ``turn`` and ``place`` of
-    `_soles`; ``tilt`` (T, 3) rad, small rotation vectors in the frame of the first standing sole, turns the standing
-    sole from flat about its middle.
-    """
+    """Return configurations (T, nq) of a robot on ``foot`` (T,); ``tilt`` (T, 3) rad turns its sole from flat."""
     rotation, position = _chained(turn, place, foot)
     middle = position + np.einsum("tij,tj->ti", rotation, place[foot, np.arange(foot.size)])
     if tilt is not None:
@@ -160,9 +226,7 @@ def _leg(body: Body) -> float:
 
 
 def _soles(body: Body, angle: Array) -> tuple[Array, Array, Array]:
-    """Return frames of both soles in the root's, turn (2, T, 3, 3) and place (2, T, 3) m, and the ``height`` (2, T) m
-    of the other sole's lowest corner over each one's plane.
-    """
+    """Return both soles in the root's frame, turn and place, and ``height`` (2, T) m of the other's lowest corner."""
     root = np.array([0.0, 0, 0, 0, 0, 0, 1])
     q = np.concatenate([np.tile(root, (len(angle) + 1, 1)), np.vstack([np.zeros(angle.shape[1]), angle])], axis=1)
     pose = poses(body, q)
@@ -245,3 +309,137 @@ def _quaternions(rotation: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_matrix(rotation).as_quat())
+
+
+# Both paths are complex numbers x + i y. Between a path and the same path turned, shifted and late, the normalised
+# correlation at the right delay is 1 in size, its angle is the turn; turns and shifts need no search. All delays at
+# which half of the shorter recording overlaps are tried at once (fast Fourier transform, gaps masked: Padfield 2012,
+# doi:10.1109/TIP.2011.2181402).
+
+_OVERLAP = 0.5  # Share of the shorter recording that must overlap
+_MOVES = 0.002  # m: centres of pressure that stay nearer than this (sd) tell no time
+
+
+@dataclass(frozen=True)
+class PlateFit:
+    """``delay`` s by which the plate's clock is ahead: what the encoders show at t, the plate shows at t + delay; the
+    frame of the first standing sole lies at ``place`` (x, y) m, turned by ``yaw`` rad, in that of the plate;
+    ``correlation`` of the two paths, ``scale`` of the plate's over the needed one.
+    """
+
+    delay: float
+    place: tuple[float, float]
+    yaw: float
+    correlation: float
+    scale: float
+
+
+def fit_plate(needed: Wrench, measured: Wrench, use: NDArray[np.bool_], *, within: float = float("inf")) -> PlateFit:
+    """Return when and where the plate saw what a motion needs: ``needed`` (T, 6) in the frame of the first standing
+    sole, of which ``use`` (T,) counts, and ``measured`` (S, 6) about the lab origin, both evenly sampled; delays are
+    tried ``within`` so many s.
+
+    Raises
+    ------
+    TrialRefused
+        The recordings are too short, or the centre of pressure does not move.
+    """
+    rate = needed.rate
+    clock = np.arange(measured.time[0], measured.time[-1], 1 / rate)
+    seen = np.stack([np.interp(clock, measured.time, one) for one in measured.value.T], axis=1)
+    path, mask = _path(needed.value), use & np.isfinite(_path(needed.value))
+    other = _path(seen)
+    if path[mask].std() < _MOVES if mask.any() else True:
+        raise TrialRefused(
+            "The centre of pressure hardly moves, so plate and encoders cannot be brought together. Record a motion "
+            "that shifts the weight."
+        )
+    correlation, slope, first, second = _correlated(path, mask, other, np.isfinite(other))
+    late = clock[0] - needed.time[0] + (np.arange(correlation.size) - (path.size - 1)) / rate
+    size = np.where(np.abs(late) <= within, np.abs(correlation), 0.0)
+    k = int(np.argmax(size))
+    if size[k] == 0:
+        raise TrialRefused(
+            f"Plate and encoders overlap for less than half of {min(path.size, other.size) / rate:.1f} s."
+        )
+    part = _peak(size, k)
+    lag = k - (path.size - 1) + part
+    turn = slope[k] / abs(slope[k])
+    place = second[k] - turn * first[k]
+    delay = clock[0] - needed.time[0] + lag / rate
+    return PlateFit(
+        float(delay),
+        (float(place.real), float(place.imag)),
+        float(np.angle(turn)),
+        float(size[k]),
+        float(abs(slope[k])),
+    )
+
+
+def on_motion_clock(measured: Wrench, time: Array, fit: PlateFit) -> Array:
+    """Return the wrench (T, 6) at ``time`` (T,) s of the motion, in the first standing sole's frame, or NaN."""
+    at = time + fit.delay
+    seen = np.stack([np.interp(at, measured.time, one, left=np.nan, right=np.nan) for one in measured.value.T], axis=1)
+    return from_plate(seen, fit.place, fit.yaw)
+
+
+def from_plate(wrench: Array, place: tuple[float, float], yaw: float) -> Array:
+    """Return a wrench (T, 6) about the lab origin in a frame at ``place`` m, turned by ``yaw`` rad about z."""
+    near = wrench_about_point(wrench, np.array([*place, 0.0]))
+    turn = elementary_rotation("z", yaw)
+    return np.concatenate([near[:, :3] @ turn, near[:, 3:] @ turn], axis=1)
+
+
+def _path(wrench: Array) -> NDArray[np.complex128]:
+    """Return the centre of pressure (T,) as x + i y, m; NaN where hardly anything presses."""
+    force = wrench[:, 2]
+    least = 0.2 * np.nanmedian(np.abs(force))
+    path = np.full(force.size, complex(np.nan, np.nan))
+    some = np.abs(force) > max(least, 1e-9)
+    path[some] = (-wrench[some, 4] + 1j * wrench[some, 3]) / force[some]
+    return path
+
+
+def _correlated(
+    a: NDArray[np.complex128], a_mask: NDArray[np.bool_], b: NDArray[np.complex128], b_mask: NDArray[np.bool_]
+) -> tuple[NDArray[np.complex128], ...]:
+    """Return for every lag of b behind a: correlation, slope of b on a, and their means over the overlap."""
+    shift_a, shift_b = a[a_mask].mean(), b[b_mask].mean()
+    x, y = (np.where(m, z - c, 0) for z, m, c in ((a, a_mask, shift_a), (b, b_mask, shift_b)))
+    size = 1 << int(np.ceil(np.log2(a.size + b.size)))
+    lags = (np.arange(-(a.size - 1), b.size)) % size
+
+    def sums(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.complex128]:
+        product = np.conj(np.fft.fft(one, size)) * np.fft.fft(other, size)
+        return np.asarray(np.fft.ifft(product)[lags])
+
+    count = sums(a_mask * 1.0, b_mask * 1.0).real.round()
+    n = np.maximum(count, 1)
+    mean_a, mean_b = np.conj(sums(x, b_mask * 1.0)) / n, sums(a_mask * 1.0, y) / n
+    both = sums(x, y) / n - np.conj(mean_a) * mean_b
+    own_a = sums(np.abs(x) ** 2, b_mask * 1.0).real / n - np.abs(mean_a) ** 2
+    own_b = sums(a_mask * 1.0, np.abs(y) ** 2).real / n - np.abs(mean_b) ** 2
+    enough = (count >= _OVERLAP * min(a_mask.sum(), b_mask.sum())) & (own_a > 1e-8) & (own_b > 1e-8)
+    scale = np.sqrt(np.where(enough, own_a * own_b, 1.0))
+    return (
+        np.where(enough, both / scale, 0),
+        np.where(enough, both / np.where(enough, own_a, 1.0), 1),
+        mean_a + shift_a,
+        mean_b + shift_b,
+    )
+
+
+def _peak(values: Array, k: int) -> float:
+    """Return where, in samples about ``k``, the parabola through three values is largest."""
+    if not 0 < k < values.size - 1:
+        return 0.0
+    before, here, after = values[k - 1 : k + 2]
+    bend = before - 2 * here + after
+    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+
+
+def onto_plate(wrench: Array, fit: PlateFit) -> Array:
+    """Return a wrench (T, 6) in the first standing sole's frame in that of the plate; the inverse of `from_plate`."""
+    turn = elementary_rotation("z", fit.yaw)
+    turned = np.concatenate([wrench[:, :3] @ turn.T, wrench[:, 3:] @ turn.T], axis=1)
+    return wrench_about_point(turned, -np.array([*fit.place, 0.0]))

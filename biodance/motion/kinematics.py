@@ -7,8 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.motion.ik.compiled.derivatives import PlacedJoints, fill_places, fill_tangent
-from biodance.motion.ik.compiled.tree import move_joints, place_joints
+from biodance.motion.ik.compiled.tree import PlacedJoints, fill_places, fill_tangent, move_joints, place_joints
 from biodance.records import Array, Index, Motion
 from biodance.spatial import cross, quaternion_matrix, skew
 

@@ -12,13 +12,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.filters import LowPass, low_pass
 from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.prepare import prepare
-from biodance.motion.contact.contact import feet_on_ground
-from biodance.motion.contact.footing import footing
-from biodance.motion.contact.soles import soles_from_markers
-from biodance.motion.contact.support import carried_elsewhere
+from biodance.lab.prepare import LowPass, low_pass, prepare
+from biodance.motion.contact import carried_elsewhere, feet_on_ground
+from biodance.motion.soles import footing, soles_from_markers
 from biodance.records import Array, Mask, Trial, Wrench, runs
 
 TELLS = 0.7
@@ -26,12 +23,9 @@ TELLS = 0.7
 23 clean trials of 15 laboratories 0.9 to 0.999."""
 _BAND = LowPass(order=2, cutoff=6.0)
 """Of force and acceleration: steps and squats are below (Winter 2009, chapter 3), impacts of single limbs above."""
-_FARTHEST, _STEP = 0.5, 0.002
-"""s: how late or early a force is looked for, and in which steps."""
-_EDGE = 0.1
-"""s at each end of the markers, which the low-pass makes up."""
-_LEAST = 0.25
-"""s without a break that are looked at."""
+_FARTHEST, _STEP = 0.5, 0.002  # s: how late or early a force is looked for, and in which steps
+_EDGE = 0.1  # s at each end of the markers, which the low-pass makes up
+_LEAST = 0.25  # s without a break that are looked at
 _MOVES = 0.01
 """Share of the mean force by which it must swing to show an instant: 0.3 mm of noise in each of eight markers is 0.7 %
 of g at 4 Hz."""
@@ -69,9 +63,7 @@ class Trunk:
         return [slice(*run) for run in runs(self.covered) if run[1] - run[0] >= least * self.rate]
 
     def weights(self, gravity: float) -> list[tuple[slice, Array, float]]:
-        """Return the frames that weigh, the factors (n,) s²/m by which forces at them give a mass, and its standard
-        deviation as a share of it.
-        """
+        """Return the frames that weigh, the factors (n,) s²/m from force to mass, and its relative sd."""
         found = []
         for span in self.spans(_WEIGHS):
             weight, bend = fading(self.time[span])
@@ -82,13 +74,13 @@ class Trunk:
         return found
 
     def beside(self, total: Wrench, *, gravity: float, sway: float) -> "LagAndMass | None":
-        """Return what Newton tells of the ``total`` wrench of all plates, see `lag_and_mass`; the last ones are kept: a
-        plate that is moved or turned changes no vertical force.
+        """Return what Newton tells of the ``total`` wrench of all plates, see `_lag_and_mass`; the last ones are kept:
+        a plate that is moved or turned changes no vertical force.
         """
         vertical = total.force[:, 2]
         key = float(total.time[0]), vertical.size, hash(vertical.tobytes())
         if key not in self._known:
-            self._known[key] = lag_and_mass(self, total.time, vertical, gravity=gravity, sway=sway)
+            self._known[key] = _lag_and_mass(self, total.time, vertical, gravity=gravity, sway=sway)
         return self._known[key]
 
 
@@ -147,9 +139,7 @@ def _trunk(trial: Trial, mass: float) -> Trunk | None:
 
 
 def _height(trial: Trial) -> Array | None:
-    """Return the height (T,) m of the middle between pelvis and trunk, each the mean of its markers that are seen
-    throughout; None without pelvis or trunk.
-    """
+    """Return the height (T,) m of the middle between pelvis and trunk; None without one of them."""
     assert trial.markers is not None
     segment = {marker.label: marker.segment for marker in read_marker_set(trial.marker_set).markers}
     heights = []
@@ -172,14 +162,8 @@ def _covered(trial: Trial, mass: float) -> Mask:
     return np.asarray(~beside & ~carried_elsewhere(trial, weight=feet.weight))
 
 
-def lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, sway: float) -> LagAndMass | None:
-    """Return what Newton tells of the vertical force (S,) N of all plates at times (S,) s; None where less than a
-    quarter of a second without a break is covered, or the force is too short to be filtered.
-
-    The lag is that of the largest correlation of force and acceleration. The mass is the force over g plus the
-    acceleration, both with weights that begin and end smoothly, so that no velocity of one instant is needed; somebody
-    whose force swings by less than ``sway`` of it stands, and weighs whatever the correlation.
-    """
+def _lag_and_mass(trunk: Trunk, time: Array, vertical: Array, *, gravity: float, sway: float) -> LagAndMass | None:
+    """Return what Newton tells of the vertical force (S,) N at times (S,) s; None where too little is covered."""
     known = np.isfinite(vertical)
     rate = 1 / float(np.median(np.diff(time))) if time.size > 1 else 0.0
     if rate <= 2 * _BAND.cutoff or time.size < 2 * _BAND.shortest(rate) or not known.all():
@@ -228,9 +212,7 @@ def _lag(trunk: Trunk, here: Array, time: Array, slow: Array) -> tuple[float, fl
 
 
 def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
-    """Return the mass kg and its sd by the force (T,) N, each span of frames with the weight of its own sd; NaN without
-    one.
-    """
+    """Return the mass kg and its sd by the force (T,) N, spans weighted by their own sd; NaN without one."""
     weights = trunk.weights(gravity)
     if not weights:
         return float("nan"), float("nan")
@@ -240,7 +222,7 @@ def _mass(trunk: Trunk, force: Array, gravity: float) -> tuple[float, float]:
 
 
 def slopes_of(trunk: Trunk, told: LagAndMass, total: Wrench, changes: Array, *, gravity: float) -> tuple[Array, Array]:
-    """Return the derivatives of lag and mass of `lag_and_mass` with respect to the sizes (d,) of ``changes`` (S, d) N
+    """Return the derivatives of lag and mass of `_lag_and_mass` with respect to the sizes (d,) of ``changes`` (S, d) N
     of the total vertical force; 0 of what is not told.
 
     The lag is the top of the parabola through three correlations: its derivative is that of the three. The mass changes

@@ -22,14 +22,11 @@ from biodance.records import Array, Index, Markers
 
 NEED = 0.020
 """m: markers that lie within this of the body, RMS, in every trial ask for no further joint (OpenSim's user guide)."""
-_ONCE_WIDER = 0.015
-"""m: the same for a body that was found too stiff elsewhere."""
-NEARER = 0.9
+_ONCE_WIDER = 0.015  # m: the same for a body that was found too stiff elsewhere
+_NEARER = 0.9
 """A joint is taken if the markers left out lie nearer than this share of their distance without it."""
-_FRAMES, _TRIALS = 48, 6
-"""Frames of all trials together that are looked at, and trials, evenly chosen."""
-_RIDGE = 1e-6
-"""Of the mean squared lever: keeps what no marker shows where it is."""
+_FRAMES, _TRIALS = 48, 6  # Frames of all trials together that are looked at, and trials, evenly chosen
+_RIDGE = 1e-6  # Of the mean squared lever: keeps what no marker shows where it is
 _TELLING = {
     "neck": ("head",),
     "forearms": ("forearm_hand", "hand"),
@@ -99,7 +96,7 @@ def with_shown_joints(
             for pair in _tried(name, more, some, before, _ONCE_WIDER if gains else NEED)
         ]
         more, best = min(tried, key=lambda pair: pair[1].with_it / pair[1].without, default=(body, None))
-        if best is None or best.with_it >= NEARER * best.without:
+        if best is None or best.with_it >= _NEARER * best.without:
             return body, (*gains, *(gain for _, gain in tried))
         body, gains = more, [*gains, replace(best, taken=True)]
         left.remove(best.name)
@@ -133,9 +130,7 @@ def _follow(body: Body, some: _Sample) -> _Followed | None:
 
 
 def _leverage(body: Body, q: Array, names: tuple[str, ...]) -> Array:
-    """Return (F, K): how much of a marker's displacement the model's own follows in the postures ``q`` (F, nq), mean
-    of three directions.
-    """
+    """Return (F, K): how much of a marker's displacement the model follows in postures ``q`` (F, nq)."""
     rows = [body.markers.names.index(name) for name in names]
     segment, pose = [body.markers.segment[k] for k in rows], poses(body, q)
     J = place_jacobian(body, pose, segment, pose.points(segment, body.markers.position[rows]))

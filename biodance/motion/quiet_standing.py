@@ -1,9 +1,4 @@
-"""Quiet standing on the plates: the mass they carry, and the centre of mass beside the centre of pressure.
-
-Standing still, the mean centre of mass lies over the mean centre of pressure, and the mean vertical force is the
-weight: two checks that need no model of motion. Quiet is the longest run in which the vertical force stays within a few
-percent of its median.
-"""
+"""Quiet standing on the plates: the mass they carry, and the centre of mass beside the centre of pressure."""
 
 from dataclasses import dataclass
 
@@ -12,12 +7,12 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
-from biodance.lab.markers.still import movement
+from biodance.lab.markers.upright import movement
 from biodance.motion.kinematics import centre_of_mass, in_blocks, poses
 from biodance.records import Array, Markers, Motion, Trial, longest_run
 from biodance.settings import StandingRules
 
-FOOT_LANDMARKS = tuple(
+_FOOT_LANDMARKS = tuple(
     f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral")
 )
 
@@ -77,7 +72,7 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
     if trial.markers is None or not trial.marker_set:
         return (), np.empty((0, 2))
     marker_set = read_marker_set(trial.marker_set)
-    found = {name: landmark(trial.markers, marker_set, name) for name in FOOT_LANDMARKS}
+    found = {name: landmark(trial.markers, marker_set, name) for name in _FOOT_LANDMARKS}
     places = {
         name: np.nanmean(path[run, :2], axis=0)
         for name, path in found.items()
@@ -87,9 +82,7 @@ def _feet(trial: Trial, run: slice) -> tuple[tuple[str, ...], Array]:
 
 
 def _still_part(markers: Markers | None, run: slice, rate: float, within: float) -> slice | None:
-    """Return the longest part of ``run`` in which the typical marker stays ``within`` m: the whole, a half, a quarter,
-    ... of `_PART` s or more; None without one. Who sways farther than that in 5 s stands still for 1 s all the same.
-    """
+    """Return the longest part of ``run``, halved down to `_PART` s, with the typical marker ``within`` m; or None."""
     if markers is None:
         return run
     length = run.stop - run.start

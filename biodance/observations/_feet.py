@@ -7,7 +7,7 @@ import numpy as np
 
 from biodance.errors import BiodanceError
 from biodance.lab.markers.sets import landmark, read_marker_set
-from biodance.motion.contact.soles import OUTLINE
+from biodance.motion.soles import OUTLINE
 from biodance.records import SIDES, Array, Markers
 from biodance.records.arrays import rate_of
 

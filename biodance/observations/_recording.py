@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.lab.markers.sets import FAMILY
-from biodance.lab.markers.still import is_still
-from biodance.motion.contact.over import inside
+from biodance.lab.markers.upright import is_still
 from biodance.motion.newton import LagAndMass, Trunk, trunk_of
+from biodance.motion.soles import inside
 from biodance.observations._feet import FootPath, Track, feet_of, pelvis_path, track_of
 from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE

@@ -15,8 +15,8 @@ from biodance.display import spaced
 from biodance.effects import DiscreteEffect, Effect, QualityCheck, Recorded
 from biodance.effects.labels_swapped import WORSE, exchanges, named_exchanges, renamed
 from biodance.errors import BiodanceError
-from biodance.lab.c3d.exchanged import write_exchanged
-from biodance.lab.c3d.ezc3d_object import write_trial
+from biodance.lab.c3d.results import write_exchanged
+from biodance.lab.c3d.write import write_trial
 from biodance.lab.corrections import (
     APPLIED,
     PlateCorrection,

@@ -11,15 +11,15 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.limits import with_tracking_limits
 from biodance.body.human.scaling import Scaling, measure_static
+from biodance.body.human.skeleton import with_tracking_limits
 from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.unloaded_body import scaled_to_mass
 from biodance.lab.markers.sets import read_marker_set
-from biodance.motion.contact.support import carried_elsewhere
+from biodance.motion.contact import carried_elsewhere
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.functional_joints import PLACED, functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
-from biodance.motion.regressor import predict_wrench
 from biodance.motion.track import track
 from biodance.pipeline.trial import Prepared, attempt, track_trial
 from biodance.pipeline.trial_result import ForceGain, ShownJoints, Step, TrialResult

@@ -12,7 +12,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.body.human.limits import joint_limits
+from biodance.body.human.skeleton import joint_limits
 from biodance.body.robot.similarity import standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance

@@ -9,8 +9,8 @@ from biodance.body.export import formats, write_model
 from biodance.body.robot.hoap3 import hoap3
 from biodance.body.solids import SegmentSolids, segment_solids
 from biodance.errors import BiodanceError, SessionRefused, TrialRefused, UnknownName
-from biodance.lab.opensim.mot import write_mot
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.opensim_tables import write_mot
+from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
 from biodance.pipeline.program_folders import opensim_coordinates, state_notes, write_bids_folder, write_opensim_folder
 from biodance.pipeline.results import SessionResult

@@ -23,7 +23,7 @@ from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
 from biodance.identification.validation import ResidualRatio, TrialValidation, residual_ratio, validate
 from biodance.lab.corrections import PlateCorrection
-from biodance.motion.regressor import Agreement, compare, predict_wrench
+from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.pipeline.checks import load_doubts, unexplained_mass, weight_notes
 from biodance.pipeline.trial_result import Check, TrialResult, Weighing, trial_fit
 from biodance.records import ROLES, Role, Sip

@@ -27,14 +27,12 @@ from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import Knowability
 from biodance.identification.recursive import RecursivePosterior, initial_posterior, summed_pressure
 from biodance.identification.statistics import Fit, believable
-from biodance.lab.filters import force_filter, motion_filter
-from biodance.lab.prepare import at_marker_times
-from biodance.motion.contact.contact import Contact, contact_with_plates, feet_on_ground
-from biodance.motion.contact.soles import soles_from_body
-from biodance.motion.ik.follow import Follower
-from biodance.motion.regressor import regressor
-from biodance.motion.smoothing import smooth
-from biodance.motion.track import upright_trunk
+from biodance.lab.prepare import at_marker_times, force_filter, motion_filter
+from biodance.motion.contact import Contact, contact_with_plates, feet_on_ground
+from biodance.motion.dynamics import regressor
+from biodance.motion.ik.inverse_kinematics import Follower
+from biodance.motion.soles import soles_from_body
+from biodance.motion.track import smooth, upright_trunk
 from biodance.records import Array, Markers, Motion, Plate, Trial, Wrench
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.caution import widened_prior

@@ -22,15 +22,14 @@ from biodance.lab.bids import (
     write_motion,
     write_participants,
 )
-from biodance.lab.opensim.ground_forces import external_loads, ground_table, inverse_dynamics_setup
-from biodance.lab.opensim.mot import TimeTable, write_mot
-from biodance.lab.opensim.trc import write_trc
+from biodance.lab.opensim_tables import TimeTable, external_loads, ground_table, inverse_dynamics_setup, write_mot
 from biodance.lab.plain_text import write_whole
+from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.results_folder import made_folder, whole_folder
-from biodance.motion.contact.contact import Contact, foot_wrenches
-from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import centre_of_mass
+from biodance.motion.soles import soles_from_body
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import CHANNELS, Motion, Plate, Session, Trial, Wrench, longest_run, runs

@@ -12,8 +12,8 @@ from biodance.errors import SessionRefused, TrialRefused
 from biodance.lab.read import read_trial
 from biodance.lab.session.read import read_session
 from biodance.lab.session.write import registered_folder, write_registered
-from biodance.motion.contact.soles import soles_from_body
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
+from biodance.motion.soles import soles_from_body
 from biodance.motion.track import track
 from biodance.pipeline.body import body_of
 from biodance.pipeline.trial import prepare_trial

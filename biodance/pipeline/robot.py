@@ -17,11 +17,10 @@ from biodance.identification.base_parameters import BaseEstimate
 from biodance.identification.identification import Identification
 from biodance.identification.robot import identify_links
 from biodance.identification.validation import TrialValidation, residual_ratio
-from biodance.lab.filters import LowPass, low_pass
-from biodance.lab.robot.recording import RobotRecording, read_robot_recording
-from biodance.motion.clocks import fit_plate, onto_plate
-from biodance.motion.grounded import RATE
-from biodance.motion.regressor import Agreement, compare, predict_wrench
+from biodance.lab.prepare import LowPass, low_pass
+from biodance.lab.robot import RobotRecording, read_robot_recording
+from biodance.motion.dynamics import Agreement, compare, predict_wrench
+from biodance.motion.grounded import RATE, fit_plate, onto_plate
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import attention_of, cause_words, misweighed, of_file, refusals, weights

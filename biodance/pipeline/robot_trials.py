@@ -9,13 +9,22 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, FileRefused, TrialRefused
 from biodance.identification.robot import RobotMotion, innovation, robot_fit
-from biodance.lab.filters import LowPass, low_pass
-from biodance.lab.robot.encoders import for_joints
-from biodance.lab.robot.recording import BaseSensors, RobotRecording, RobotTrial
-from biodance.motion.base_seen import BaseSeen, base_of_inclinations, base_of_markers
-from biodance.motion.clocks import PlateFit, fit_plate, on_motion_clock
-from biodance.motion.grounded import RATE, UNDER, Grounded, even_angles, ground
-from biodance.motion.regressor import predict_wrench
+from biodance.lab.prepare import LowPass, low_pass
+from biodance.lab.robot import BaseSensors, RobotRecording, RobotTrial, for_joints
+from biodance.motion.dynamics import predict_wrench
+from biodance.motion.grounded import (
+    RATE,
+    UNDER,
+    BaseSeen,
+    Grounded,
+    PlateFit,
+    base_of_inclinations,
+    base_of_markers,
+    even_angles,
+    fit_plate,
+    ground,
+    on_motion_clock,
+)
 from biodance.records import Array, Wrench
 from biodance.spatial import elementary_rotation
 

@@ -11,16 +11,15 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from biodance.body.body import Body
-from biodance.body.body_file import read_body
+from biodance.body.body import Body, read_body
 from biodance.errors import FileRefused, SessionRefused, TrialRefused
-from biodance.lab.filters import motion_filter
 from biodance.lab.plain_text import whole_file
-from biodance.lab.session.manifest import read_manifest, refuse_mixture
+from biodance.lab.prepare import motion_filter
 from biodance.lab.session.read import read_session
+from biodance.lab.session.results_folder import read_manifest, refuse_mixture
 from biodance.library import refuse_large
-from biodance.motion.contact.contact import ground_contact
-from biodance.motion.contact.soles import soles_from_body
+from biodance.motion.contact import ground_contact
+from biodance.motion.soles import soles_from_body
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial import attempt, compare_wrenches, prepare_trial
 from biodance.pipeline.trial_result import Step, TrialResult

@@ -8,7 +8,7 @@ import numpy as np
 from biodance.dance.dance import Dance
 from biodance.dance.problem.splines import Phase
 from biodance.errors import BiodanceError
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.records import Array, Motion, Subject
 from biodance.spatial import zero_moment_point
 from biodance.virtual_lab.faults.causes import Hidden, hide

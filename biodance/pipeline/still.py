@@ -12,9 +12,9 @@ from biodance.body.solids import box_solid, shape_parts
 from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.load_words import size_and_segments
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import Poses, centre_of_mass, poses
 from biodance.motion.quiet_standing import facing
-from biodance.motion.regressor import predict_wrench
 from biodance.pipeline.trial_result import Still, TrialResult
 from biodance.records import Array, Motion, side_in_name
 

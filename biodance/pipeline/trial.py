@@ -14,18 +14,17 @@ from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.statistics import believable, standing_point
 from biodance.lab.c3d.subject import FileOutputs, read_outputs
-from biodance.lab.markers.gaps import MarkerGaps, report_gaps
 from biodance.lab.markers.sets import canonical, read_marker_set
+from biodance.lab.markers.signals import MarkerGaps, report_gaps
 from biodance.lab.prepare import prepare
-from biodance.motion.contact.contact import Contact, ground_contact
-from biodance.motion.contact.soles import Soles, soles_from_body, soles_from_markers
-from biodance.motion.cutoff import with_own_cutoff
+from biodance.motion.contact import Contact, ground_contact
+from biodance.motion.dynamics import compare, predict_wrench
 from biodance.motion.quiet_standing import quiet_standing
-from biodance.motion.regressor import compare, predict_wrench
-from biodance.motion.track import track
+from biodance.motion.soles import Soles, soles_from_body, soles_from_markers
+from biodance.motion.track import track, with_own_cutoff
 from biodance.pipeline.trial_result import MarkerFit, Step, TrialResult, WrenchComparison, trial_fit
 from biodance.records import LeftOut, Motion, Sip, Trial, runs
-from biodance.records.left_out import seconds_left_out
+from biodance.records.attention import seconds_left_out
 
 T = TypeVar("T")
 

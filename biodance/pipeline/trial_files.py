@@ -15,11 +15,10 @@ from biodance.errors import MissingLibrary, TrialRefused
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import refuse_present, whole_file
-from biodance.motion.contact.contact import Contact, foot_wrenches
-from biodance.motion.contact.soles import soles_from_body
-from biodance.motion.dynamics import joint_torques
+from biodance.motion.contact import Contact, foot_wrenches
+from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import centre_of_mass, poses
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.soles import soles_from_body
 from biodance.pipeline.trial import contact_of, movement_of
 from biodance.pipeline.trial_result import TrialResult
 from biodance.records import SIDES, Array, Wrench

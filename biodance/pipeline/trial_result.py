@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from biodance import display
 from biodance.identification.statistics import Fit
 from biodance.lab.corrections import PlateCorrection, correction_doubts
-from biodance.lab.markers.gaps import MarkerGaps
-from biodance.motion.contact.contact import Contact
+from biodance.lab.markers.signals import MarkerGaps
+from biodance.motion.contact import Contact
 from biodance.motion.optional_joints import JointGain
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.records import CHANNEL_TITLES, Array, LeftOut, Motion, Trial, Wrench

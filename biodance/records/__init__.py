@@ -20,12 +20,11 @@ from biodance.records.arrays import (
     runs,
     spread_frames,
 )
-from biodance.records.left_out import LeftOut
+from biodance.records.attention import LeftOut
 from biodance.records.markers import Markers
 from biodance.records.motion import AngleSpan, AngleState, Motion
 from biodance.records.session import ROLES, Defect, Role, Session, Source, Trial
-from biodance.records.sip import Sip
-from biodance.records.subject import SIDES, FootSizes, Subject, side_in_name
+from biodance.records.subject import SIDES, FootSizes, Sip, Subject, side_in_name
 from biodance.records.wrench import Plate, Wrench
 
 __all__ = [

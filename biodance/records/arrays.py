@@ -23,7 +23,7 @@ class _HasName(Protocol):
     def name(self) -> str: ...
 
 
-Named = TypeVar("Named", bound=_HasName)
+_Named = TypeVar("_Named", bound=_HasName)
 
 
 def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> Array:
@@ -45,9 +45,7 @@ def frozen_array(value: ArrayLike, shape: tuple[int | None, ...], what: str) -> 
 
 
 def any_coordinate(flags: Mask) -> Mask:
-    """Return (...) where one of the three coordinates is flagged, (..., 3): ``flags.any(axis=-1)`` in a third of its
-    time.
-    """
+    """Return (...) where a coordinate (..., 3) is flagged: ``flags.any(axis=-1)`` in a third of its time."""
     return np.asarray(flags[..., 0] | flags[..., 1] | flags[..., 2])
 
 
@@ -55,9 +53,7 @@ _SPREAD = 256
 
 
 def spread_frames(values: Array) -> Array:
-    """Return some hundred frames of ``values`` (T, ...), spread over the recording: enough to tell how large something
-    is and where it lies.
-    """
+    """Return some hundred frames of ``values`` (T, ...), spread over the recording, to tell size and place."""
     return values[:: max(1, len(values) // _SPREAD)]
 
 
@@ -101,10 +97,8 @@ def rate_of(time: Array) -> float:
     return float((time.size - 1) / (time[-1] - time[0])) if time.size > 1 else float("nan")
 
 
-def by_name(trials: Iterable[Named], name: str, kind: str) -> Named:
-    """Return the first of ``trials`` of that ``name``; UnknownName lists all names where there is none of the
-    ``kind``.
-    """
+def by_name(trials: Iterable[_Named], name: str, kind: str) -> _Named:
+    """Return the first of ``trials`` of that ``name``; UnknownName lists all where there is none."""
     some = tuple(trials)
     return some[known_index(kind, name, [one.name for one in some])]
 

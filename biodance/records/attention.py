@@ -1,21 +1,65 @@
-"""What a person must see first, and what a verdict rests on: the same records on page, terminal and in JSON."""
+"""What a person must see first, and what a verdict rests on or leaves out: the same records on page, terminal and in
+JSON.
+"""
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Literal
 
-from biodance.records.left_out import LeftOut
+import numpy as np
+
+from biodance.records.arrays import Mask
+
+
+class LeftOut(StrEnum):
+    """Why frames are not compared with a body, in the order of the gates: a frame counts at the first."""
+
+    CARRIED_ELSEWHERE = "carried_elsewhere"
+    """A chair, a rail or a hand carries a part of the person."""
+    NO_LOAD = "no_load"
+    """No plate is loaded, and nobody flies."""
+    FORCE_UNKNOWN = "force_unknown"
+    """A plate's force is not known."""
+    FOOT_UNSEEN = "foot_unseen"
+    """A foot was not seen."""
+    FOOT_BESIDE = "foot_beside"
+    """A foot may touch the ground beside the plates, or stand partly beside one."""
+    NO_FOOT_ON_PLATE = "no_foot_on_plate"
+    """A plate is loaded though no foot is over it."""
+    SILENT_PLATE = "silent_plate"
+    """A foot rests on a plate that reads nothing."""
+    POSTURE_OPEN = "posture_open"
+    """The markers do not fix the posture."""
+    FORCES_DIFFER = "forces_differ"
+    """Plates and motion differ by more than a wrong body or soft tissue can make of this movement."""
+    SHORT_RUN = "short_run"
+    """What is left without a break is too short to tell of slow errors."""
+
+
+def seconds_left_out(reasons: Mapping[LeftOut, Mask], rate: float) -> dict[LeftOut, float]:
+    """Return how many seconds each of the ``reasons`` (T,) takes out at ``rate`` Hz, in the order of `LeftOut`: a frame
+    counts once, at the first; without reasons that take out nothing.
+    """
+    found: dict[LeftOut, float] = {}
+    before: Mask | None = None
+    for reason in (one for one in LeftOut if one in reasons):
+        here = reasons[reason]
+        new = here if before is None else here & np.logical_not(before)
+        before = here if before is None else here | before
+        if new.any():
+            found[reason] = float(new.sum() / rate)
+    return found
+
 
 Level = Literal["fail", "warn", "note"]
 LEVELS: tuple[Level, ...] = ("fail", "warn", "note")
 """Strongest first."""
 WARNING = "Warning: "
 """Beginning of a note that needs a person."""
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
-"""What may differ between two sentences of one wording."""
-_FEW = 4
-"""Trials of one check that are told one by one."""
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")  # What may differ between two sentences of one wording
+_FEW = 4  # Trials of one check that are told one by one
 LIMIT_TOLD = ", should be "
 """Between the value of a check and its limit, in a sentence about it."""
 
@@ -87,9 +131,7 @@ def _together(rows: list[Attention]) -> Attention:
 
 
 def _range(found: list[tuple[str, str]]) -> str:
-    """Return the smallest and the largest of many values (trial, ``5.6 % of weight``) with their trials; "" where they
-    are no numbers of one unit.
-    """
+    """Return the smallest and largest of values (trial, ``5.6 % of weight``) with their trials; or ""."""
     parts = [(trial, *value.partition(" ")) for trial, value in found]
     try:
         low, high = (choose(parts, key=lambda part: float(part[1])) for choose in (min, max))

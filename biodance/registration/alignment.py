@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.lab.filters import force_filter, low_pass
+from biodance.lab.prepare import force_filter, low_pass
 from biodance.records import Array, Markers, Mask, Motion, Plate, Trial, Wrench, freeze
 from biodance.records.motion import BY_FRAME
 from biodance.settings import COP_FORCE, Settings

@@ -18,11 +18,9 @@ from biodance.effects import Case
 from biodance.errors import TrialRefused
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.plates.faults import DELAY, POSITION, ROTATION
-from biodance.motion.contact.belts import dilate, speeds
-from biodance.motion.contact.contact import Contact, ground_contact
-from biodance.motion.contact.over import inside
-from biodance.motion.contact.soles import Soles, soles_from_body
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.contact import Contact, dilate, ground_contact, speeds
+from biodance.motion.dynamics import predict_wrench
+from biodance.motion.soles import Soles, inside, soles_from_body
 from biodance.observations import ONSET, FootPath
 from biodance.observations.foot_across import ACROSS_PHASES
 from biodance.observations.foot_along import ALONG_PHASES

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from biodance.body.body_file import body_text
+from biodance.body.body import body_text
 from biodance.display import spaced
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from biodance.cycles.curves import CurveGroup
+from biodance.cycles.curves import ANGLE_PANELS, LOAD_PANELS, CurveGroup
 from biodance.cycles.cut import PERCENT
-from biodance.cycles.key_values import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.provenance import now, provenance
 from biodance.pipeline.visit_quantity import ComparedQuantity, Untested

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from biodance.body.body_file import body_text
+from biodance.body.body import body_text
 from biodance.diagnosis.diagnosis import Finding
 from biodance.effects import QualityCheck
 from biodance.effects.labels_swapped import LabelsSwapped

@@ -14,8 +14,8 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
+from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import Poses, place_jacobian, poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Array, Markers, Motion, Plate, Trial
 from biodance.spatial import quaternion_matrix
 from biodance.uncertainty.bands import BANDS

@@ -9,7 +9,7 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.skeleton import kind_of
-from biodance.motion.ik.compiled.derivatives import FOUR, add_products
+from biodance.motion.ik.compiled.tree import FOUR, add_products
 from biodance.motion.kinematics import neighbours
 from biodance.records import Array, Index
 from biodance.spatial import cross

@@ -19,8 +19,8 @@ from via_points import Excitation, design, within_ranges
 from biodance.body.body import Body
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.identification.base_parameters import BaseParameters, base_parameters, parameter_names
+from biodance.motion.dynamics import regressor_of
 from biodance.motion.kinematics import segment_motion
-from biodance.motion.regressor import regressor_of
 from biodance.records import Array, Motion
 
 MOTIONS = 6

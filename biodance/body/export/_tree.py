@@ -16,7 +16,7 @@ WORLD = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Hinge:
+class _Hinge:
     """One degree of freedom of a compound joint: index ``joint`` in ``Body.joints``; ``axis`` (3,) unit vector and
     ``place`` (3,) m of a point on it, both in the frame of the CHILD segment at zero angles.
     """
@@ -39,7 +39,7 @@ class Branch:
     parent: int
     rotation: Array
     translation: Array
-    hinges: tuple[Hinge, ...]
+    hinges: tuple[_Hinge, ...]
 
 
 def segment_tree(body: Body) -> tuple[Branch, ...]:
@@ -62,12 +62,12 @@ def segment_tree(body: Body) -> tuple[Branch, ...]:
 
 
 def _branch(body: Body, segment: int) -> Branch:
-    hinges: list[Hinge] = []
+    hinges: list[_Hinge] = []
     rotation, translation = np.eye(3), np.zeros(3)  # link_T_segment, from the segment inwards
     index = body.segment_joint[segment]
     while index >= 0:
         joint = body.joints[index]
-        hinges.insert(0, Hinge(index, rotation.T @ joint.axis, -rotation.T @ translation))
+        hinges.insert(0, _Hinge(index, rotation.T @ joint.axis, -rotation.T @ translation))
         rotation, translation = joint.rotation @ rotation, joint.translation + joint.rotation @ translation
         index = joint.parent
         if index >= 0 and body.joints[index].segment != NO_SEGMENT:

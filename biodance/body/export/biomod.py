@@ -24,7 +24,10 @@ def text(body: Body, source: str) -> str:
         lines += _segment(body.segments[0], ["translations xyz", "rotations xyz", *ranges, *_mass(body, 0)])
     links = link_names(body)
     for i, joint in enumerate(body.joints):
-        turn = _x_along(joint.axis)
+        other = np.eye(3)[np.argmin(np.abs(joint.axis))]
+        y = np.cross(other, joint.axis)
+        y = y / np.linalg.norm(y)
+        turn = np.stack([joint.axis, y, np.cross(joint.axis, y)], axis=1)
         above = links[joint.parent] if joint.parent >= 0 else body.segments[0] if body.n_root else ""
         placed = [*([f"parent {above}"] if above else []), *_placed(joint.rotation @ turn, joint.translation)]
         limits = f"rangesQ {row([body.limits.lower[i], body.limits.upper[i]])}"
@@ -50,11 +53,3 @@ def _placed(rotation: Array, translation: Array) -> list[str]:
 def _mass(body: Body, segment: int) -> list[str]:
     lump = rigid_inertia(body.sip.of(body.segments[segment]))
     return [f"mass {row([lump.mass])}", "inertia", *(f"  {row(line)}" for line in lump.inertia), f"com {row(lump.com)}"]
-
-
-def _x_along(axis: Array) -> Array:
-    """Return a rotation (3, 3) whose first column is the unit vector ``axis``."""
-    other = np.eye(3)[np.argmin(np.abs(axis))]
-    y = np.cross(other, axis)
-    y = y / np.linalg.norm(y)
-    return np.stack([axis, y, np.cross(axis, y)], axis=1)

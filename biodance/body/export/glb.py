@@ -20,7 +20,7 @@ _COLOURS = {"left": (0, 114, 178, 255), "right": (213, 94, 0, 255), "": (150, 15
 """Red, green, blue, opacity by the side that a segment's name begins with (Okabe and Ito: told apart by everybody)."""
 MARKER = 0.007
 """m: radius of a marker."""
-WORLD_NODE = "world"
+_WORLD_NODE = "world"
 
 
 def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
@@ -36,7 +36,7 @@ def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
     solids = segment_solids(body) if solids is None else solids
     if not solids:
         raise BiodanceError(f"{body.name}: no segment has a box or a mesh, so there is nothing to see.")
-    scene = trimesh.Scene(base_frame=WORLD_NODE)
+    scene = trimesh.Scene(base_frame=_WORLD_NODE)
     scene.metadata |= {"name": body.name, "source": source}
     ball = trimesh.creation.icosphere(subdivisions=1, radius=MARKER)
     for branch in segment_tree(body):
@@ -44,7 +44,7 @@ def data(body: Body, source: str, solids: SegmentSolids | None = None) -> bytes:
         place = np.eye(4)
         if branch.parent != WORLD:
             place[:3, :3], place[:3, 3] = branch.rotation, branch.translation
-        above = WORLD_NODE if branch.parent == WORLD else body.segments[branch.parent]
+        above = _WORLD_NODE if branch.parent == WORLD else body.segments[branch.parent]
         mesh = solids[name].copy() if name in solids else trimesh.Trimesh()
         mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=_COLOURS[side_in_name(name, "")])
         mesh.metadata = {"mass_kg": float(body.sip.of(name)[0]), "com_m": body.sip.com[branch.segment].tolist()}

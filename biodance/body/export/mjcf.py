@@ -1,6 +1,5 @@
-"""MJCF: the model format of MuJoCo, which refuses an inertia that breaks the triangle inequality.
-
-One body per segment with its hinges in order; markers are sites; boxes are seen but never touched (no contact).
+"""MJCF: the model format of MuJoCo, which refuses an inertia that breaks the triangle inequality. One body per segment
+with its hinges in order; markers are sites; boxes are seen but never touched (no contact).
 """
 
 from xml.etree.ElementTree import Element

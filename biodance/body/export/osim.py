@@ -21,10 +21,9 @@ from biodance.records import Array
 
 FORMAT = "osim"
 SUFFIX = ".osim"
-GEOMETRY = "Geometry"
-"""Folder beside the model in which OpenSim looks for meshes."""
+_GEOMETRY = "Geometry"  # Folder beside the model in which OpenSim looks for meshes
 ROOT_ROTATIONS = ("tilt", "list", "rotation")
-ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_ROOT_AXES = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 ROOT_TRANSLATIONS = ("tx", "ty", "tz")
 
 
@@ -57,7 +56,7 @@ def text(body: Body, source: str, solids: SegmentSolids | None = None) -> str:
 def beside(body: Body, solids: SegmentSolids) -> dict[str, bytes]:
     """Return the meshes (STL, m) by their path beside the model."""
     return {
-        f"{GEOMETRY}/{_mesh_file(body, name)}": bytes(solids[name].export(file_type="stl"))
+        f"{_GEOMETRY}/{_mesh_file(body, name)}": bytes(solids[name].export(file_type="stl"))
         for name in body.segments
         if name in solids
     }
@@ -102,7 +101,7 @@ def _joint(joints: Element, body: Body, branch: Branch) -> None:
     add(frame, "orientation", row(_body_fixed_xyz(branch.rotation)))
     transform = add(element, "SpatialTransform")
     if free:
-        turns, names = ROOT_AXES, [f"{name}_{word}" for word in ROOT_ROTATIONS]
+        turns, names = _ROOT_AXES, [f"{name}_{word}" for word in ROOT_ROTATIONS]
         shifts = [f"{name}_{word}" for word in ROOT_TRANSLATIONS]
         ranges = [(-10.0, 10.0)] * 6
     else:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.human.limits import joint_limits
 from biodance.body.human.opinions import body_opinions, sole_corners, told_by, usual_outline
 from biodance.body.human.prior import child_widening, com_sd, is_child, prior
 from biodance.body.human.skeleton import (
@@ -14,6 +13,7 @@ from biodance.body.human.skeleton import (
     Skeleton,
     cut_at_joint,
     generic_skeleton,
+    joint_limits,
     joint_tree,
     kind_of,
     side_of,
@@ -25,29 +25,24 @@ from biodance.lab.markers.sets import MarkerSet, read_marker_set
 from biodance.records import SIDES, Array, Sip, Subject
 from biodance.settings import STANDARD_GRAVITY, Settings
 
-COM_SIGMAS = 3.0
-"""Half width of a CoM box in prior standard deviations."""
-LUMBAR_HEIGHT = 0.112 / 1.755
+_COM_SIGMAS = 3.0  # Half width of a CoM box in prior standard deviations
+_LUMBAR_HEIGHT = 0.112 / 1.755
 """Stature: height over the hips of the lumbar joint from which ``boxes.csv`` measures the trunk (ANSUR II, 1.755 m)."""
 
 
-def shape_boxes(skeleton: Skeleton) -> Array:
-    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature: lower and upper corners in the segment
-    frames.
-
-    The trunk's box ends at the vertex wherever this skeleton has its trunk joint.
-    """
+def _shape_boxes(skeleton: Skeleton) -> Array:
+    """Return the boxes (12, 2, 3) m of ``boxes.csv`` at the person's stature, in the segment frames."""
     table = read_table("human", "boxes")
     columns = "x_min y_min z_min x_max y_max z_max"
     corners = np.array([row_numbers(table.row(segment=kind_of(s)), columns) for s in SEGMENTS])
     boxes = corners.reshape(-1, 2, 3) * skeleton.stature
-    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - LUMBAR_HEIGHT * skeleton.stature
+    boxes[SEGMENTS.index("trunk_head"), 1, 1] -= skeleton.origins["trunk"][1] - _LUMBAR_HEIGHT * skeleton.stature
     return boxes
 
 
 def com_boxes(sip: Sip, skeleton: Skeleton, boxes: Array) -> Array:
     """Return where the CoM may be, (12, 2, 3) m: three standard deviations around the prior, inside the shape box."""
-    half = COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
+    half = _COM_SIGMAS * np.array([com_sd(segment, skeleton) for segment in SEGMENTS])
     around = np.stack([sip.com - half, sip.com + half], axis=1)
     return np.clip(around, boxes[:, :1], boxes[:, 1:])
 
@@ -60,8 +55,7 @@ def sole(skeleton: Skeleton, subject: Subject, side: str) -> Foot:
     return Foot(SEGMENTS.index(segment), np.insert(corners, 1, -skeleton.ankle_height[side], axis=1))
 
 
-ADULT = (18.0, 65.0)
-"""years: the ages that the usual table speaks for."""
+_ADULT = (18.0, 65.0)  # years: the ages that the usual table speaks for
 
 
 def human(
@@ -115,7 +109,7 @@ def human(
         f"Segment lengths: table {table} at stature {subject.stature:.3f} m; nobody was measured. Markers: usual "
         f"places of {markers}."
     )
-    worn = generic_markers(skeleton, read_marker_set(markers))
+    worn = _generic_markers(skeleton, read_marker_set(markers))
     return assemble(subject, skeleton, table=table, markers=worn, notes=(note,), gravity=gravity)
 
 
@@ -131,7 +125,7 @@ def assemble(
     """Return the Body of a skeleton: joint tree, prior SIP, limits, boxes and soles."""
     measured = {f"{side}_foot": outline.length for side, outline in subject.foot_outline.items()}
     skeleton = replace(skeleton, lengths={**skeleton.lengths, **measured})
-    usual, boxes = reference(table, subject), shape_boxes(skeleton)
+    usual, boxes = reference(table, subject), _shape_boxes(skeleton)
     opinions = body_opinions(usual, skeleton, subject)
     sip = prior(usual, skeleton, subject, opinions)
     along = prior(usual, cut_at_joint(skeleton), subject) if skeleton.cut else None
@@ -178,7 +172,7 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
         f"Segment parameters before the data: {table} for a {sex} of {subject.mass:.2f} kg, standard deviations from "
         f"the spread of tables; trunk joint at {joint}."
     ]
-    if table in measured_whole() and not (np.isnan(subject.age) or ADULT[0] <= subject.age <= ADULT[1]):
+    if table in measured_whole() and not (np.isnan(subject.age) or _ADULT[0] <= subject.age <= _ADULT[1]):
         groups = {study for sex in ("F", "M") for study, group in studies(sex).items() if group in ("child", "older")}
         notes.append(
             f"Table {table} is of young adults, the subject is {subject.age:.0f} years old; consider "
@@ -193,7 +187,7 @@ def _prior_notes(subject: Subject, table: str) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers:
+def _generic_markers(skeleton: Skeleton, marker_set: MarkerSet) -> SegmentMarkers:
     """Return the markers of a set that have a usual place, there (offset times normaliser)."""
     shoulders = np.mean([skeleton.origins["right_shoulder"], skeleton.origins["left_shoulder"]], axis=0)
     worn = [marker for marker in marker_set.markers if marker.offset is not None]

@@ -5,9 +5,117 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.human.standing import StaticPosture
 from biodance.body.tables.anthropometry import proportion
-from biodance.records import Array, Subject, Trial
+from biodance.errors import TrialRefused
+from biodance.lab.markers.sets import LANDMARKS, MarkerSet, canonical, landmark, read_marker_set
+from biodance.lab.markers.upright import WINDOW, posture_frames
+from biodance.records import SIDES, Array, Markers, Subject, Trial
+
+_NEEDED = (
+    *("right_asis", "left_asis", "mid_psis"),
+    *(f"{side}_{place}" for side in SIDES for place in ("knee_lateral", "ankle_lateral", "heel", "toe")),
+)
+"""Landmarks without which no body can be placed: pelvis and legs. The rest may stand by proportion (`unseen`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticPosture:
+    """Markers of the set (canonical labels) in one standing posture: ``points`` label -> (3,) m, lab frame;
+    ``landmarks`` name -> (3,) m.
+
+    ``unseen`` the anatomical joints that no marker shows, whose landmarks were put by proportion; ``notes`` say which
+    frames were averaged and which markers come from elsewhere in the trial or are missing. ``still`` is False where the
+    person moves and one frame was taken: then the feet need not be flat.
+    """
+
+    marker_set: MarkerSet
+    points: Mapping[str, Array]
+    landmarks: Mapping[str, Array]
+    notes: tuple[str, ...]
+    unseen: tuple[str, ...] = ()
+    still: bool = True
+
+
+def standing(static: Trial) -> StaticPosture:
+    """Return the posture of a static trial: the median over its quietest half second, or over all frames for a marker
+    not seen then.
+
+    Raises
+    ------
+    TrialRefused
+        There are no markers, no recognised marker set, or a landmark that the body needs is missing in every frame; all
+        are named.
+    """
+    where = f"Static trial {static.name}"
+    if static.markers is None:
+        raise TrialRefused(
+            f"{where}: it has no markers, so no body can be scaled on it. Record the person standing still."
+        )
+    if not static.marker_set:
+        raise TrialRefused(
+            f"{where}: its {len(static.markers.names)} labels are of no known marker set. Label them as in "
+            "anthropometry/marker_sets, or describe your own set in a TOML file of that form and give it with "
+            "--markers FILE, or say [markers] file or map in session.toml."
+        )
+    marker_set = read_marker_set(static.marker_set)
+    markers = canonical(static.markers, marker_set)
+    chosen, still = posture_frames(markers)
+    points = {}
+    elsewhere: list[str] = []
+    missing: list[str] = []
+    for label in markers.names:
+        track, near = markers[label], markers[label][chosen]
+        near, track = near[np.isfinite(near).all(axis=1)], track[np.isfinite(track).all(axis=1)]
+        if len(track):
+            points[label] = np.median(near if len(near) else track, axis=0)
+        (missing if not len(track) else elsewhere if not len(near) else []).append(label)
+    corners = _corners(points, marker_set)
+    seen = points | corners
+    one = Markers(tuple(seen), np.zeros(1), np.array(list(seen.values())).reshape(1, -1, 3))
+    tracks = {name: landmark(one, marker_set, name) for name in LANDMARKS}
+    landmarks = {name: track[0] for name, track in tracks.items() if track is not None}
+    if not corners:
+        landmarks = {name: place for name, place in landmarks.items() if not name.endswith("_knee_axis")}
+    points |= corners
+    _refuse_missing(landmarks, marker_set, where)
+    first, last = (static.source.first_frame + int(i) for i in np.flatnonzero(chosen)[[0, -1]])
+    notes = [f"{where}: posture from frames {first} to {last}, the quietest {WINDOW} s."]
+    if not still:
+        notes = [f"Warning: {where}: nobody stands still in it; its frame {first} was taken for the posture."]
+    notes += [f"{where}: {', '.join(elsewhere)} not seen then, taken from the rest of the trial."] if elsewhere else []
+    notes += [f"{where}: {', '.join(missing)} never seen, so not on the body."] if missing else []
+    return StaticPosture(marker_set, points, landmarks, tuple(notes), still=still)
+
+
+def _corners(points: Mapping[str, Array], marker_set: MarkerSet) -> dict[str, Array]:
+    """Return the markers that a knee alignment device stood in for, label -> (3,) m: where its arms meet."""
+    found = {}
+    for marker in marker_set.markers:
+        if marker.label in points or not set(marker.corner_of) or not set(marker.corner_of) <= points.keys():
+            continue
+        ends = np.array([points[label] for label in marker.corner_of])
+        middle = ends.mean(axis=0)
+        square = np.cross(ends[1] - ends[0], ends[2] - ends[0])
+        reach = float(np.mean(np.linalg.norm(ends - middle, axis=1))) / np.sqrt(2.0)
+        body = np.mean(list(points.values()), axis=0)
+        step = reach * square / np.linalg.norm(square)
+        found[marker.label] = middle + (step if step @ (body - middle) > 0 else -step)
+    return found
+
+
+def _refuse_missing(landmarks: Mapping[str, Array], marker_set: MarkerSet, where: str) -> None:
+    absent = [name for name in _NEEDED if name not in landmarks]
+    if absent:
+        labels = [
+            " or ".join("+".join(labels) for labels in marker_set.landmarks.get(name, ())) or "none in this set"
+            for name in absent
+        ]
+        listed = ", ".join(f"{name.replace('_', ' ')} ({label})" for name, label in zip(absent, labels, strict=True))
+        raise TrialRefused(
+            f"{where}: no frame shows these landmarks of the set {marker_set.title}: {listed}. "
+            "Choose or record a static trial that shows them, or fill the gaps."
+        )
+
 
 _MM = 1e-3
 
@@ -18,9 +126,7 @@ def unit(vector: Array) -> Array:
 
 
 def pelvis_frame(right_asis: Array, left_asis: Array, mid_psis: Array) -> tuple[Array, Array]:
-    """Return lab_R_pelvis (3, 3) and the middle of the ASIS (3,) m: z to the right ASIS, x forwards in the plane of
-    ASIS and PSIS (ISB).
-    """
+    """Return lab_R_pelvis (3, 3) (z to the right ASIS, x forwards; ISB) and the middle of the ASIS (3,) m."""
     middle = (right_asis + left_asis) / 2
     z = unit(right_asis - left_asis)
     y = unit(np.cross(z, middle - mid_psis))
@@ -96,14 +202,13 @@ def wrist(elbow_centre: Array, radial: Array, ulnar: Array, distance: float, *, 
     return np.asarray(middle - distance * unit(back))
 
 
-MARKER_DIAMETER = 0.014
-"""m, where the file does not say: the usual marker of plug-in gait."""
-ASIS_BETWEEN, LEG_BETWEEN = (-0.024, 0.054), (-0.040, 0.040)
+_MARKER_DIAMETER = 0.014  # m, where the file does not say: the usual marker of plug-in gait
+_ASIS_BETWEEN, _LEG_BETWEEN = (-0.024, 0.054), (-0.040, 0.040)
 """m: how much farther apart markers are than a typed measure without a warning. The distance of the spines is typed of
 bone and marked on skin, which lies outside of it: 15 mm (sd 13) in 15 persons of 6 public laboratories, here with three
 standard deviations; of legs 0 mm (sd 15) in 16.
 """
-LETTER = {"right": "R", "left": "L"}
+_LETTER = {"right": "R", "left": "L"}
 
 
 @dataclass(frozen=True)
@@ -135,10 +240,10 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
     notes, guessed = _contradictions(given, width, place), list[str]()
     diameter = given.get("markerdiameter")
     if diameter is None:
-        notes.append(f"Marker diameter is not in the file: {1e3 * MARKER_DIAMETER:.0f} mm taken.")
-    legs = {side: given.get(f"{LETTER[side]}leglength".lower(), marker_leg(place, side)) for side in LETTER}
+        notes.append(f"Marker diameter is not in the file: {1e3 * _MARKER_DIAMETER:.0f} mm taken.")
+    legs = {side: given.get(f"{_LETTER[side]}leglength".lower(), _marker_leg(place, side)) for side in _LETTER}
     widths, offsets = {}, {}
-    for side, letter in LETTER.items():
+    for side, letter in _LETTER.items():
         for joint in ("knee", "ankle", "elbow", "wrist"):
             default = proportion(f"{joint}_width", subject.sex) * subject.stature
             widths[f"{side}_{joint}"] = given.get(f"{letter}{joint}width".lower(), default)
@@ -153,12 +258,12 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
             f"{', '.join(sorted(guessed)).replace('_', ' ')}."
         )
     return Measures(
-        marker_radius=(diameter or MARKER_DIAMETER) / 2,
+        marker_radius=(diameter or _MARKER_DIAMETER) / 2,
         pelvis_width=width,
         pelvis_depth=float(np.linalg.norm(middle - place["mid_psis"])),
         leg_length=legs,
         asis_to_trochanter={
-            s: given.get(f"{LETTER[s]}asistrocanterdistance".lower(), 0.1288 * legs[s] - 0.04856) for s in LETTER
+            s: given.get(f"{_LETTER[s]}asistrocanterdistance".lower(), 0.1288 * legs[s] - 0.04856) for s in _LETTER
         },
         shoulder_offset=offsets,
         widths=widths,
@@ -166,7 +271,7 @@ def measures(posture: StaticPosture, static: Trial, subject: Subject) -> Measure
     )
 
 
-def marker_leg(place: Mapping[str, Array], side: str) -> float:
+def _marker_leg(place: Mapping[str, Array], side: str) -> float:
     """Return the leg length between markers, m: ASIS to knee to ankle."""
     asis, knee, ankle = (place[f"{side}_{name}"] for name in ("asis", "knee_lateral", "ankle_lateral"))
     return float(np.linalg.norm(asis - knee) + np.linalg.norm(knee - ankle))
@@ -174,10 +279,10 @@ def marker_leg(place: Mapping[str, Array], side: str) -> float:
 
 def _contradictions(given: Mapping[str, float], width: float, place: Mapping[str, Array]) -> list[str]:
     """Return a warning for every typed measure that the markers contradict."""
-    checks = [("InterAsisDistance", given.get("interasisdistance"), width, ASIS_BETWEEN)]
-    for side, letter in LETTER.items():
+    checks = [("InterAsisDistance", given.get("interasisdistance"), width, _ASIS_BETWEEN)]
+    for side, letter in _LETTER.items():
         checks.append(
-            (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), marker_leg(place, side), LEG_BETWEEN)
+            (f"{letter}LegLength", given.get(f"{letter}leglength".lower()), _marker_leg(place, side), _LEG_BETWEEN)
         )
     return [
         f"Warning: {name} was typed as {1e3 * typed:.0f} mm, the markers are {1e3 * seen:.0f} mm apart: check "

@@ -2,20 +2,219 @@
 noise, all weighted in the same way.
 """
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.body.human.girths import CONTRADICTION, SegmentOpinion, girth_opinions, mean_fraction
-from biodance.body.human.scan import read_scan
-from biodance.body.human.scan_parts import ScannedBody, cut_scan
+from biodance.body.human.scan import ScannedBody, cut_scan, read_scan
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of
 from biodance.body.inertia import TENSOR, RigidInertia
-from biodance.body.tables.anthropometry import Reference, Sex, proportion, read_table
+from biodance.body.tables.anthropometry import Reference, Sex, proportion, read_table, row_numbers
+from biodance.body.tables.choice import PARTS, reference, studies, study_masses
+from biodance.body.tables.choice import parts as table_parts
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import SessionRefused
+from biodance.lab.shape import legal_girths, usual_girths
 from biodance.records import SIDES, Array, FootSizes, Subject
+
+WOMAN, MAN = Subject(65.0, 1.70, "F"), Subject(75.0, 1.75, "M")
+_LIVING = ("adult", "older")
+_OWN_CUT = ("chen_2011", "ma_2011", "pavol_2002")
+
+
+def published_fractions(kind: str, who: Subject) -> list[float]:
+    """Return the fractions by all tables and studies of living adults of one sex; for the trunk only those that cut
+    the pelvis themselves (Zatsiorsky's data are de Leva's; Winter's fractions count once, as the man's).
+    """
+    living = [
+        name for name, group in studies(who.sex).items() if group in _LIVING and name != "zatsiorsky_seluyanov_1979"
+    ]
+    own = [name for name in living if kind not in ("pelvis", "trunk_head") or name in _OWN_CUT]
+    masses = _studied(who.sex)
+    return [one.segments[kind].mass for one in published_people(who.sex)] + [masses[name][kind] for name in own]
+
+
+@functools.cache
+def published_people(sex: Sex) -> tuple[Reference, ...]:
+    """Return the reference people of the published tables for one sex (Winter's counts once, as the man's)."""
+    who = WOMAN if sex == "F" else MAN
+    tables = ("de_leva_1996", "dumas_2018", *(("winter_2009",) if sex == "M" else ()))
+    return tuple(reference(name, who) for name in tables)
+
+
+@functools.cache
+def _studied(sex: Sex) -> Mapping[str, dict[str, float]]:
+    """Return the mass fractions of every kind of segment by study of living adults."""
+    who = WOMAN if sex == "F" else MAN
+    return {name: study_masses(name, who) for name, group in studies(sex).items() if group in _LIVING}
+
+
+@functools.cache
+def _mean_fraction(kind: str, sex: Sex) -> tuple[float, float]:
+    """Return the mean of the published fractions of one sex and its standard error, relative."""
+    some = published_fractions(kind, MAN if sex == "M" else WOMAN)
+    return float(np.mean(some)), float(np.std(some, ddof=1) / np.mean(some) / np.sqrt(len(some)))
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact to degree 5; sections have degree 4 along the axis
+
+
+def stadium(girth: Array, aspect: Array) -> tuple[Array, Array]:
+    """Return radius r and half length t (n,) m of stadia from their girths (n,) m and breadth over depth (n,), at
+    least 1: girth = 2 pi r + 4 t, breadth over depth = (r + t) / r.
+    """
+    radius = np.asarray(girth) / (2 * np.pi + 4 * (np.asarray(aspect) - 1))
+    return radius, (np.asarray(aspect) - 1) * radius
+
+
+def stadium_stack(level: Array, girth: Array, aspect: Array, *, length: float) -> RigidInertia:
+    """Return volume (as ``mass``, m³), centroid and second moments of volume of a stack along -y from the origin.
+
+    Parameters
+    ----------
+    level : array_like
+        (n,) ascending, share of the length from the proximal end; the first section reaches up to 0, the last to 1.
+    girth : array_like
+        (n,) m.
+    aspect : array_like
+        (n,) breadth (z) over depth (x).
+    length : float
+        m.
+
+    Returns
+    -------
+    RigidInertia
+        x anterior, y up, z right, origin in the middle of the proximal section; inertia (m⁵) about the centroid.
+    """
+    radius, half = stadium(girth, aspect)
+    ends = np.unique(np.concatenate([[0.0], level, [1.0]]))
+    low, step = ends[:-1, None], np.diff(ends)[:, None]
+    place = (low + step * (1 + _NODES) / 2).ravel()
+    weight = (step * _WEIGHTS / 2).ravel() * length
+    r, t, y = np.interp(place, level, radius), np.interp(place, level, half), -place * length
+    area = np.pi * r**2 + 4 * r * t
+    volume = float(weight @ area)
+    middle = float(weight @ (area * y)) / volume
+    xx = weight @ (np.pi * r**4 / 4 + 4 * t * r**3 / 3)
+    zz = weight @ (np.pi * r**4 / 4 + 8 * t * r**3 / 3 + np.pi * r**2 * t**2 + 4 * r * t**3 / 3)
+    yy = weight @ (area * (y - middle) ** 2)
+    return RigidInertia(volume, np.array([0.0, middle, 0.0]), np.diag([yy + zz, xx + zz, xx + yy]))
+
+
+_CONTRADICTION = 0.15  # Share of the body mass by which girths, or a scan, may miss it
+_TRUNK = ("pelvis", "trunk_head")
+_HEAD = 0.16  # Of the stature: from the middle of the neck to the vertex
+_STEP = 0.01  # Of a girth: the step of a difference quotient
+
+
+@dataclass(frozen=True, eq=False)
+class _PartSolid:
+    """One part of a person: ``ratio`` of its volume to the mean person's, ``sd`` relative, of what the tape leaves
+    uncertain in it, ``said`` the girths it rests on.
+    """
+
+    ratio: float
+    sd: float
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _SegmentOpinion:
+    """One measurement of a segment: ``mass`` kg with ``mass_sd``, ``said`` the measures it rests on."""
+
+    mass: float
+    mass_sd: float
+    said: tuple[str, ...]
+
+
+def _girth_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) -> dict[str, _SegmentOpinion]:
+    """Return the masses from the subject's girths, by segment; segments without a measured girth are not in it."""
+    girths = legal_girths(subject.girths)
+    every = {segment: _opinion(segment, reference, skeleton, subject, girths) for segment in SEGMENTS}
+    opinions = {segment: one for segment, one in every.items() if one.said}
+    total = sum(one.mass for one in every.values())
+    if abs(total / subject.mass - 1) > _CONTRADICTION:
+        table = {segment: reference.segments[kind_of(segment)].mass * subject.mass for segment in opinions}
+        over = {segment: one.mass - table[segment] for segment, one in opinions.items()}
+        worst = max(over, key=lambda segment: abs(over[segment]))
+        raise SessionRefused(
+            f"[subject] girths_cm: the girths make a body of {total:.1f} kg, but the body mass is {subject.mass:.1f} "
+            f"kg ({100 * (total / subject.mass - 1):+.0f} %, at most {100 * _CONTRADICTION:.0f} % is believed). "
+            f"Farthest from the table: {worst} by {over[worst]:+.1f} kg ({', '.join(opinions[worst].said)}). Measure "
+            "these girths again, or correct mass_kg."
+        )
+    return opinions
+
+
+def _opinion(
+    segment: str, reference: Reference, skeleton: Skeleton, subject: Subject, girths: Mapping[str, float]
+) -> _SegmentOpinion:
+    kind, side = kind_of(segment), segment.removesuffix(kind_of(segment))
+    mine = {name: girths.get(f"{side}{name}", girths.get(name)) for name in usual_girths()}
+    person = {kind_of(one): length for one, length in skeleton.lengths.items() if one.startswith(side)}
+    survey = read_table("human", "girths").provenance["people"]["mass_kg"][subject.sex]
+    mean, mean_sd = _mean_fraction(kind, subject.sex)
+    shape, survey_sd = (error_size("solid_mass", what) for what in ("trunk" if kind in _TRUNK else "limb", "survey"))
+    own = np.linalg.norm([mean_sd, shape, survey_sd])
+    mass = variance = 0.0
+    said: tuple[str, ...] = ()
+    for part, share in _shares(kind, subject.sex).items():
+        solid = _part_solid(part, reference, subject, person | {"stature": skeleton.stature}, mine)
+        if solid is None:
+            one, sd = share * reference.segments[kind].mass * subject.mass, error_size("solid_mass", "untold part")
+        else:
+            one, sd = share * mean * survey * solid.ratio, np.hypot(own, solid.sd)
+            said += tuple(name for name in solid.said if name not in said)
+        mass, variance = mass + one, variance + (one * sd) ** 2
+    return _SegmentOpinion(mass, float(np.sqrt(variance)), said)
+
+
+def _shares(kind: str, sex: Sex) -> dict[str, float]:
+    """Return the parts of a segment that tapes go round, with their shares in its mass (de Leva 1996)."""
+    masses = {part: lump.mass for part, lump in table_parts(sex).items()}
+    shares: dict[str, float] = {}
+    for part in PARTS[kind]:
+        name = "upper_trunk" if part == "middle_trunk" else part
+        shares[name] = shares.get(name, 0.0) + masses[part] / sum(masses[one] for one in PARTS[kind])
+    return shares
+
+
+def _part_length(part: str, reference: Reference, sizes: Mapping[str, float]) -> float:
+    """Return the length of a part, m, of somebody of these lengths (by kind of segment) and ``stature``."""
+    cut = reference.lengths["pelvis"] / reference.lengths["trunk_head"]
+    trunk = {"lower_trunk": cut, "upper_trunk": 1 - cut}
+    if part in trunk:
+        return trunk[part] * sizes["trunk_head"]
+    return _HEAD * sizes["stature"] if part == "head" else sizes["forearm_hand" if part == "forearm" else part]
+
+
+def _part_solid(
+    part: str, reference: Reference, subject: Subject, sizes: Mapping[str, float], girths: Mapping[str, float | None]
+) -> _PartSolid | None:
+    """Return a part's stacks; None where no girth of it was measured or no tape goes round it."""
+    table = read_table("human", "girths")
+    rows = table.where(part=part)
+    given = np.array([girths[row["girth"]] is not None for row in rows])
+    if not given.any():
+        return None
+    level, aspect, usual = np.array([row_numbers(row, f"level aspect {subject.sex}") for row in rows]).T
+    measured = np.array([girths[row["girth"]] or one for row, one in zip(rows, usual, strict=True)])
+    predict = np.where(given[:, None], np.eye(len(rows)), given / given.sum())
+    girth = usual * np.exp(predict @ np.log(measured / usual))
+    grown = table.provenance["people"]["stature_m"][subject.sex] / reference.stature
+    people = {kind: grown * length for kind, length in reference.lengths.items()}
+    length = _part_length(part, reference, sizes)
+    usual_length = _part_length(part, reference, people | {"stature": grown * reference.stature})
+    volume = stadium_stack(level, girth, aspect, length=length).mass
+    mean = stadium_stack(level, usual, aspect, length=usual_length).mass
+    more = [girth * np.exp(_STEP * one) for one in np.eye(len(rows))]
+    slope = np.array([np.log(stadium_stack(level, one, aspect, length=length).mass / volume) / _STEP for one in more])
+    tape, untold = error_size("girth", "tape"), error_size("girth", "untold")
+    covariance = predict @ np.diag(given * tape**2) @ predict.T + np.diag(~given * untold**2)
+    said = tuple(row["girth"] for row, is_given in zip(rows, given, strict=True) if is_given)
+    return _PartSolid(volume / mean, float(np.sqrt(slope @ covariance @ slope)), said)
 
 
 def usual_outline(length: float, sex: Sex) -> FootSizes:
@@ -31,14 +230,10 @@ def sole_corners(outline: FootSizes, sex: Sex) -> Array:
     return np.array([(0.0, narrow), (ball, wide), (length, narrow), (length, -narrow), (ball, -wide), (0.0, -narrow)])
 
 
-def foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, SegmentOpinion]:
-    """Return what the outlines say about the masses of the feet.
-
-    The foot of the mean person of the survey of girths, whose fraction all tables and studies give, times the area of
-    the outline and the height of the ankle over those of that mean person.
-    """
+def _foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, _SegmentOpinion]:
+    """Return what the outlines say about the masses of the feet."""
     people = read_table("human", "girths").provenance["people"]
-    mean, mean_sd = mean_fraction("foot", subject.sex)
+    mean, mean_sd = _mean_fraction("foot", subject.sex)
     stature = people["stature_m"][subject.sex]
     usual = usual_outline(proportion("foot_length", subject.sex) * stature, subject.sex)
     height = proportion("ankle_height", subject.sex) * stature
@@ -47,7 +242,7 @@ def foot_opinions(skeleton: Skeleton, subject: Subject) -> dict[str, SegmentOpin
     for side in SIDES:
         area = _area(subject.foot_outline[side], subject.sex) / _area(usual, subject.sex)
         mass = mean * people["mass_kg"][subject.sex] * area * skeleton.ankle_height[side] / height
-        opinions[f"{side}_foot"] = SegmentOpinion(mass, float(own * mass), ("foot outline",))
+        opinions[f"{side}_foot"] = _SegmentOpinion(mass, float(own * mass), ("foot outline",))
     return opinions
 
 
@@ -63,7 +258,6 @@ _NEIGHBOURS = {
     "shoulder": ("trunk_head", "upper_arm"),
     "elbow": ("upper_arm", "forearm_hand"),
 }
-_TRUNK = ("pelvis", "trunk_head")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +282,12 @@ def body_opinions(reference: Reference, skeleton: Skeleton, subject: Subject) ->
     """
     opinions = []
     if subject.girths:
-        opinions.append(_of_masses(girth_opinions(reference, skeleton, subject)))
+        opinions.append(_of_masses(_girth_opinions(reference, skeleton, subject)))
     if subject.foot_outline:
-        opinions.append(_of_masses(foot_opinions(skeleton, subject)))
+        opinions.append(_of_masses(_foot_opinions(skeleton, subject)))
     if subject.scan:
         scan = read_scan(subject.scan, subject.stature, subject.scan_up)
-        opinions.append(scan_opinion(cut_scan(scan, skeleton), subject))
+        opinions.append(_scan_opinion(cut_scan(scan, skeleton), subject))
     return tuple(opinions)
 
 
@@ -103,7 +297,7 @@ def told_by(opinions: tuple[Opinion, ...]) -> dict[str, tuple[str, ...]]:
     return {name: words for name, words in sources.items() if words}
 
 
-def _of_masses(opinions: Mapping[str, SegmentOpinion]) -> Opinion:
+def _of_masses(opinions: Mapping[str, _SegmentOpinion]) -> Opinion:
     """Return opinions on masses; the sides err together: same tape, same shape of muscle."""
     kinds = np.array([kind_of(segment) for segment in opinions])
     sds = np.array([one.mass_sd for one in opinions.values()])
@@ -114,24 +308,15 @@ def _of_masses(opinions: Mapping[str, SegmentOpinion]) -> Opinion:
     return Opinion(where, value, together * np.outer(sds, sds), {name: one.said for name, one in opinions.items()})
 
 
-def scan_opinion(body: ScannedBody, subject: Subject) -> Opinion:
-    """Return what a cut scan says about mass, CoM and inertia of every segment.
-
-    Masses err with the density of their kind, with all volumes alike (clothes), and with every cut, which takes from
-    one segment what it gives to its neighbour.
-
-    Raises
-    ------
-    SessionRefused
-        Volumes times densities miss the body mass by more than 15 %.
-    """
+def _scan_opinion(body: ScannedBody, subject: Subject) -> Opinion:
+    """Return what a cut scan says about mass, CoM and inertia of every segment."""
     lumps = [body.lumps[name] for name in SEGMENTS]
     mass = np.array([lump.mass for lump in lumps])
-    if abs(mass.sum() / subject.mass - 1) > CONTRADICTION:
+    if abs(mass.sum() / subject.mass - 1) > _CONTRADICTION:
         raise SessionRefused(
             f"[subject] scan: the scan weighs {mass.sum():.1f} kg by volume and density, but the body mass is "
             f"{subject.mass:.1f} kg ({100 * (mass.sum() / subject.mass - 1):+.0f} %, at most "
-            f"{100 * CONTRADICTION:.0f} % is believed). Is it the same person, in tight clothes, and mass_kg right?"
+            f"{100 * _CONTRADICTION:.0f} % is believed). Is it the same person, in tight clothes, and mass_kg right?"
         )
     value = np.concatenate([primitives_of(lump) for lump in lumps])
     com_sd, share, sd = error_size("scan_com", "any"), error_size("scan_inertia", "any"), list[float]()

@@ -1,8 +1,5 @@
 """Joints that a body has only where the markers of a session show them: neck, collar bones, turning forearms, wrists.
-
-The twelve segments stay what is identified. Head, collar bone and hand become parts of trunk and forearm
-(`body.parts.Part`) with the table's share of them; a turning forearm is a second axis of the elbow. All these joints
-are zero in the static trial.
+The twelve segments stay what is identified.
 """
 
 from collections.abc import Mapping
@@ -19,19 +16,18 @@ from biodance.body.tables.anthropometry import read_table, row_numbers
 from biodance.body.tables.segment_data import read_segment_table
 from biodance.records import SIDES, Array
 
-NECK = 0.41
+_NECK = 0.41
 """Height, between shoulders and vertex, about which the head turns: the angle of the jaw (de Leva 1996: 0.39 men, 0.45
 women). Nodding is shared by all of the neck; about its base the head's weight would move twice as far as it does in
 virtual persons.
 """
-STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
+_STERNOCLAVICULAR = np.array([0.2, 0.0, 0.12])
 """Forwards, upwards and sideways from the middle of the shoulders, in half shoulder widths."""
 OPTIONAL_JOINTS = ("neck", "forearms", "wrists", "clavicles")
 """The joints that a body may have beyond its 23 axes."""
 _ACROMION = 0.5
 """Half shoulder widths from the shoulder's centre: so near, markers of the trunk ride on the collar bone."""
-_BEYOND_WRIST = 0.03
-"""m: markers of the forearm so far beyond the wrist are worn on the hand."""
+_BEYOND_WRIST = 0.03  # m: markers of the forearm so far beyond the wrist are worn on the hand
 _HEAD_MARKERS = 3
 
 
@@ -59,7 +55,7 @@ def neck_and_vertex(body: Body) -> tuple[Array, Array] | None:
     if middle is None:
         return None
     vertex = np.array([middle[0], body.boxes[body.segment_index("trunk_head"), 1, 1], 0.0])
-    return middle + NECK * (vertex - middle), vertex
+    return middle + _NECK * (vertex - middle), vertex
 
 
 def sternoclavicular(body: Body, side: str) -> Array:
@@ -68,7 +64,7 @@ def sternoclavicular(body: Body, side: str) -> Array:
     assert middle is not None
     _, shoulder = body.place_on_segment(body.joint_index(f"{side}_shoulder_flexion"))
     return np.asarray(
-        middle + abs(float(shoulder[2])) * STERNOCLAVICULAR * [1.0, 1.0, 1.0 if side == "right" else -1.0]
+        middle + abs(float(shoulder[2])) * _STERNOCLAVICULAR * [1.0, 1.0, 1.0 if side == "right" else -1.0]
     )
 
 

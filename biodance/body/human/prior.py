@@ -8,8 +8,16 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from biodance.body.human.girths import MAN, WOMAN, published_fractions, published_people
-from biodance.body.human.opinions import Opinion, body_opinions, primitives_of, told_by
+from biodance.body.human.opinions import (
+    MAN,
+    WOMAN,
+    Opinion,
+    body_opinions,
+    primitives_of,
+    published_fractions,
+    published_people,
+    told_by,
+)
 from biodance.body.human.skeleton import SEGMENTS, Skeleton, kind_of, side_of, upright_to
 from biodance.body.inertia import (
     TENSOR,
@@ -22,21 +30,19 @@ from biodance.body.inertia import (
     turn_inertia,
 )
 from biodance.body.tables.anthropometry import Reference, proportion
-from biodance.body.tables.choice import measured_whole
+from biodance.body.tables.choice import PARTS, measured_whole, regression, study_masses
+from biodance.body.tables.choice import lengths as reference_lengths
 from biodance.body.tables.choice import reference as reference_of
-from biodance.body.tables.de_leva import PARTS
-from biodance.body.tables.de_leva import lengths as reference_lengths
 from biodance.body.tables.error_sizes import error_size
-from biodance.body.tables.published import regression, study_masses
 from biodance.records import Array, Sip, Subject
 
 _AXES = ("sagittal", "longitudinal", "transverse")
 _BOTH = (WOMAN, MAN)
-TRUNK = ("pelvis", "trunk_head")
+_TRUNK = ("pelvis", "trunk_head")
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class _Spread:
     """Standard deviations of one kind of segment.
 
     ``mass`` relative; ``com`` (3,) in units of the length; ``radii`` (3,) relative, of the radii of gyration about x,
@@ -51,14 +57,14 @@ class Spread:
 
 
 @functools.cache
-def table_spread(kind: str) -> Spread:
+def _table_spread(kind: str) -> _Spread:
     """Return the standard deviations of one kind of segment (`KINDS`)."""
-    alike = kind not in TRUNK
+    alike = kind not in _TRUNK
     people = _by_sex([[_in_lengths(one, kind) for one in published_people(who.sex)] for who in _BOTH], alike)
     masses = _by_sex([published_fractions(kind, who) for who in _BOTH], alike)
     inner = _within(kind)
     tensors = [[unit.inertia for unit in units] for units in people]
-    return Spread(
+    return _Spread(
         float(np.hypot(_sd([np.array(one) / np.mean(one) for one in masses]), inner.mass)),
         np.hypot(_sd([[unit.com for unit in units] for units in people]), inner.com),
         np.hypot(_sd([[0.5 * np.log(np.diag(one)) for one in some] for some in tensors]), inner.radii),
@@ -67,9 +73,7 @@ def table_spread(kind: str) -> Spread:
 
 
 def _by_sex(groups: list[list[Any]], alike: bool) -> list[list[Any]]:
-    """Return the groups of women and men apart where the sexes are cut ``alike``, else together: where a table cuts
-    pelvis from trunk is no difference between the sexes, but one of its ways to cut.
-    """
+    """Return the groups of women and men apart where the sexes are cut ``alike``, else together."""
     return groups if alike else [[one for group in groups for one in group]]
 
 
@@ -90,7 +94,7 @@ def _in_lengths(person: Reference, kind: str) -> RigidInertia:
     return RigidInertia(1.0, (unit.com + base) / length, unit.inertia / length**2)
 
 
-def _within(kind: str) -> Spread:
+def _within(kind: str) -> _Spread:
     """Return the spread between men of one mass and stature; parts of a compound segment vary independently."""
     parts = PARTS[kind]
     mass, mass_sd = np.array([regression(part, "mass", "", MAN) for part in parts]).T
@@ -100,7 +104,7 @@ def _within(kind: str) -> Spread:
     along = np.array([com, 0.0, 0.0]) if kind == "foot" else np.array([0.0, com, 0.0])
     names = ("longitudinal", "sagittal", "transverse") if kind == "foot" else _AXES
     radii = np.array([share @ [_radius_sd(part, axis) for part in parts] for axis in names])
-    return Spread(float(np.linalg.norm(mass_sd) / mass.sum()), along, radii, np.zeros(3))
+    return _Spread(float(np.linalg.norm(mass_sd) / mass.sum()), along, radii, np.zeros(3))
 
 
 def _radius_sd(part: str, axis: str) -> float:
@@ -144,12 +148,7 @@ def prior(
 def _weigh(
     lumps: tuple[RigidInertia, ...], covariance: Array, apart: Array, opinions: tuple[Opinion, ...]
 ) -> tuple[tuple[RigidInertia, ...], Array]:
-    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after other opinions.
-
-    The sum of the masses is kept. The weights are those of ``apart`` (120, 120), in which segments hang together by
-    the body mass alone: that a thigh is like another table's says nothing about the foot. The covariance is that of
-    these weights (Joseph form).
-    """
+    """Return segments and covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] after other opinions."""
     where = np.concatenate([one.where for one in opinions])
     noise = block_diag(*(one.noise for one in opinions))
     theta = np.concatenate([primitives_of(lump) for lump in lumps])
@@ -163,14 +162,14 @@ def _weigh(
     return tuple(lump_from(row) for row in theta.reshape(-1, 10)), keep @ covariance @ keep.T + gain @ noise @ gain.T
 
 
-CHILD_AGE, CHILD_STATURE = 18.0, 1.50
+_CHILD_AGE, _CHILD_STATURE = 18.0, 1.50
 """years, m: below, a person is a child; the stature counts where the age is not known (1.50 m: one adult woman in
 twenty is smaller, ANSUR II 2012)."""
 
 
 def is_child(subject: Subject) -> bool:
     """Return whether age, or the stature of somebody whose age is not known, says child."""
-    return subject.stature < CHILD_STATURE if np.isnan(subject.age) else subject.age < CHILD_AGE
+    return subject.stature < _CHILD_STATURE if np.isnan(subject.age) else subject.age < _CHILD_AGE
 
 
 def child_widening(subject: Subject) -> float:
@@ -188,7 +187,7 @@ def _boys_widening() -> float:
     adult, boy = reference_of("de_leva_1996", MAN), study_masses("jensen_1986_12y", MAN)
     limbs = ("thigh", "shank", "foot", "upper_arm", "forearm_hand")
     apart = np.array([boy[kind] / adult.segments[kind].mass - 1.0 for kind in limbs])
-    spread = np.array([table_spread(kind).mass for kind in limbs])
+    spread = np.array([_table_spread(kind).mass for kind in limbs])
     return float(max(1.0, np.sqrt(np.mean((apart**2 + spread**2) / spread**2))))
 
 
@@ -227,7 +226,7 @@ def disagreement(lumps: tuple[RigidInertia, ...], other: tuple[RigidInertia, ...
     Zero for pelvis and trunk, which tables divide at different heights.
     """
     rows = [
-        np.zeros(10) if s in TRUNK else primitives_of(b) - primitives_of(a)
+        np.zeros(10) if s in _TRUNK else primitives_of(b) - primitives_of(a)
         for s, a, b in zip(SEGMENTS, lumps, other, strict=True)
     ]
     return np.concatenate(rows)
@@ -243,11 +242,11 @@ def primitive_covariance(
     """Return the covariance (120, 120) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of all segments (kg, m, m²); ``others``
     other tables'; ``least`` relative sd of the mass of a segment of one part.
 
-    The variance of ``primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest
+    The variance of ``_primitive_sd`` is divided: what the disagreement of the tables explains moves together, the rest
     on its own.
     """
     ways = np.array([disagreement(lumps, other) for other in others]).reshape(-1, 10 * len(lumps))
-    variance = np.concatenate([primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
+    variance = np.concatenate([_primitive_sd(s, lump, skeleton) for s, lump in zip(SEGMENTS, lumps, strict=True)]) ** 2
     floor = [least * lump.mass * (len(PARTS[kind_of(s)]) == 1) for s, lump in zip(SEGMENTS, lumps, strict=True)]
     variance[::10] = np.maximum(variance[::10], np.square(floor))
     own = np.sqrt(np.maximum(variance - np.sum(ways**2, axis=0), error_size("own_share", "variance") * variance))
@@ -266,12 +265,12 @@ def primitive_covariance(
 def com_sd(segment: str, skeleton: Skeleton) -> Array:
     """Return the standard deviations (3,) m of a segment's CoM in its frame: tables, people, misplaced joints."""
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
-    return np.hypot(table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
+    return np.hypot(_table_spread(kind_of(segment)).com * length, error_size("joint_centre", "other", state="before"))
 
 
-def primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
+def _primitive_sd(segment: str, lump: RigidInertia, skeleton: Skeleton) -> Array:
     """Return the standard deviations (10,) of [m, c, Jxx, Jxy, Jyy, Jxz, Jyz, Jzz] of a segment about its joint."""
-    kind, own = table_spread(kind_of(segment)), lump.inertia / lump.mass
+    kind, own = _table_spread(kind_of(segment)), lump.inertia / lump.mass
     length = skeleton.lengths["trunk_head" if segment == "pelvis" else segment]
     products = dict(zip(((0, 1), (0, 2), (1, 2)), kind.products, strict=True))
     tensor = [

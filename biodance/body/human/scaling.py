@@ -1,11 +1,8 @@
 """The human of one subject: joint centres, segment lengths, constant joint tilts and every marker from the static
 trial.
-
-The static posture is reached exactly by the body: whatever the joints cannot do (a knee has no varus, an ankle no
-torsion, an elbow no carrying angle) becomes a constant tilt of that joint, so that in the static trial every marker and
-joint centre has residual zero.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,26 +10,151 @@ import numpy as np
 
 from biodance.body.body import Body
 from biodance.body.human.human import assemble
-from biodance.body.human.limits import joint_limits, widen_limits
-from biodance.body.human.measures import Measures, measures
-from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_tree, kind_of
-from biodance.body.human.standing import StaticPosture, standing
-from biodance.body.human.static_centres import LIMB_ENDS, Centres, SegmentFrames, segment_frames, static_centres
-from biodance.body.human.unseen import widen_unseen, with_unseen_parts
+from biodance.body.human.measures import Measures, StaticPosture, harrington_hip, measures, pelvis_frame, standing, unit
+from biodance.body.human.skeleton import JOINTS, SEGMENTS, Skeleton, joint_limits, joint_tree, kind_of, widen_limits
+from biodance.body.human.static_centres import (
+    LIMB_ENDS,
+    SIGN,
+    UP,
+    Centres,
+    SegmentFrames,
+    segment_frames,
+    static_centres,
+)
 from biodance.body.parts import SegmentMarkers
 from biodance.body.tables.anthropometry import proportion
 from biodance.body.tables.choice import reference
+from biodance.body.tables.error_sizes import error_size
+from biodance.lab.markers.sets import usual_places
 from biodance.records import SIDES, Array, Subject, Trial
 from biodance.settings import STANDARD_GRAVITY
 from biodance.spatial import elementary_rotation, zxy_angles
 
+_THORAX = ("c7", "jugular_notch", "t10", "xiphoid")
+_ARM = ("upper_arm", "forearm_hand")
+_ARM_JOINTS = {side: (f"{side}_shoulder", f"{side}_elbow") for side in SIDES}
+"""The anatomical joints of an arm, held where it is not seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Upright:
+    """The upright frame over a standing pelvis: ``middle`` (3,) m between the hips, unit vectors ``ahead`` and
+    ``right``; ``sizes`` m by normaliser of the marker sets.
+    """
+
+    middle: Array
+    ahead: Array
+    right: Array
+    sizes: Mapping[str, float]
+
+    def turned(self, offset: Array) -> Array:
+        """Return an offset (anterior, up, right) m in the lab frame."""
+        return np.asarray(offset[0] * self.ahead + offset[1] * UP + offset[2] * self.right)
+
+    def usual(self, landmark: str) -> Array:
+        """Return the usual place (3,) m of a landmark from the origin of its offset, lab frame."""
+        marker = usual_places()[landmark]
+        return self.turned(np.array(marker.offset) * self.sizes[marker.normaliser])
+
+
+def _with_unseen_parts(posture: StaticPosture, lengths: Mapping[str, float]) -> StaticPosture:
+    """Return the posture with the landmarks of shoulders and arms that have no marker, put where they usually are."""
+    mark = dict(posture.landmarks)
+    upright = _upright(mark, lengths)
+    unseen, notes = _trunk(mark, upright)
+    hidden: list[str] = []
+    for side in SIDES:
+        hidden += _arm(mark, upright, side)
+    segments = {f"{side}_{part}" for side in hidden for part in _ARM}
+    worn = {marker.label for marker in posture.marker_set.markers if marker.segment in segments}
+    points = {label: place for label, place in posture.points.items() if label not in worn}
+    unseen += [joint for side in hidden for joint in _ARM_JOINTS[side]]
+    if hidden:
+        notes.append(
+            f"The {' and '.join(hidden)} arm{'s carry' if len(hidden) > 1 else ' carries'} no markers that "
+            "place elbow and wrist: taken as hanging straight and carried by the trunk as one piece, at the mass of "
+            "the table. How arms swing is not in the simulated wrench."
+        )
+    return replace(posture, points=points, landmarks=mark, unseen=tuple(unseen), notes=(*posture.notes, *notes))
+
+
+def _widen_unseen(body: Body, unseen: tuple[str, ...]) -> Body:
+    """Return the body with wider standard deviations of where the mass of its unseen parts is."""
+    sizes = {f"{side}_{part}": "arm" for side in SIDES for part in _ARM if f"{side}_elbow" in unseen}
+    sizes |= {"trunk_head": "trunk_head"} if "trunk" in unseen else {}
+    if not sizes:
+        return body
+    covariance = np.array(body.sip.covariance)
+    for segment, kind in sizes.items():
+        k = body.segments.index(segment)
+        moments = np.arange(10 * k + 1, 10 * k + 4)
+        covariance[moments, moments] += (body.sip.mass[k] * error_size("unseen_com", kind)) ** 2
+    return replace(body, sip=replace(body.sip, covariance=covariance))
+
+
+def _upright(mark: Mapping[str, Array], lengths: Mapping[str, float]) -> _Upright:
+    rotation, middle = pelvis_frame(mark["right_asis"], mark["left_asis"], mark["mid_psis"])
+    width = float(np.linalg.norm(mark["right_asis"] - mark["left_asis"]))
+    local = harrington_hip(width, float(np.linalg.norm(middle - mark["mid_psis"])))
+    right = unit(rotation[:, 2] * [1.0, 1.0, 0.0])
+    sizes = {f"{kind.removesuffix('_hand')}_length": lengths[kind] for kind in _ARM}
+    sizes["trunk_length"] = lengths["trunk_head"]
+    return _Upright(middle + rotation @ (local * [1.0, 1.0, 0.0]), np.cross(UP, right), right, sizes)
+
+
+def _trunk(mark: dict[str, Array], upright: _Upright) -> tuple[list[str], list[str]]:
+    """Put the acromia that are not seen; return whether the trunk's joint is held, and what that costs."""
+    absent = [side for side in SIDES if f"{side}_acromion" not in mark]
+    if not absent:
+        return [], []
+    if len(absent) == 1 and "jugular_notch" in mark:
+        seen = next(side for side in SIDES if side not in absent)
+        across = 2 * ((mark[f"{seen}_acromion"] - mark["jugular_notch"]) @ upright.right) * upright.right
+        mark[f"{absent[0]}_acromion"] = mark[f"{seen}_acromion"] - across
+        return [], [f"The {absent[0]} acromion has no marker: taken as the mirror image of the other."]
+    thorax = [name for name in _THORAX if name in mark]
+    shoulders = upright.middle + upright.sizes["trunk_length"] * UP
+    if thorax:
+        shoulders = np.mean([mark[name] - upright.usual(name) for name in thorax], axis=0)
+    for side in absent:
+        mark[f"{side}_acromion"] = shoulders + upright.usual(f"{side}_acromion")
+    if len(thorax) >= 3:
+        return [], [f"The acromia have no markers: shoulders placed by proportion from {', '.join(thorax)}."]
+    return ["trunk"], [
+        "The trunk carries too few markers to be followed: trunk, head and arms are one piece of the table's "
+        "size and mass that stays upright over the pelvis and faces where it goes. How they really lean and turn is "
+        "not in the simulated wrench, so horizontal forces and moments prove little."
+    ]
+
+
+def _arm(mark: dict[str, Array], upright: _Upright, side: str) -> list[str]:
+    """Put the landmarks of an arm that is not seen, hanging straight; return the side if it is not seen."""
+    radial, ulnar = f"{side}_wrist_radial", f"{side}_wrist_ulnar"
+    wrist = [mark[name] for name in (radial, ulnar) if name in mark]
+    if f"{side}_elbow_lateral" in mark and wrist:
+        mark |= {radial: mark.get(radial, wrist[0]), ulnar: mark.get(ulnar, wrist[0])}
+        return []
+    out = SIGN[side] * upright.right
+    under = upright.usual(f"{side}_acromion") @ UP
+    elbow = mark[f"{side}_acromion"] - under * UP - upright.sizes["upper_arm_length"] * UP
+    half = 0.15 * upright.sizes["upper_arm_length"]
+    for name, height, across in (
+        ("elbow_lateral", 0.0, half),
+        ("elbow_medial", 0.0, -half),
+        ("wrist_radial", upright.sizes["forearm_length"], half / 2),
+        ("wrist_ulnar", upright.sizes["forearm_length"], -half / 2),
+    ):
+        mark[f"{side}_{name}"] = elbow - height * UP + across * out
+    return [side]
+
+
 _ANKLE_HEIGHT = (0.04, 0.12)
 """m: an ankle centre so high over z = 0 of the lab is taken to stand on that floor."""
-TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 45.0}
+_TILT = {"knee": 15.0, "elbow": 25.0, "ankle": 45.0}
 """deg: larger constant tilts of a joint point to a misplaced marker. Of 60 ankles of 15 public laboratories without a
 fault there the largest stands 40 degrees away, of 60 elbows 24.
 """
-LENGTH_RATIO = {
+_LENGTH_RATIO = {
     "thigh": (0.19, 0.29),
     "shank": (0.19, 0.29),
     "upper_arm": (0.12, 0.22),
@@ -64,9 +186,9 @@ class Scaling:
     def body(self) -> tuple[Body, Array]:
         """Return the scaled body and its posture q (30,) in the static trial, meeting all markers exactly."""
         frames = segment_frames(self.centres)
-        skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
+        skeleton = _static_skeleton(frames, self.posture, self.sizes, self.subject)
         doubts = _doubts(skeleton, self.subject, self.centres)
-        markers = calibrated_markers(frames, self.posture)
+        markers = _calibrated_markers(frames, self.posture)
         notes = (*self.notes, *doubts)
         body = assemble(self.subject, skeleton, table=self.table, markers=markers, notes=notes, gravity=self.gravity)
         return self._standing(replace(body, joint_errors=self.centres.errors), frames)
@@ -77,8 +199,8 @@ class Scaling:
         boxes, soles and notes stay those of the present centres.
         """
         frames = segment_frames(centres)
-        skeleton = static_skeleton(frames, self.posture, self.sizes, self.subject)
-        markers, limits = calibrated_markers(frames, self.posture), joint_limits(self.subject)
+        skeleton = _static_skeleton(frames, self.posture, self.sizes, self.subject)
+        markers, limits = _calibrated_markers(frames, self.posture), joint_limits(self.subject)
         joints = joint_tree(skeleton)
         return self._standing(replace(self._present, joints=joints, markers=markers, limits=limits), frames)
 
@@ -87,13 +209,11 @@ class Scaling:
         return self.body()[0]
 
     def _standing(self, body: Body, frames: SegmentFrames) -> tuple[Body, Array]:
-        """Return a body whose limits allow its posture in the static trial, unseen parts held as they stand, and that
-        posture.
-        """
-        q = static_posture(body, frames)
+        """Return a body whose limits allow its static posture, unseen parts held, and that posture."""
+        q = _static_posture(body, frames)
         limits, widened = widen_limits(body, q)
         body = replace(body, limits=limits, notes=(*body.notes, *widened))
-        return widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
+        return _widen_unseen(body, self.posture.unseen).holding(self.posture.unseen, q), q
 
 
 def measure_static(subject: Subject, static: Trial) -> Scaling:
@@ -108,7 +228,7 @@ def measure_static(subject: Subject, static: Trial) -> Scaling:
     usual = reference(table, subject)
     lengths = usual.lengths
     tall = subject.stature / usual.stature
-    posture = with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
+    posture = _with_unseen_parts(standing(static), {kind: tall * length for kind, length in lengths.items()})
     sizes = measures(posture, static, subject)
     centres = static_centres(
         posture.landmarks, sizes, hip=hip, trunk_fraction=lengths["pelvis"] / lengths["trunk_head"], flat=posture.still
@@ -155,7 +275,7 @@ def scale(subject: Subject, static: Trial) -> Body:
     return measure_static(subject, static).body()[0]
 
 
-def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> SegmentMarkers:
+def _calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> SegmentMarkers:
     """Return every marker of the set that was seen and counts, at its place in its segment."""
     worn = [one for one in posture.marker_set.markers if one.label in posture.points and one.weight > 0]
     local = [frames.rotation[m.segment].T @ (posture.points[m.label] - frames.origin[m.segment]) for m in worn]
@@ -167,7 +287,7 @@ def calibrated_markers(frames: SegmentFrames, posture: StaticPosture) -> Segment
     )
 
 
-def static_skeleton(frames: SegmentFrames, posture: StaticPosture, sizes: Measures, subject: Subject) -> Skeleton:
+def _static_skeleton(frames: SegmentFrames, posture: StaticPosture, sizes: Measures, subject: Subject) -> Skeleton:
     """Return the sizes of the skeleton in the static trial."""
 
     def local(segment: str, point: Array) -> Array:
@@ -218,7 +338,7 @@ def _foot(
     return length, height, float(-heel[0]) - sizes.marker_radius
 
 
-def static_posture(body: Body, frames: SegmentFrames) -> Array:
+def _static_posture(body: Body, frames: SegmentFrames) -> Array:
     """Return q (30,) of the body in the static trial."""
     from scipy.spatial.transform import Rotation
 
@@ -250,9 +370,9 @@ def chain_angles(relative: Array, axes: Array) -> Array:
 
 
 def tilted_joints(body: Body) -> tuple[str, ...]:
-    """Return the hinges of a ``body`` that stand away from their axes (`TILT`) in the static trial: ``left_elbow``."""
+    """Return the hinges of a ``body`` that stand away from their axes (`_TILT`) in the static trial: ``left_elbow``."""
     first = {joint.name.rsplit("_", 1)[0]: joint.rotation for joint in reversed(body.joints)}
-    hinges = ((f"{side}_{joint}", most) for side in SIDES for joint, most in TILT.items())
+    hinges = ((f"{side}_{joint}", most) for side in SIDES for joint, most in _TILT.items())
     return tuple(name for name, most in hinges if name in first and _tilt(first[name]) > most)
 
 
@@ -265,7 +385,7 @@ def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[str]
     """Return warnings about lengths, sides and tilts that no person has."""
     notes = []
     for segment in SEGMENTS:
-        low, high = (ratio * subject.stature for ratio in LENGTH_RATIO.get(kind_of(segment), (0.0, 1.0)))
+        low, high = (ratio * subject.stature for ratio in _LENGTH_RATIO.get(kind_of(segment), (0.0, 1.0)))
         if not low < skeleton.lengths[segment] < high:
             notes.append(
                 f"Warning: {segment} is {skeleton.lengths[segment]:.3f} m long, {low:.2f} to {high:.2f} m would be "
@@ -280,7 +400,7 @@ def _doubts(skeleton: Skeleton, subject: Subject, centres: Centres) -> list[str]
             )
     for joint, rotation in skeleton.turns.items():
         tilt = _tilt(rotation)
-        if tilt > TILT[joint.split("_")[1]]:
+        if tilt > _TILT[joint.split("_")[1]]:
             notes.append(
                 f"Warning: {joint.replace('_', ' ')} stands {tilt:.0f} degrees away from its axes: check the markers "
                 f"beside it and the wand above it."

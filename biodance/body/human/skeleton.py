@@ -1,13 +1,24 @@
-"""The joint tree of the human from its sizes: where each joint sits and how its axes turn."""
+"""The joint tree of the human from its sizes: where each joint sits, how its axes turn and how far."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import isnan
+from typing import Literal
 
 import numpy as np
 
-from biodance.body.parts import Joint
-from biodance.body.tables.anthropometry import KINDS, Reference, proportion, read_table, row_numbers
+from biodance.body.body import Body
+from biodance.body.parts import Joint, JointLimits
+from biodance.body.tables.anthropometry import (
+    KINDS,
+    AnthropometricTable,
+    Reference,
+    proportion,
+    read_table,
+    row_numbers,
+)
 from biodance.records import SIDES, Array, Subject
+from biodance.settings import STANDARD_GRAVITY
 
 SEGMENTS = (
     *("pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head"),
@@ -120,3 +131,126 @@ def cut_at_joint(skeleton: Skeleton) -> Skeleton:
     longer = (above + float(skeleton.cut["trunk_head"][1])) / above
     stretched = {"pelvis": pelvis / lengths["pelvis"], "trunk_head": longer}
     return replace(skeleton, cut={}, lengths={**lengths, "pelvis": pelvis}, stretched=stretched)
+
+
+_REFERENCE_MASS = {"F": 65.0, "M": 75.0}
+"""kg: the bodies for which joints_23.csv gives torques; other bodies in proportion to mass."""
+Range = Literal["anatomical", "comfortable"]
+
+# Anderson's joint and direction -> movement and sign in the model; the ankle flexes (dorsiflexion) upwards
+_ANDERSON = {
+    ("hip", "flexion"): ("hip_flexion", 1),
+    ("hip", "extension"): ("hip_flexion", -1),
+    ("knee", "flexion"): ("knee_flexion", 1),
+    ("knee", "extension"): ("knee_flexion", -1),
+    ("ankle", "flexion"): ("ankle_dorsiflexion", 1),
+    ("ankle", "extension"): ("ankle_dorsiflexion", -1),
+}
+
+
+def joint_limits(subject: Subject, *, within: Range = "anatomical") -> JointLimits:
+    """Return the limits of the 23 joints of a person.
+
+    ``within="anatomical"`` is what a healthy adult's joint allows (for inverse kinematics), ``"comfortable"`` what he
+    or she reaches without effort (for designed motions). Speed 4 rad/s (Bonnet 2016). Torques: hip flexion, knee and
+    ankle dorsiflexion from Anderson 2007 (C1 * mass * g * stature) by sex and age; all others from ``joints_23.csv`` in
+    proportion to body mass, times the same age factor (mean over Anderson's six torques against 18-25 years). Unknown
+    age counts as 25.
+    """
+    table = read_table("human", "joints_23")
+    low, high = {
+        "anatomical": ("range_min_deg", "range_max_deg"),
+        "comfortable": ("comfort_min_deg", "comfort_max_deg"),
+    }[within]
+    word = {"F": "woman", "M": "man"}[subject.sex]
+    ranges = np.radians([row_numbers(row, f"{low} {high}") for row in table.rows])
+    velocity = [float(row["velocity_rad_s"]) for row in table.rows]
+    torque = np.array([row_numbers(row, f"torque_min_{word}_Nm torque_max_{word}_Nm") for row in table.rows])
+    anderson = read_table("human", "anderson_2007")
+    young = replace(subject, age=25.0)
+    ratios = [_coefficient(anderson, subject, *one) / _coefficient(anderson, young, *one) for one in _ANDERSON]
+    torque *= subject.mass / _REFERENCE_MASS[subject.sex] * float(np.mean(ratios))
+    names = [row["joint"].split("_", 1)[1] for row in table.rows]
+    for (joint, direction), (movement, sign) in _ANDERSON.items():
+        peak = peak_torque(anderson, subject, joint, direction)
+        for i, name in enumerate(names):
+            if name == movement:
+                torque[i, (sign + 1) // 2] = sign * peak
+    return JointLimits(ranges[:, 0], ranges[:, 1], np.array(velocity), torque[:, 0], torque[:, 1])
+
+
+def peak_torque(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
+    """Return the largest isometric torque, N·m > 0: C1 * mass * g * stature, C1 linear between 25, 60 and 70 years."""
+    return _coefficient(anderson, subject, joint, direction) * subject.mass * STANDARD_GRAVITY * subject.stature
+
+
+def _coefficient(anderson: AnthropometricTable, subject: Subject, joint: str, direction: str) -> float:
+    rows = anderson.where(joint=joint, direction=direction, sex=subject.sex)
+    age = 25.0 if isnan(subject.age) else subject.age
+    return float(np.interp(age, [25.0, 60.0, 70.0], [float(row["C1"]) for row in rows]))
+
+
+_HAND_TURN = np.radians(120.0)
+"""rad either way: the model has no pronation, so with a straight elbow a turning hand is seen as a turning shoulder; a
+narrower limit makes the arm jump to the other set of angles that reaches the same hand (seen in a real walk).
+"""
+_LOADED_ANKLE = np.radians(40.0)
+"""rad: dorsiflexion under body weight with a bent knee, as on stairs and in squats (weight-bearing lunge, Bennell et
+al. 1998); the tables give the unloaded joint's 20 to 25 deg.
+"""
+_BEYOND = np.radians(25.0)
+"""rad: how far a joint of the model may pass the anatomical range of the joint whose name it has: trunk and girdle bend
+in many places where the model has one joint, marker sets turn the axes, and skin slides.
+"""
+_HELD = ("_knee_flexion", "_elbow_flexion", "_shoulder_rotation")
+"""Ends of the names of joints that do not go further: hinges, and the shoulder's turn, as wide as the hand's."""
+_SPARE = np.radians(5.0)  # rad: how far a joint range is widened beyond the angle of the static trial
+
+
+def widen_limits(body: Body, q: Array) -> tuple[JointLimits, tuple[str, ...]]:
+    """Return the limits for tracking: counted from this person's upright pelvis, the static posture ``SPARE`` inside
+    them, the shoulder turning as far as the hand does, the ankle bending as far as under load, and all but knees,
+    elbows and that turn by ``BEYOND`` more. The notes name what this posture changed.
+
+    Clinical ranges of hip and trunk count from upright standing, ISB angles from the plane of the pelvis markers, which
+    stands tilted.
+    """
+    angle, names, tilt = q[body.nq - len(body.joints) :], [joint.name for joint in body.joints], standing_tilt(q)
+
+    def named(*ends: str) -> Array:
+        return np.array([name.endswith(ends) for name in names], dtype=float)
+
+    shift = tilt * (named("_hip_flexion") - named("trunk_flexion"))
+    lower, upper = body.limits.lower + np.minimum(shift, 0.0), body.limits.upper + np.maximum(shift, 0.0)
+    upper = np.where(named("_ankle_dorsiflexion"), np.maximum(upper, _LOADED_ANKLE), upper)
+    lower, upper = (
+        np.where(named("_shoulder_rotation"), *pair) for pair in ((-_HAND_TURN, lower), (_HAND_TURN, upper))
+    )
+    free = _BEYOND * (1.0 - named(*_HELD))
+    lower, upper = lower - free, upper + free
+    low, high = np.minimum(lower, angle - _SPARE), np.maximum(upper, angle + _SPARE)
+    notes = tuple(
+        f"Range of {name.replace('_', ' ')} widened to {round(np.degrees(low[i]))} to {round(np.degrees(high[i]))} "
+        f"degrees: {round(np.degrees(angle[i]))} degrees when standing."
+        for i, name in enumerate(names)
+        if low[i] < lower[i] or high[i] > upper[i]
+    )
+    lean = round(np.degrees(tilt))
+    way = "backwards" if lean < 0 else "forwards"
+    tilted = (
+        f"Pelvis markers stand tilted {abs(lean)} degree{'s' * (abs(lean) != 1)} {way}: ranges of hip and trunk "
+        "flexion are widened by as much."
+    )
+    return replace(body.limits, lower=low, upper=high), (tilted, *notes)
+
+
+def with_tracking_limits(body: Body) -> Body:
+    """Return a body without a static trial with the limits for tracking, counted from the neutral posture."""
+    return replace(body, limits=widen_limits(body, body.neutral)[0])
+
+
+def standing_tilt(q: Array) -> float:
+    """Return the forward tilt, rad, of the pelvis in a posture q: how far its x axis points below the horizontal."""
+    from scipy.spatial.transform import Rotation
+
+    return -float(np.arcsin(Rotation.from_quat(q[3:7]).as_matrix()[2, 0]))

@@ -24,9 +24,9 @@ from biodance.spatial import elementary_rotation
 
 SIGN = {"right": 1.0, "left": -1.0}
 UP = np.array([0.0, 0.0, 1.0])
-WRIST_BAR = 0.03
+_WRIST_BAR = 0.03
 """m: wrist markers this much farther apart than markers on the styloids would be sit on a bar."""
-AXIS_TOLERANCE = 30.0
+_AXIS_TOLERANCE = 30.0
 """deg: a thigh marker that turns the knee's axis further, seen from above, is not believed."""
 LIMB_ENDS = {
     "thigh": ("hip", "knee"),
@@ -35,7 +35,7 @@ LIMB_ENDS = {
     "forearm_hand": ("elbow", "wrist"),
 }
 """The joints at both ends of the limbs that people have as long on the right as on the left."""
-Places = Mapping[str, Array]
+_Places = Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +53,25 @@ class Centres:
     pelvis.
     """
 
-    place: Places
-    right: Places
+    place: _Places
+    right: _Places
     axis_sd: Mapping[str, float]
-    lateral: Places
+    lateral: _Places
     pelvis: Array
-    across: Places
+    across: _Places
     cut: float
     notes: tuple[str, ...]
     errors: tuple[JointError, ...] = ()
     contradicted: tuple[str, ...] = ()
     mid_hip: Array | None = None
-    sole: Places = field(default_factory=dict)
+    sole: _Places = field(default_factory=dict)
 
     def sd(self, joint: str) -> float:
         """Return the standard deviation (m per axis) of a joint's centre, after a movement has placed it or before."""
         return next((one.centre for one in self.errors if one.joint == joint), static_sd(joint))
 
     def sides_sd(self, limb: str) -> float:
-        """Return the standard deviation (m) of how much longer a ``limb`` (thigh, shank, ...) is on the right: of
-        people, and of the joint centres at its ends.
-        """
+        """Return the sd (m) of how much longer a ``limb`` is on the right: of people, and of joint centres."""
         ends = (self.sd(f"{side}_{joint}") for side in SIGN for joint in LIMB_ENDS[limb])
         return float(np.linalg.norm([error_size("side_length", "limb"), *ends]))
 
@@ -86,16 +84,16 @@ def static_sd(joint: str) -> float:
     return error_size("hinge_centre", "hinge", state="before") if hinge else joint_size("joint_centre", joint)
 
 
-def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True) -> Centres:
+def static_centres(mark: _Places, sizes: Measures, *, hip: Hip, trunk_fraction: float, flat: bool = True) -> Centres:
     """Return the joint centres from the landmarks ``mark`` name -> (3,) m.
 
     Hip: regressions. Knee, ankle, elbow: middle of lateral and medial marker, or the constructions of plug-in gait.
     Trunk: on the line from mid hip to mid shoulder, at ``trunk_fraction`` of it, where the table cuts the trunk.
     ``flat``: the feet stand flat; otherwise each lies as its heel and toe markers do.
     """
-    pelvis, hips = hip_centres(mark, sizes, hip=hip)
+    pelvis, hips = _hip_centres(mark, sizes, hip=hip)
     middle = (hips["right"] + hips["left"]) / 2
-    shoulders = shoulder_centres(mark, sizes, middle)
+    shoulders = _shoulder_centres(mark, sizes, middle)
     place = {"trunk": middle + trunk_fraction * ((shoulders["right"] + shoulders["left"]) / 2 - middle)}
     right, axis_sd, lateral, across, sole = {}, {}, {}, {}, {}
     notes: list[str] = []
@@ -105,7 +103,7 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
         place |= {
             f"{side}_hip": hips[side],
             f"{side}_knee": knee,
-            f"{side}_ankle": ankle_centre(mark, sizes, knee, side),
+            f"{side}_ankle": _ankle_centre(mark, sizes, knee, side),
         }
         place[f"{side}_shoulder"] = shoulders[side]
         place[f"{side}_elbow"], place[f"{side}_wrist"] = arm_centres(mark, sizes, shoulders[side], side)
@@ -121,7 +119,7 @@ def static_centres(mark: Places, sizes: Measures, *, hip: Hip, trunk_fraction: f
     return Centres(place, right, axis_sd, lateral, pelvis, across, trunk_fraction, tuple(notes), sole=sole)
 
 
-def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
+def _hip_centres(place: _Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dict[str, Array]]:
     """Return lab_R_pelvis (3, 3) and the hip centres by side, m."""
     rotation, middle = pelvis_frame(place["right_asis"], place["left_asis"], place["mid_psis"])
     legs = float(np.mean(list(sizes.leg_length.values())))
@@ -136,7 +134,7 @@ def hip_centres(place: Places, sizes: Measures, *, hip: Hip) -> tuple[Array, dic
     return rotation, centres
 
 
-def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
+def _shoulder_centres(place: _Places, sizes: Measures, mid_hip: Array) -> dict[str, Array]:
     """Return the shoulder centres by side, m: chord from the jugular notch, or straight under the acromion."""
     right, left = place["right_acromion"], place["left_acromion"]
     if all(name in place for name in ("c7", "t10", "jugular_notch", "xiphoid")):
@@ -153,11 +151,11 @@ def shoulder_centres(place: Places, sizes: Measures, mid_hip: Array) -> dict[str
     return {side: shoulder(base, forward, place[f"{side}_acromion"], offset[side], side=SIGN[side]) for side in SIGN}
 
 
-def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
+def knee_centre(place: _Places, sizes: Measures, hip: Array, pelvis_right: Array, side: str) -> tuple[Array, str]:
     """Return the knee centre, m, and what had to be assumed: the middle of the epicondyles, or a chord with the thigh
     marker.
 
-    A thigh marker that would turn the knee's axis further than ``AXIS_TOLERANCE`` from square to the line of march
+    A thigh marker that would turn the knee's axis further than ``_AXIS_TOLERANCE`` from square to the line of march
     (mean of pelvis and foot) was not placed for plug-in gait: the axis is then taken square to that line.
     """
     lateral = place[f"{side}_knee_lateral"]
@@ -174,7 +172,7 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
     centre = chord(hip, lateral, distance, place[f"{side}_thigh_wand"])
     axis = SIGN[side] * (lateral - centre)
     angle = float(np.degrees(np.arctan2(UP @ np.cross(across, axis), across @ axis - (across @ UP) * (axis @ UP))))
-    if abs(angle) <= AXIS_TOLERANCE:
+    if abs(angle) <= _AXIS_TOLERANCE:
         return centre, ""
     return usual, (
         f"Warning: the {side} thigh marker would turn the knee's axis {abs(angle):.0f} deg from square to the line of "
@@ -183,7 +181,7 @@ def knee_centre(place: Places, sizes: Measures, hip: Array, pelvis_right: Array,
     )
 
 
-def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Array:
+def _ankle_centre(place: _Places, sizes: Measures, knee: Array, side: str) -> Array:
     """Return the ankle centre, m: middle of the malleoli, or chord with the shank marker, or with the knee's axis."""
     lateral = place[f"{side}_ankle_lateral"]
     if f"{side}_ankle_medial" in place:
@@ -192,7 +190,7 @@ def ankle_centre(place: Places, sizes: Measures, knee: Array, side: str) -> Arra
     return chord(knee, lateral, sizes.widths[f"{side}_ankle"] / 2 + sizes.marker_radius, outside)
 
 
-def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
+def arm_centres(place: _Places, sizes: Measures, shoulder_at: Array, side: str) -> tuple[Array, Array]:
     """Return elbow and wrist centre, m: the elbow in the middle of its epicondyle markers, or by the plug-in-gait
     construction.
 
@@ -206,7 +204,7 @@ def arm_centres(place: Places, sizes: Measures, shoulder_at: Array, side: str) -
         return (lateral + place[f"{side}_elbow_medial"]) / 2, middle
     at = elbow(shoulder_at, lateral, middle, sizes.widths[f"{side}_elbow"] / 2 + sizes.marker_radius, side=SIGN[side])
     reach = sizes.widths[f"{side}_wrist"] / 2 + sizes.marker_radius
-    if np.linalg.norm(radial - ulnar) < 2 * reach + WRIST_BAR:
+    if np.linalg.norm(radial - ulnar) < 2 * reach + _WRIST_BAR:
         return at, middle
     return at, wrist(at, radial, ulnar, reach, side=SIGN[side])
 
@@ -217,9 +215,9 @@ class SegmentFrames:
     proximal joint centre); ``ends`` side_wrist -> (3,) m; ``cut`` (3,) m where the table cuts pelvis from trunk.
     """
 
-    rotation: Places
-    origin: Places
-    ends: Places
+    rotation: _Places
+    origin: _Places
+    ends: _Places
     cut: Array
 
 
@@ -235,7 +233,7 @@ def segment_frames(centres: Centres) -> SegmentFrames:
     hips, shoulders = ((at[f"right_{joint}"] + at[f"left_{joint}"]) / 2 for joint in ("hip", "shoulder"))
     hips = hips if centres.mid_hip is None else centres.mid_hip
     axis = shoulders - hips
-    rotation = {"pelvis": centres.pelvis, "trunk_head": frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
+    rotation = {"pelvis": centres.pelvis, "trunk_head": _frame_yz(axis, at["right_shoulder"] - at["left_shoulder"])}
     origin = {"pelvis": hips, "trunk_head": at["trunk"]}
     for side in SIGN:
         for names, joints in (
@@ -251,12 +249,12 @@ def segment_frames(centres: Centres) -> SegmentFrames:
                 centres.right[f"{side}_{joints[1]}"],
             )
         origin[f"{side}_foot"] = at[f"{side}_ankle"]
-        rotation[f"{side}_foot"] = frame_yz(centres.sole.get(side, UP), centres.across[side])
+        rotation[f"{side}_foot"] = _frame_yz(centres.sole.get(side, UP), centres.across[side])
     ends = {f"{side}_wrist": at[f"{side}_wrist"] for side in SIGN}
     return SegmentFrames(rotation, origin, ends, hips + centres.cut * axis)
 
 
-def frame_yz(up: Array, right: Array) -> Array:
+def _frame_yz(up: Array, right: Array) -> Array:
     """Return (3, 3) with y along ``up``, z as near to ``right`` as it can be, x forwards."""
     y = unit(up)
     x = unit(np.cross(y, right))
@@ -272,7 +270,7 @@ def _chain(
 ) -> None:
     """Fill in the two segments of a limb: the second flexes about z of the first, tilted about its own x (varus)."""
     (upper, lower), (top, middle, end) = names, centres
-    rotation[upper], origin[upper], origin[lower] = frame_yz(top - middle, right), top, middle
+    rotation[upper], origin[upper], origin[lower] = _frame_yz(top - middle, right), top, middle
     direction = rotation[upper].T @ unit(middle - end)
     flexion, varus = np.arctan2(-direction[0], direction[1]), np.arcsin(direction[2])
     rotation[lower] = rotation[upper] @ elementary_rotation("z", flexion) @ elementary_rotation("x", varus)

@@ -10,7 +10,7 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.inertia import RigidInertia, inertial_parameters, turn_inertia
 from biodance.body.parts import UPRIGHT, Foot, Joint, JointLimits, SegmentMarkers
-from biodance.body.robot.prior import robot_covariance
+from biodance.body.robot.similarity import robot_covariance
 from biodance.body.tables.anthropometry import TableRow, read_table, row_numbers
 from biodance.records import SIDES, Array, Sip
 from biodance.spatial import elementary_rotation
@@ -19,7 +19,7 @@ _SEGMENTS = (
     "pelvis", "right_thigh", "right_shank", "right_foot", "left_thigh", "left_shank", "left_foot", "trunk_head",
     "right_upper_arm", "right_forearm_hand", "left_upper_arm", "left_forearm_hand",
 )  # fmt: skip
-CARRIES = {
+_CARRIES = {
     "hip_pitch": "thigh",
     "knee_pitch": "shank",
     "ankle_roll": "foot",
@@ -27,16 +27,13 @@ CARRIES = {
     "elbow_pitch": "forearm_hand",
 }
 """The last joint before each segment."""
-_SPEED = 1.0
-"""rad/s, the limit that Bonnet 2016 used for this robot."""
-LEG_BASE, ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
+_SPEED = 1.0  # rad/s, the limit that Bonnet 2016 used for this robot
+_LEG_BASE, _ARM_BASE = np.array([-0.035, -0.055, 0.0]), np.array([-0.035, 0.0, 0.125])
 """m: where legs start in the pelvis (ISB axes) and arms in the trunk (forwards, left, up); Fujitsu, table 6.1-2."""
-_SHOULDER = 0.111
-"""m, from the middle to either shoulder."""
-_ANKLE_HEIGHT, SOLE_AHEAD, SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
+_SHOULDER = 0.111  # m, from the middle to either shoulder
+_ANKLE_HEIGHT, _SOLE_AHEAD, _SOLE_WIDE = 0.040, (-0.040, 0.068), 0.036
 """m: sole under the ankle, from heel to toe, half its width about its middle line."""
-_COM_SD = 0.010
-"""m, prior standard deviation of every centre of mass; the others in `robot_prior`."""
+_COM_SD = 0.010  # m, prior standard deviation of every centre of mass; the others in `robot_prior`
 
 
 def hoap3() -> Body:
@@ -49,12 +46,13 @@ def hoap3() -> Body:
     columns = "x_min y_min z_min x_max y_max z_max"
     boxes = np.array([row_numbers(row, columns) for row in corners]).reshape(-1, 2, 3)
     phi = np.concatenate([inertial_parameters(lump) for lump in lumps])
+    low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
     return Body(
         "HOAP-3",
         _SEGMENTS,
         joints,
         Sip(_SEGMENTS, phi, robot_covariance(lumps, [_COM_SD] * len(lumps))),
-        _limits(rows),
+        JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque),
         SegmentMarkers((), (), np.empty((0, 3)), np.empty(0)),
         boxes,
         boxes,
@@ -82,7 +80,7 @@ def _joints() -> tuple[Joint, ...]:
         if kind in ("hip_yaw", "shoulder_pitch"):
             parent, base, place = _base(kind, side, joints)
             rotation, translation = base @ rotation, place + base @ translation
-        carried = _SEGMENTS.index(f"{side}_{CARRIES[kind]}") if kind in CARRIES else -1
+        carried = _SEGMENTS.index(f"{side}_{_CARRIES[kind]}") if kind in _CARRIES else -1
         joints.append(Joint(name, parent, z, rotation, translation, carried))
     return tuple(joints)
 
@@ -92,9 +90,9 @@ def _base(kind: str, side: str, joints: list[Joint]) -> tuple[int, Array, Array]
     z = np.array([0.0, 0.0, 1.0])
     tilt = elementary_rotation("x", -np.pi / 2)
     if kind == "hip_yaw":
-        return -1, tilt @ elementary_rotation("z", np.pi / 2), LEG_BASE
+        return -1, tilt @ elementary_rotation("z", np.pi / 2), _LEG_BASE
     waist = next(i for i, joint in enumerate(joints) if joint.name == "waist_pitch")
-    return waist, tilt, ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
+    return waist, tilt, _ARM_BASE + tilt @ (z * (_SHOULDER if side == "left" else -_SHOULDER))
 
 
 def _zero_posture(joints: tuple[Joint, ...]) -> dict[str, Array]:
@@ -116,14 +114,9 @@ def _lump(row: TableRow, turn: Array) -> RigidInertia:
     return turn_inertia(RigidInertia(mass, np.array(com), inertia), turn.T)
 
 
-def _limits(rows: list[TableRow]) -> JointLimits:
-    low, high, torque = np.array([row_numbers(row, "lower_deg upper_deg torque_nm") for row in rows]).T
-    return JointLimits(np.radians(low), np.radians(high), np.full(len(rows), _SPEED), -torque, torque)
-
-
 def _sole(side: str) -> Foot:
     """Return the sole in the foot's frame (x up, z forwards), counter-clockwise seen from above."""
     middle = 0.005 if side == "right" else -0.005
-    heel, toe = SOLE_AHEAD
-    corners = [(heel, -SOLE_WIDE), (heel, SOLE_WIDE), (toe, SOLE_WIDE), (toe, -SOLE_WIDE)]
+    heel, toe = _SOLE_AHEAD
+    corners = [(heel, -_SOLE_WIDE), (heel, _SOLE_WIDE), (toe, _SOLE_WIDE), (toe, -_SOLE_WIDE)]
     return Foot(_SEGMENTS.index(f"{side}_foot"), np.array([[-_ANKLE_HEIGHT, middle + y, z] for z, y in corners]))

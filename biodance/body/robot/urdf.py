@@ -11,14 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.body.changes import place_at_zero
 from biodance.body.export import refuse_impossible
-from biodance.body.frames import place_at_zero
 from biodance.body.inertia import RigidInertia, combine_inertias, inertial_parameters, turn_inertia
 from biodance.body.parts import NO_SEGMENT, Foot, Joint, JointLimits, SegmentMarkers
-from biodance.body.robot.prior import com_deviation, extended, is_point, is_possible, robot_covariance, solid
-from biodance.body.robot.similarity import reframed
-from biodance.body.robot.sole import match_faces, sole_outline
-from biodance.body.robot.urdf_file import Connection, UrdfFile, read_urdf_file
+from biodance.body.robot.similarity import (
+    com_deviation,
+    extended,
+    is_point,
+    is_possible,
+    reframed,
+    robot_covariance,
+    solid,
+)
+from biodance.body.robot.urdf_file import Connection, UrdfFile, match_faces, read_urdf_file, sole_outline
 from biodance.errors import BiodanceError, FileRefused, known_index
 from biodance.records import SIDES, Array, Sip
 
@@ -113,11 +119,7 @@ def _body(file: UrdfFile, joints: list[Joint], limits: JointLimits, heavy: list[
 
 
 def _tree(file: UrdfFile) -> tuple[list[Joint], JointLimits, list[_Carrier], dict[str, _Carrier]]:
-    """Return joints, limits, the links that move and, of every link, the one that carries it.
-
-    A joint is followed by all that hangs on it, as pinocchio's algorithms need it; joints on one link keep the order of
-    the file.
-    """
+    """Return joints, limits, the links that move and, of every link, the one that carries it."""
     first = _Carrier(_root(file), -1, [])
     owner, frame = {first.link: first}, {first.link: (np.eye(3), np.zeros(3))}
     joints, rows, carriers, waiting = list[Joint](), list[Connection](), [first], _on(file, first.link)
@@ -230,9 +232,7 @@ def _backwards(feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]],
 def _soles(
     file: UrdfFile, feet: dict[str, _Carrier], place: dict[str, tuple[Array, Array]], axes: Array
 ) -> dict[str, Array]:
-    """Return the outlines (P, 3) m of both soles in the frames of the feet; ``axes`` (3, 3), rows: forwards, up and to
-    the right in the root's frame.
-    """
+    """Return the outlines (P, 3) m of both soles; ``axes`` (3, 3) rows: forwards, up, right of the root."""
     soles = {}
     for side, carrier in feet.items():
         if not carrier.corners.size:

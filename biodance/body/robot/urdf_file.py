@@ -5,29 +5,164 @@ fixed) with their placements and limits. Transmissions, sensors and colours do n
 wiki.ros.org/urdf/XML.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, fromstring
 
 import numpy as np
 
 from biodance.body.inertia import RigidInertia
-from biodance.body.robot.sole import mesh_file, mesh_hull
+from biodance.body.solids import read_mesh
 from biodance.errors import FileRefused
 from biodance.library import refuse_special
 from biodance.records import Array
 from biodance.spatial import axis_rotation, elementary_rotation
 
-_KINDS = ("revolute", "continuous", "fixed")
-"""Types of joints that a body can have."""
-_TURN = np.pi
-"""rad: range of a continuous joint to either side."""
-_X = np.array([1.0, 0.0, 0.0])
-"""Axis of a joint that names none."""
+_PACKAGE = "package://"
+
+
+def mesh_file(urdf: Path, name: str) -> Path:
+    """Return the file that a mesh's ``filename`` means: a path beside the URDF, or ``package://NAME/PATH`` in a folder
+    above it.
+
+    The package is looked for by its name in all folders that hold the URDF, and as one of these folders itself.
+
+    Raises
+    ------
+    FileRefused
+        There is no such file; the message says where it was looked for.
+    """
+    plain = name.removeprefix("file://").removeprefix("model://")
+    places = [urdf.parent / plain]
+    if name.startswith(_PACKAGE):
+        package, _, rest = name.removeprefix(_PACKAGE).partition("/")
+        above = urdf.resolve().parents
+        places = [*(one / package / rest for one in above), *(one / rest for one in above if one.name == package)]
+    for place in places:
+        if place.is_file():
+            return place
+    raise FileRefused(
+        f"the mesh {name!r} is not where {urdf} says. Put it beside the URDF, or below a folder "
+        f"{urdf.resolve().parent} is in"
+    )
+
+
+@lru_cache(maxsize=256)
+def _mesh_hull(path: Path, scale: tuple[float, float, float]) -> Array:
+    """Return the corners (K, 3) m of the convex hull of a mesh times ``scale`` m; of a flat one, all corners."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    corners = np.unique(np.array(read_mesh(path, scale=np.array(scale)).vertices), axis=0)
+    with suppress(QhullError, ValueError):
+        corners = corners[ConvexHull(corners).vertices]
+    corners.setflags(write=False)
+    return np.asarray(corners)
+
+
+_FLAT = 0.0005  # m: corners of a foot of boxes this near to the plane of its sole belong to it
+_LAYER = 0.002
+"""m: corners of a mesh this near to its lowest plane belong to the sole; meshes have rounded edges."""
+_STEEPEST = 0.5  # Cosine of the largest angle between a sole and the ground at zero joint angles
+CORNERS = 12
+"""A sole keeps at most so many corners, those that leave it largest, all on its outline: support is not overrated."""
+
+
+def sole_outline(where: str, boxes: list[Array], hulls: list[Array], axes: Array) -> Array:
+    """Return the sole (P, 3) m of a foot, counter-clockwise from above: the face of its shapes that lies lowest and
+    nearest to horizontal.
+
+    Parameters
+    ----------
+    where
+        File and foot, for messages.
+    boxes, hulls
+        Corners (8, 3) of boxes and (K, 3) of convex hulls of meshes, m, in the frame of the foot.
+    axes
+        (3, 3), rows: forwards, up and to the right at zero joint angles, in the frame of the foot.
+
+    Raises
+    ------
+    FileRefused
+        No face points to the ground, or the lowest layer is a point or a line.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    (ahead, up, right), corners = axes, np.concatenate([*boxes, *hulls])
+    down = _down(boxes, hulls, up)
+    if -down @ up < _STEEPEST:
+        raise FileRefused(
+            f"{where} has no face that points to the ground at zero joint angles. Give it a collision <box>."
+        )
+    low = corners[corners @ down > (corners @ down).max() - (_LAYER if hulls else _FLAT)]
+    flat = np.stack([low @ ahead, -(low @ right)], axis=1)  # x forwards, y left: counter-clockwise is from above
+    try:
+        outline = ConvexHull(flat).vertices
+    except (QhullError, ValueError) as error:
+        raise FileRefused(f"{where} stands on a point or an edge, not on a face. Give it a collision <box>.") from error
+    return np.asarray(low[_largest(flat, outline.tolist())])
+
+
+def match_faces(one: Array, other: Array) -> tuple[Array, Array]:
+    """Return two outlines with equally many points: the poorer one gets the middles of its longest edges."""
+    most = max(len(one), len(other))
+    return _refined(one, most), _refined(other, most)
+
+
+def _down(boxes: list[Array], hulls: list[Array], up: Array) -> Array:
+    """Return the outward normal (3,) of the most horizontal face; of meshes, of the largest one within the limit."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if not hulls:
+        normals = np.concatenate([_normals(corners) for corners in boxes])
+        return np.asarray(normals[np.argmax(-normals @ up)])
+    points = np.concatenate([*boxes, *hulls])
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return -up  # a flat mesh is a sole by itself
+    normals = hull.equations[:, :3]
+    edges = points[hull.simplices]
+    area = np.linalg.norm(np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0]), axis=1) / 2
+    alike = normals @ normals.T > np.cos(np.radians(2.0))
+    face = np.where(-normals @ up > _STEEPEST, alike @ area, 0.0)
+    best = int(np.argmax(face))
+    mean = (alike[best] * area) @ normals
+    return np.asarray(mean / np.linalg.norm(mean)) if face[best] > 0 else np.asarray(normals[np.argmax(-normals @ up)])
+
+
+def _normals(corners: Array) -> Array:
+    """Return the outward normals (6, 3) of a box from its corners (8, 3), ordered as `urdf_file` does."""
+    axes = np.array([corners[4] - corners[0], corners[2] - corners[0], corners[1] - corners[0]])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return np.concatenate([axes, -axes])
+
+
+def _largest(flat: Array, outline: list[int]) -> list[int]:
+    """Return at most `CORNERS` indices of a convex ``outline`` into ``flat`` (K, 2): the least important go first."""
+    while len(outline) > CORNERS:
+        here, before, after = flat[outline], flat[np.roll(outline, 1)], flat[np.roll(outline, -1)]
+        (ax, ay), (bx, by) = (here - before).T, (after - before).T
+        outline.pop(int(np.argmin(np.abs(ax * by - ay * bx))))
+    return outline
+
+
+def _refined(outline: Array, count: int) -> Array:
+    while len(outline) < count:
+        following = np.roll(outline, -1, axis=0)
+        i = int(np.argmax(np.linalg.norm(following - outline, axis=1)))
+        outline = np.insert(outline, i + 1, (outline[i] + following[i]) / 2, axis=0)
+    return outline
+
+
+_KINDS = ("revolute", "continuous", "fixed")  # Types of joints that a body can have
+_TURN = np.pi  # rad: range of a continuous joint to either side
+_X = np.array([1.0, 0.0, 0.0])  # Axis of a joint that names none
 
 
 @dataclass(frozen=True, eq=False)
-class Link:
+class _Link:
     """One link: ``lump`` in the link's frame, None without mass; of its collision (else visual) shapes, in the link's
     frame: ``shapes`` corners (8, 3) m of the boxes around those that are no meshes, ``hulls`` corners (K, 3) m of the
     convex hulls of those that are; ``unread`` why a mesh could not be read.
@@ -67,7 +202,7 @@ class UrdfFile:
 
     path: Path
     name: str
-    links: dict[str, Link]
+    links: dict[str, _Link]
     connections: tuple[Connection, ...]
 
 
@@ -122,16 +257,16 @@ def placement(path: Path, element: Element, what: str) -> tuple[Array, Array]:
     return turn, _row(path, origin, "xyz", what, "0 0 0")
 
 
-def _link(path: Path, element: Element) -> Link:
+def _link(path: Path, element: Element) -> _Link:
     name = element.get("name") or ""
     what = f"link {name!r}"
     lump, unread = _lump(path, element.find("inertial"), what), list[str]()
     for kind in ("collision", "visual"):
         elements = element.findall(kind)
-        shapes, hulls = _shapes(path, elements, what), mesh_hulls(path, elements, what, unread)
+        shapes, hulls = _shapes(path, elements, what), _mesh_hulls(path, elements, what, unread)
         if shapes or hulls:
-            return Link(name, lump, shapes, hulls)
-    return Link(name, lump, (), (), tuple(unread))
+            return _Link(name, lump, shapes, hulls)
+    return _Link(name, lump, (), (), tuple(unread))
 
 
 def _lump(path: Path, inertial: Element | None, what: str) -> RigidInertia | None:
@@ -174,7 +309,7 @@ def _shapes(path: Path, elements: list[Element], what: str) -> tuple[Array, ...]
     return tuple(boxes)
 
 
-def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
+def _mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]) -> tuple[Array, ...]:
     """Return the corners (K, 3) m of the convex hulls of all meshes; why one cannot be read goes to ``unread``."""
     hulls = []
     for element in elements:
@@ -184,7 +319,7 @@ def mesh_hulls(path: Path, elements: list[Element], what: str, unread: list[str]
         scale = _row(path, mesh, "scale", what, "1 1 1")
         turn, place = placement(path, element, what)
         try:
-            hulls.append(mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
+            hulls.append(_mesh_hull(mesh_file(path, mesh.get("filename", "")), tuple(scale)) @ turn.T + place)
         except FileRefused as error:
             unread.append(str(error))
     return tuple(hulls)
@@ -230,9 +365,7 @@ def _connection(path: Path, element: Element, links: set[str]) -> Connection:
 
 
 def _limits(path: Path, element: Element, kind: str, what: str) -> tuple[float, float, float, float] | None:
-    """Return lower, upper, velocity and effort of a joint; None if it has neither of the last two and zero is in its
-    range: a finger that is drawn and never moves.
-    """
+    """Return lower, upper, velocity and effort of a joint; None for one drawn and never moved."""
     limit = element.find("limit")
     if limit is None:
         raise FileRefused(

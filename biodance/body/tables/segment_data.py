@@ -1,10 +1,4 @@
-"""FAMILY: tables of segment parameters, one tidy .csv each with a .toml of its provenance beside it.
-
-One row is one number: ``segment, sex, quantity, axis, value, unit``; further columns may be left out or empty:
-``study`` and ``group`` (a file of several studies), ``per_kg`` and ``per_m`` (a regression: value + per_kg * mass +
-per_m * stature), ``sd``, ``n``, ``correlation``, ``landmarks``. Found in ``anthropometry/segments``, by the entry
-points ``biodance.segment_tables``, or by the path of a user's own file.
-"""
+"""FAMILY: tables of segment parameters, one tidy .csv each with a .toml of its provenance beside it."""
 
 import csv
 import functools
@@ -24,23 +18,23 @@ from biodance.library import read_toml
 from biodance.records import Subject
 
 FAMILY = DataFamily("table of segment inertial parameters", "biodance.segment_tables", "anthropometry/segments", ".csv")
-REQUIRED = ("segment", "sex", "quantity", "axis", "value", "unit")
-OPTIONAL = ("study", "group", "per_kg", "per_m", "sd", "n", "correlation", "landmarks")
-SEXES = ("F", "M", "FM")
-ALONG = ("sagittal", "transverse", "longitudinal")
+_REQUIRED = ("segment", "sex", "quantity", "axis", "value", "unit")
+_OPTIONAL = ("study", "group", "per_kg", "per_m", "sd", "n", "correlation", "landmarks")
+_SEXES = ("F", "M", "FM")
+_ALONG = ("sagittal", "transverse", "longitudinal")
 _TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 _LEGAL: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "mass": (("",), ("body_mass", "kg")),
     "length": (("",), ("m", "stature")),
     "com": (("longitudinal", "x", "y", "z"), ("length", "m")),
-    "gyration": ((*ALONG, "transverse_proximal", "x", "y", "z", *_TENSOR), ("length", "m")),
-    "inertia": (ALONG, ("kg m2",)),
+    "gyration": ((*_ALONG, "transverse_proximal", "x", "y", "z", *_TENSOR), ("length", "m")),
+    "inertia": (_ALONG, ("kg m2",)),
 }
 """The legal axes and units of every quantity; a unit such as ``length`` means a fraction of it."""
 
 
 @dataclass(frozen=True)
-class Number:
+class _Number:
     """One number: ``value`` in ``unit``; ``per_kg``, ``per_m`` its regression on mass and stature; ``sd`` or NaN."""
 
     value: float
@@ -54,27 +48,27 @@ class Number:
         return self.value + self.per_kg * subject.mass + self.per_m * subject.stature
 
 
-NumberKey = tuple[str, str, str, str, str]
+_NumberKey = tuple[str, str, str, str, str]
 
 
 @dataclass(frozen=True, eq=False)
 class SegmentTable:
     """One table: ``numbers`` by study (""), segment, sex ("F" or "M"), quantity and axis; ``groups`` of its studies
-    (adult, child ...) by study and sex; ``layout`` says how its segments lie in the model (`segment_tables.LAYOUTS`);
+    (adult, child ...) by study and sex; ``layout`` says how its segments lie in the model (`tables.choice`);
     ``provenance`` the .toml.
     """
 
     name: str
-    numbers: Mapping[NumberKey, Number]
+    numbers: Mapping[_NumberKey, _Number]
     groups: Mapping[tuple[str, str], str] = field(default_factory=dict)
     layout: str = "model"
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
-    def find(self, segment: str, quantity: str, axis: str = "", *, sex: str, study: str = "") -> Number | None:
+    def find(self, segment: str, quantity: str, axis: str = "", *, sex: str, study: str = "") -> _Number | None:
         """Return one number; None where the table does not have it."""
         return self.numbers.get((study, segment, sex, quantity, axis))
 
-    def number(self, segment: str, quantity: str, axis: str = "", *, sex: str, study: str = "") -> Number:
+    def number(self, segment: str, quantity: str, axis: str = "", *, sex: str, study: str = "") -> _Number:
         """Return one number; UnknownName where the table does not have it."""
         found = self.find(segment, quantity, axis, sex=sex, study=study)
         if found is None:
@@ -134,7 +128,7 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
     provenance = read_toml(beside) if beside.is_file() else {}
     if "sha256" in provenance:
         refuse_changed(path, provenance["sha256"])
-    numbers: dict[NumberKey, Number] = {}
+    numbers: dict[_NumberKey, _Number] = {}
     groups: dict[tuple[str, str], str] = {}
     for line, row in _rows(path):
         for sex in row["sex"]:
@@ -146,7 +140,7 @@ def _read(name: str, path: Path, own: bool, _stamps: tuple[int, ...]) -> Segment
             numbers[key] = _number(path, line, row)
             groups[row["study"], sex] = row["group"]
     if not numbers:
-        raise FileRefused(f"{path}: the table has no row. Write one row per number: {', '.join(REQUIRED)}.")
+        raise FileRefused(f"{path}: the table has no row. Write one row per number: {', '.join(_REQUIRED)}.")
     layout = str(provenance.get("layout", "model"))
     return SegmentTable(name, MappingProxyType(numbers), MappingProxyType(groups), layout, MappingProxyType(provenance))
 
@@ -155,12 +149,12 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     """Return the rows of a table, checked, each with its line in the file; what a file leaves out is empty."""
     reader = csv.DictReader(io.StringIO(read_text(path)))
     columns = tuple(reader.fieldnames or ())
-    absent = [name for name in REQUIRED if name not in columns]
-    unknown = [name for name in columns if name not in (*REQUIRED, *OPTIONAL)]
+    absent = [name for name in _REQUIRED if name not in columns]
+    unknown = [name for name in columns if name not in (*_REQUIRED, *_OPTIONAL)]
     if absent or unknown:
         what = f"lacks the column {absent[0]!r}" if absent else f"has the unknown column {unknown[0]!r}"
         raise FileRefused(
-            f"{path}: the table {what}. Legal are {', '.join(REQUIRED)}, and optional {', '.join(OPTIONAL)}."
+            f"{path}: the table {what}. Legal are {', '.join(_REQUIRED)}, and optional {', '.join(_OPTIONAL)}."
         )
     rows = []
     for line, cells in enumerate(reader, start=2):
@@ -168,7 +162,7 @@ def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
             raise FileRefused(
                 f"{path}, row {line}: has not {len(columns)} cells as the header has. Correct its commas."
             )
-        row = dict.fromkeys(OPTIONAL, "") | {name: str(cell).strip() for name, cell in cells.items()}
+        row = dict.fromkeys(_OPTIONAL, "") | {name: str(cell).strip() for name, cell in cells.items()}
         _refuse_illegal(path, line, row)
         rows.append((line, row))
     return rows
@@ -179,7 +173,7 @@ def _refuse_illegal(path: Path, line: int, row: Mapping[str, str]) -> None:
     quantity = row["quantity"]
     axes, units = _LEGAL.get(quantity, ((row["axis"],), (row["unit"],)))
     for column, what, legal in (
-        ("sex", "sex", SEXES),
+        ("sex", "sex", _SEXES),
         ("quantity", "quantity", tuple(_LEGAL)),
         ("axis", f"axis of {quantity}", axes),
         ("unit", f"unit of {quantity}", units),
@@ -191,7 +185,7 @@ def _refuse_illegal(path: Path, line: int, row: Mapping[str, str]) -> None:
         raise FileRefused(f"{path}, row {line}: names no segment. Write its name.")
 
 
-def _number(path: Path, line: int, row: Mapping[str, str]) -> Number:
+def _number(path: Path, line: int, row: Mapping[str, str]) -> _Number:
     """Return the number of a row; FileRefused where a cell is no number, or none that can be."""
     found = {}
     for name in ("value", "per_kg", "per_m", "sd"):
@@ -211,4 +205,4 @@ def _number(path: Path, line: int, row: Mapping[str, str]) -> Number:
         )
     if found.get("sd", 0.0) < 0:
         raise FileRefused(f"{path}, row {line}: the sd of {row['segment']} is {row['sd']}, expected 0 or more.")
-    return Number(unit=row["unit"], **found)
+    return _Number(unit=row["unit"], **found)

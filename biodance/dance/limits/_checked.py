@@ -13,9 +13,8 @@ from biodance.body.body import Body
 from biodance.body.inertia import rigid_inertia
 from biodance.body.parts import GRAVITY
 from biodance.dance.problem.stance import Stance, support_depth
-from biodance.motion.dynamics import distribute, joint_torques
+from biodance.motion.dynamics import distribute, joint_torques, predict_wrench
 from biodance.motion.kinematics import Poses, poses
-from biodance.motion.regressor import predict_wrench
 from biodance.records import SIDES, Array, Motion, Wrench
 
 

@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from biodance.body.body import Body
+from biodance.body.body import Body, load_pinocchio
 from biodance.body.parts import GRAVITY, UPRIGHT
-from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
-from biodance.motion.ik.general_legs import GeneralLeg
-from biodance.motion.ik.legs import Leg
+from biodance.motion.ik.legs import GeneralLeg, Leg
 from biodance.records import SIDES, Array, Motion
 from biodance.spatial import axis_rotation
 from biodance.threads import Sendable

@@ -50,7 +50,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from biodance.body.human.limits import Range
+from biodance.body.human.skeleton import Range
 from biodance.dance.limits import Limit, family, join_limits, limits_with
 from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError, UnknownName

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.pinocchio_model import load_pinocchio
+from biodance.body.body import load_pinocchio
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance, foot_forces
 from biodance.records import Array

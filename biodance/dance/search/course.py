@@ -14,8 +14,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.body.body import Body
-from biodance.body.body_file import body_text
+from biodance.body.body import Body, body_text
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import Blocks, excitation_blocks

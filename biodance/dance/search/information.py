@@ -13,8 +13,8 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.splines import rest_to_rest
 from biodance.identification.posterior import prior_factor
+from biodance.motion.dynamics import regressor
 from biodance.motion.kinematics import poses
-from biodance.motion.regressor import regressor
 from biodance.records import Array
 
 SAMPLE_ERROR = np.array([8.0, 8.0, 8.0, 4.0, 4.0, 4.0])

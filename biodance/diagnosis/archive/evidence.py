@@ -13,7 +13,7 @@ import numpy as np
 
 from biodance.diagnosis.archive.quantities import PlateEvidence, PlateVisit
 from biodance.diagnosis.archive.walking import StepRow, of_steps, placed, step_rows
-from biodance.lab.markers.still import is_still, standing_mass
+from biodance.lab.markers.upright import is_still, standing_mass
 from biodance.lab.plates.decode import block_means, find_baseline
 from biodance.observations import recording
 from biodance.records import Array, Plate, Trial

@@ -10,7 +10,7 @@ from biodance.diagnosis.archive.changes import ALARM, ALL, Change, History, Stra
 from biodance.diagnosis.archive.conditions import ConditionEffect, condition_effects, without_conditions
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES, PlateEvidence, PlateVisit, in_order
 from biodance.diagnosis.archive.series import series_of
-from biodance.settings.groups import STANDARD_GRAVITY
+from biodance.settings import STANDARD_GRAVITY
 from biodance.threads import one_thread
 
 _HORIZONTAL = ("offset_x", "offset_y")

@@ -10,9 +10,9 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.effects._base.geometry import Geometry, GeometryChanges, geometry
 from biodance.errors import TrialRefused, UnknownName
-from biodance.lab.filters import motion_filter
+from biodance.lab.prepare import motion_filter
+from biodance.motion.dynamics import wrench_of_segments
 from biodance.motion.kinematics import Poses, SegmentMotion, poses, segment_motion
-from biodance.motion.regressor import wrench_of_segments
 from biodance.records import Array, Motion, Plate, Trial, Wrench, freeze
 from biodance.spatial import wrench_about_point
 

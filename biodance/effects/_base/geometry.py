@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.changes import carried_by, neutral_turn
 from biodance.effects._base.moved_geometry import MovedMatter, PostureSensitivity, centres_of, moved_matter, wrench_of
-from biodance.lab.filters import LowPass
+from biodance.lab.prepare import LowPass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, chains, jacobian
 from biodance.records import Array, Index, Motion
 from biodance.spatial import skew

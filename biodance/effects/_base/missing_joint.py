@@ -17,12 +17,11 @@ from biodance.body.body import Body
 from biodance.effects._base.case import Case
 from biodance.effects._base.effect import Effect
 from biodance.errors import TrialRefused
-from biodance.lab.filters import LowPass, low_pass, motion_filter
+from biodance.lab.prepare import LowPass, low_pass, motion_filter
+from biodance.motion.dynamics import wrench_of_segments
 from biodance.motion.ik.inverse_kinematics import solve_ik
 from biodance.motion.kinematics import SegmentMotion, chains, poses, segment_motion
-from biodance.motion.regressor import wrench_of_segments
-from biodance.motion.smoothing import smooth
-from biodance.motion.track import track
+from biodance.motion.track import smooth, track
 from biodance.records import Array, Markers
 
 _RATE = 25.0

@@ -26,7 +26,7 @@ from scipy.interpolate import make_interp_spline
 
 from biodance.body.body import Body
 from biodance.body.inertia import TENSOR
-from biodance.lab.filters import LowPass, low_pass
+from biodance.lab.prepare import LowPass, low_pass
 from biodance.motion.kinematics import Poses, SegmentMotion, below, place_jacobian
 from biodance.records import Array
 from biodance.spatial import cross, skew
@@ -222,7 +222,7 @@ def centres_of(phi: Array) -> Array:
 def wrench_of(nine: Array, time: Array, wanted: Array, *, smoothed: LowPass, gravity: Array) -> NDArray[np.float32]:
     """Return the change (T, 6, P) of the ground wrench about the lab origin at the even times ``wanted`` (T,) s from P,
     Q, S ``nine`` (F, 9, P) at some ``time`` (F,) s, low-passed and differentiated as the motion was (``smoothed``, see
-    `biodance.motion.smoothing`); in single precision, because they are many and large.
+    `biodance.motion.track`); in single precision, because they are many and large.
     """
     parts = range(0, nine.shape[2], _TOGETHER)
     out = np.empty((len(wanted), 6, nine.shape[2]), dtype=np.float32)

@@ -1,11 +1,10 @@
-"""Decide how many points, channels, samples and frames the data section of a C3D file holds.
-
-The numbers stand in the header, in the parameters and, as the last witness, in the length of the file. Where they
-contradict each other, only a reading that fills the file to its last block is believed; if there is none, or more than
-one, the file is refused.
+"""Decide how many points, channels, samples and frames the data section of a C3D file holds, by header, parameters and
+the length of the file. Where they contradict each other, only the one reading that fills the file to its last block is
+believed; else the file is refused.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -14,17 +13,98 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.declared import (
-    distinct,
-    first_frame_number,
-    frame_counts,
-    frames_held,
-    is_clipped,
-    parameter_numbers,
-    scalar,
-    texts,
-)
-from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters
+from biodance.lab.c3d.parameters import C3D_BLOCK, RESAVE, Header, Parameters, ParameterValue
+
+_CLIPPED = 65535
+"""What 16-bit frame numbers hold in a longer recording: TRIAL, LONG_FRAMES or the length of the file tells more."""
+
+
+def parameter_numbers(parameters: Parameters, group: str, name: str) -> NDArray[Any]:
+    """Return a numeric parameter as (n,), continued in NAME2, NAME3 ... beyond 255 entries; empty if missing."""
+    family = _continued(parameters, group, name)
+    arrays = [np.ravel(value, order="F") for value in family if isinstance(value, np.ndarray)]
+    return np.concatenate(arrays) if arrays else np.empty(0)
+
+
+def texts(parameters: Parameters, group: str, name: str) -> list[str]:
+    """Return a text parameter, continued in NAME2, NAME3 ... beyond 255 entries; empty if missing or numeric."""
+    return [text for value in _continued(parameters, group, name) if isinstance(value, list) for text in value]
+
+
+def _continued(parameters: Parameters, group: str, name: str) -> list[ParameterValue]:
+    """Return the values of a parameter and of its continuations NAME2, NAME3 ..."""
+    found = parameters.get(group, {})
+    return [found[name + tail] for tail in ("", *map(str, range(2, 100))) if name + tail in found]
+
+
+def _scalar(parameters: Parameters, group: str, name: str) -> float:
+    """Return the first number of a parameter; NaN if it is missing, empty or not finite."""
+    values = parameter_numbers(parameters, group, name)
+    return float(values[0]) if values.size and np.isfinite(values[0]) else math.nan
+
+
+def _distinct(values: Iterable[float]) -> list[int]:
+    """Return the distinct finite values >= 0 as integers, in order."""
+    return list(dict.fromkeys(int(v) for v in values if math.isfinite(v) and v >= 0))
+
+
+def _unsigned(value: float) -> float:
+    """Return a frame number that was stored in 16 bits without its sign."""
+    return value + 65536 if -32768 <= value < 0 else value
+
+
+def _frame_counts(header: Header, parameters: Parameters) -> list[int]:
+    """Return the frame counts that the file declares; those that end at the most that 16 bits hold tell nothing."""
+    first, last = (_field(parameters, name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
+    spans = ((float(header.first_frame), float(header.last_frame)), (first, last))
+    declared = [to - start + 1 for start, to in spans if to != _CLIPPED]
+    declared += [_unsigned(_scalar(parameters, "POINT", name)) for name in ("FRAMES", "LONG_FRAMES")]
+    return [count for count in _distinct(declared) if count not in (0, _CLIPPED)]
+
+
+def _frames_held(content: bytes, start: int, width: int, first: int, remarks: list[str]) -> int:
+    """Return how many frames of ``width`` bytes the file holds from byte ``start`` on; ``remarks`` say so."""
+    size, least = len(content) - start, _CLIPPED - first + 1
+    held = size // max(width, 1)
+    while held > least and size - (held - 1) * width < C3D_BLOCK and not any(content[start + (held - 1) * width :]):
+        held -= 1
+    behind = size - held * width
+    cut = f" {behind} bytes behind them were left: the file may be cut off." if behind >= C3D_BLOCK else ""
+    remarks.append(
+        f"Header, POINT:FRAMES and TRIAL stop at {_CLIPPED} frames, the most that 16 bits hold; the length of the file "
+        f"decides: {held} frames were read.{cut}"
+    )
+    return max(held, least)
+
+
+def _field(parameters: Parameters, name: str) -> float:
+    """Return a frame number stored as two 16-bit words (low, high) in the TRIAL group; NaN if it is missing."""
+    words = parameter_numbers(parameters, "TRIAL", name)
+    if words.size == 0 or not np.all(np.isfinite(words)):
+        return math.nan
+    return _unsigned(float(words[0])) + 65536 * (_unsigned(float(words[1])) if words.size > 1 else 0)
+
+
+def _first_frame_number(header: Header, parameters: Parameters, frames: int, notes: list[str]) -> int:
+    """Return the number of the first frame."""
+    first = _field(parameters, "ACTUAL_START_FIELD")
+    spans = header.last_frame - header.first_frame + 1 == frames or header.last_frame == _CLIPPED
+    if int(first) == header.first_frame if math.isfinite(first) else spans:
+        return header.first_frame
+    if not math.isfinite(first):
+        notes.append(
+            f"The first frame's number, {header.first_frame} in the header, does not fit its last one, "
+            f"{header.last_frame}."
+        )
+        return header.first_frame
+    last = _field(parameters, "ACTUAL_END_FIELD")
+    if last - first + 1 == frames and header.last_frame - header.first_frame + 1 != frames:
+        return int(first)
+    notes.append(
+        f"The first frame is {header.first_frame} in the header and {first:g} in TRIAL:ACTUAL_START_FIELD; the "
+        f"header's is taken."
+    )
+    return header.first_frame
 
 
 @dataclass(frozen=True)
@@ -73,7 +153,7 @@ def read_layout(content: bytes, header: Header, parameters: Parameters, where: s
     rate, analog_rate = _rates(header, parameters, samples if channels else 0, notes)
     unsigned = "UNSIGNED" in (text.upper() for text in texts(parameters, "ANALOG", "FORMAT"))
     gain, offset = _analog_transform(parameters, channels, unsigned, where, remarks)
-    first = first_frame_number(header, parameters, frames, notes)
+    first = _first_frame_number(header, parameters, frames, notes)
     kind = (floating, unsigned, abs(scale), rate, analog_rate, gain, offset)
     return Layout(
         header.processor, start, points, channels, samples, frames, first, *kind, tuple(notes), tuple(remarks)
@@ -94,15 +174,15 @@ def _agreed_scale(header: Header, parameters: Parameters, where: str) -> float:
 
 def _analog_counts(header: Header, parameters: Parameters) -> list[tuple[int, int]]:
     """Return the pairs (channels, samples per frame) that at most one statement of the file contradicts."""
-    used, values, samples = scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
-    ratio = scalar(parameters, "ANALOG", "RATE") / (scalar(parameters, "POINT", "RATE") or math.nan)
+    used, values, samples = _scalar(parameters, "ANALOG", "USED"), header.analog_values, header.analog_samples
+    ratio = _scalar(parameters, "ANALOG", "RATE") / (_scalar(parameters, "POINT", "RATE") or math.nan)
     ratio = round(ratio) if math.isfinite(ratio) and ratio > 0.5 else math.nan
     if not (used > 0 or values > 0):
         return [(0, 0)]
     if values == 0 and samples == 0:  # a header that is silent on analog data
         return [(0, 0), (int(used), int(ratio))] if math.isfinite(ratio) else [(0, 0)]
-    channels = distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
-    rows = distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
+    channels = _distinct([used, *(values / s for s in (samples, ratio) if s > 0 and values % s == 0)])
+    rows = _distinct([samples, ratio, *(values / c for c in channels if c and values % c == 0)])
 
     def against(c: int, s: int) -> int:
         contradicted = (c != used and not math.isnan(used), s != samples, s != ratio and not math.isnan(ratio))
@@ -123,17 +203,16 @@ def _counts(
     notes: list[str],
     remarks: list[str],
 ) -> tuple[int, int, int, int, int]:
-    """Return (start byte, points, channels, samples per frame, frames); ``notes`` say what was overruled, ``remarks``
-    that nothing but the file's length tells the frames.
-    """
-    starts = distinct(
-        [header.data_start, (scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
+    """Return (start byte, points, channels, samples per frame, frames); say in ``notes`` what was overruled."""
+    starts = _distinct(
+        [header.data_start, (_scalar(parameters, "POINT", "DATA_START") or math.nan) * C3D_BLOCK - C3D_BLOCK]
     )
-    points = distinct([header.points, scalar(parameters, "POINT", "USED")])
-    analog, frames, size = _analog_counts(header, parameters), frame_counts(header, parameters), len(content)
-    if not frames and is_clipped(header, parameters) and len(starts) == len(points) == len(analog) == 1:
+    points = _distinct([header.points, _scalar(parameters, "POINT", "USED")])
+    analog, frames, size = _analog_counts(header, parameters), _frame_counts(header, parameters), len(content)
+    clipped = _CLIPPED in (header.last_frame, _unsigned(_scalar(parameters, "POINT", "FRAMES")))
+    if not frames and clipped and len(starts) == len(points) == len(analog) == 1:
         width = word * (4 * points[0] + analog[0][0] * analog[0][1])
-        frames = [frames_held(content, starts[0], width, header.first_frame, remarks)]
+        frames = [_frames_held(content, starts[0], width, header.first_frame, remarks)]
     readings = [(s, p, c, n, f) for s, p, (c, n), f in product(starts, points, analog, frames)]
 
     def rest(reading: tuple[int, int, int, int, int]) -> int:
@@ -170,15 +249,15 @@ def _counts(
 def _all_told_twice(header: Header, parameters: Parameters) -> bool:
     """Return whether header and parameters agree on every count: bytes behind the data are then padding."""
     points = not header.points or "USED" in parameters.get("POINT", {})
-    channels = scalar(parameters, "ANALOG", "USED")
+    channels = _scalar(parameters, "ANALOG", "USED")
     analog = (header.analog_values > 0) == (channels > 0)
     return points and analog and {"FRAMES", "DATA_START"} <= parameters.get("POINT", {}).keys()
 
 
 def _rates(header: Header, parameters: Parameters, samples: int, notes: list[str]) -> tuple[float, float]:
     """Return point and analog rate in Hz, as two of the three places in the file tell them; NaN if none is > 0."""
-    analog = scalar(parameters, "ANALOG", "RATE")
-    witnesses = {"POINT:RATE": scalar(parameters, "POINT", "RATE"), "the header": header.rate}
+    analog = _scalar(parameters, "ANALOG", "RATE")
+    witnesses = {"POINT:RATE": _scalar(parameters, "POINT", "RATE"), "the header": header.rate}
     witnesses["ANALOG:RATE / samples per frame"] = analog / samples if samples else math.nan
     told = {name: rate for name, rate in witnesses.items() if math.isfinite(rate) and rate > 0}
     if not told:

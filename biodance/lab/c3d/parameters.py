@@ -19,7 +19,7 @@ from biodance.errors import FileRefused
 C3D_BLOCK = 512
 INTEL, DEC, MIPS = 84, 85, 86
 _PROCESSORS = {INTEL: "Intel", DEC: "DEC", MIPS: "SGI/MIPS"}
-_SCALES, RATES = (1e-9, 1e6), (1e-3, 1e6)
+_SCALES, _RATES = (1e-9, 1e6), (1e-3, 1e6)
 """Believable magnitudes of the header's scale and rate (Hz): numbers of the wrong processor type are outside by far."""
 
 _RESAVE_IT = "export the trial again from the recording software."
@@ -58,9 +58,7 @@ def integers(content: bytes | memoryview, processor: int, kind: str = "u2") -> N
 
 
 def floats(content: bytes | memoryview, processor: int) -> NDArray[Any]:
-    """Return the bytes as 32-bit floats (n,) from the number format of the processor; DEC (VAX F) values are
-    converted to IEEE.
-    """
+    """Return the bytes as 32-bit floats (n,) in the processor's number format; DEC (VAX F) becomes IEEE."""
     if processor != DEC:
         return np.frombuffer(content, dtype=">f4" if processor == MIPS else "<f4")
     words = np.frombuffer(content, dtype="<u2").reshape(-1, 2).astype(np.uint32)
@@ -110,7 +108,7 @@ def read_header(content: bytes, where: str) -> Header:
             f"{where}: the header puts the data into block {words[8]}, but the file has only "
             f"{len(content) // C3D_BLOCK} blocks: it is damaged or was cut off. {RESAVE}"
         )
-    if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or RATES[0] < rate < RATES[1])):
+    if not (_SCALES[0] < abs(scale) < _SCALES[1] and (rate == 0 or _RATES[0] < rate < _RATES[1])):
         raise FileRefused(
             f"{where}: read as {_PROCESSORS[processor]} numbers, the header has a scale of {scale:g} and a rate of "
             f"{rate:g} Hz, which no lab has: it is damaged or its processor type is wrong. {RESAVE}"
@@ -180,9 +178,9 @@ def _short(value: ParameterValue) -> str:
     return ", ".join(str(one) for one in (value if isinstance(value, list) else np.ravel(value, order="F"))[:4])
 
 
-def text_rows(content: bytes, header: Header, where: str, *, group: str, name: str) -> list[tuple[int, int]]:
-    """Return byte position and width of every string of the text parameter ``group``:``name`` and its continuations
-    NAME2, NAME3 ...
+def label_rows(content: bytes, header: Header, where: str) -> list[tuple[int, int]]:
+    """Return byte position and width of every label of a point: POINT:LABELS and its continuations LABELS2,
+    LABELS3 ...
 
     Raises
     ------
@@ -197,12 +195,12 @@ def text_rows(content: bytes, header: Header, where: str, *, group: str, name: s
         at, number, word, value = _record(section, here, header.processor, where)
         if value is None:
             numbers[number] = word
-        elif isinstance(value, list) and word.rstrip("0123456789") == name:
+        elif isinstance(value, list) and word.rstrip("0123456789") == "LABELS":
             first = here + 2 + abs(int(np.int8(np.uint8(section[here])))) + 2
             found.append((number, first, section[first : first + 2 + section[first + 1]]))
     rows = []
     for number, first, head in found:
-        if numbers.get(number) == group and head[1] >= 1:
+        if numbers.get(number) == "POINT" and head[1] >= 1:
             width, count = head[2], math.prod(head[3:])
             rows += [(first + len(head) + i * width, width) for i in range(count)]
     return rows
@@ -244,7 +242,9 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
         raise damaged
     raw = section[first:end]
     if kind == -1:
-        return _texts(raw, shape), end
+        width = shape[0] if shape else 1
+        rows = [raw[i : i + width] for i in range(0, len(raw), width)] if width else []
+        return [_text(row) for row in rows], end
     if kind == 1:
         numbers: NDArray[Any] = np.frombuffer(raw, dtype=np.int8).astype(np.int64)
     elif kind == 2:
@@ -254,13 +254,6 @@ def _value(section: bytes, at: int, processor: int, damaged: FileRefused) -> tup
     numbers = numbers.reshape(shape or (1,), order="F")
     numbers.setflags(write=False)
     return numbers, end
-
-
-def _texts(raw: bytes, shape: tuple[int, ...]) -> list[str]:
-    """Return the strings of a character array whose first dimension is the length of each."""
-    width = shape[0] if shape else 1
-    rows = [raw[i : i + width] for i in range(0, len(raw), width)] if width else []
-    return [_text(row) for row in rows]
 
 
 def _text(row: bytes) -> str:

@@ -1,7 +1,10 @@
 """What a C3D file says, in its own unit and axes: bytes made safe, markers and model outputs told apart."""
 
 import hashlib
+import io
+import math
 import re
+import subprocess
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,19 +15,205 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.child_process import run_python
 from biodance.errors import FileRefused
-from biodance.lab.c3d.declared import texts
-from biodance.lab.c3d.layout import Layout, read_layout
-from biodance.lab.c3d.length import metres_per_unit
-from biodance.lab.c3d.numbers import Numbers, read_numbers, second_opinion
-from biodance.lab.c3d.parameters import RESAVE, Parameters, read_header, read_parameters
+from biodance.lab.c3d.layout import Layout, parameter_numbers, read_layout, texts
+from biodance.lab.c3d.parameters import MIPS, RESAVE, Parameters, doubles, floats, read_header, read_parameters
 from biodance.lab.plain_text import refuse_huge
 from biodance.records import Array, any_coordinate, spread_frames
 
-_FRAMES = 4096
-"""Frames looked at at once: little memory, however long the recording."""
+_Numbers = tuple[NDArray[Any], NDArray[Any]]
+"""Points (T, K, 3) in file units with NaN = not seen, analog (T * samples, C) in units."""
 
-GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
+
+def read_numbers(content: bytes, layout: Layout) -> _Numbers:
+    """Return the points and analog values of the data section.
+
+    A frame holds x, y, z and a word of residual and cameras for each point, then the analog samples, channel fastest;
+    all 32-bit floats or all 16-bit integers. A point was not seen if its residual is negative, a coordinate is no
+    finite number, or all three are zero. Source: C3D user guide, "3D point data" and "analog data".
+    """
+    words = layout.frames * (4 * layout.points + layout.channels * layout.samples)
+    size = 4 if layout.floating else 2
+    section = memoryview(content)[layout.start : layout.start + size * words]
+    if layout.floating:
+        rows = analog_rows = floats(section, layout.processor).reshape(layout.frames, -1)
+    else:
+        order = ">" if layout.processor == MIPS else "<"
+        rows = np.frombuffer(section, dtype=order + "i2").reshape(layout.frames, -1)
+        analog_rows = rows.view(order + "u2") if layout.unsigned else rows
+    quads = rows[:, : 4 * layout.points].reshape(layout.frames, layout.points, 4)
+    points = doubles(quads[..., :3])
+    if not layout.floating:
+        points *= layout.scale
+    seen = (quads[..., 3] >= 0) & ~any_coordinate(~np.isfinite(points)) & any_coordinate(points != 0)
+    points[~seen] = np.nan
+    rest = doubles(analog_rows[:, 4 * layout.points :])
+    with np.errstate(invalid="ignore", over="ignore"):
+        analog = rest.reshape(layout.frames * layout.samples, layout.channels) if layout.channels else np.empty((0, 0))
+        analog -= layout.offset
+        analog *= layout.gain
+    return points, analog
+
+
+_PATIENCE = 60.0  # s after which the child is given up
+READ = """
+import io, sys, warnings
+import ezc3d, numpy
+warnings.simplefilter("ignore")
+try:
+    data = ezc3d.c3d(sys.argv[1])["data"]
+except Exception as error:
+    sys.exit(" ".join(str(error).split())[:120] or type(error).__name__)
+points, analogs = data["points"], data["analogs"]
+answer = io.BytesIO()  # not stdout itself: numpy asks a file for its position, and a pipe has none
+numpy.save(answer, points[:3].transpose(2, 1, 0).astype("f4"))
+numpy.save(answer, analogs[0].T.astype("f4"))
+sys.stdout.buffer.write(answer.getvalue())
+"""
+
+
+def second_opinion(path: Path, numbers: _Numbers, layout: Layout) -> str:
+    """Return "confirmed" if ezc3d reads the same numbers, "refuted" if it reads others, else why it does not read the
+    file.
+
+    ezc3d finds the layout on its own, so it also judges ours. Where header and parameters disagree it believes one of
+    them without looking at the length of the file, as biodance does: no judgement. Left out are analog channels that
+    ezc3d 1.7.2 is known to read wrong: those with a negative OFFSET, whose sign it loses, and unsigned integers, which
+    it takes for signed ones.
+
+    Parameters
+    ----------
+    path
+        The file.
+    numbers
+        Points (T, K, 3) in file units, NaN = not seen, and analog (S, C), as biodance read them.
+    layout
+        How biodance understood the data section.
+    """
+    try:
+        child = run_python("-c", READ, str(path), timeout=_PATIENCE)
+    except subprocess.TimeoutExpired:
+        return f"ezc3d gives no answer within {_PATIENCE:g} s"
+    except OSError as error:
+        return f"ezc3d cannot be started ({error.strerror})"
+    if child.returncode < 0:
+        return f"ezc3d crashes on the file (signal {-child.returncode})"
+    if child.returncode:
+        lines = child.stderr.decode(errors="replace").strip().splitlines()
+        return f"ezc3d does not take the file ({lines[-1] if lines else f'exit code {child.returncode}'})"
+    with io.BytesIO(child.stdout) as answer:
+        points, analog = np.load(answer).astype(float), np.load(answer).astype(float)
+    # without channels ezc3d still gives one row a frame
+    ours = (numbers[0].shape, numbers[1].shape if numbers[1].size else (len(points), 0))
+    if layout.notes and (points.shape, analog.shape) != ours:
+        return (
+            f"ezc3d believes the other of the two ({points.shape[1]} points, {analog.shape[1]} channels, "
+            f"{len(points)} frames)"
+        )
+    return "confirmed" if _same_points(numbers[0], points) and _same_analog(numbers[1], analog, layout) else "refuted"
+
+
+def _same_points(ours: Array, theirs: Array) -> bool:
+    """Compare where biodance saw a point; where it did not, ezc3d may give any number."""
+    seen = np.isfinite(ours)
+    return ours.shape == theirs.shape and _same(ours[seen], theirs[seen])
+
+
+def _same_analog(ours: Array, theirs: Array, layout: Layout) -> bool:
+    judged = layout.offset >= 0
+    if not ours.size or not judged.any() or (layout.unsigned and not layout.floating):
+        return True
+    return ours.shape == theirs.shape and _same(ours[:, judged], theirs[:, judged])
+
+
+def _same(one: Array, other: Array) -> bool:
+    size = np.abs(one[np.isfinite(one)]).max(initial=1.0)
+    return np.allclose(one, other, rtol=1e-5, atol=1e-6 * size, equal_nan=True)
+
+
+_METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "in": 0.0254}
+_PREFIXES = {"mm": "milli", "cm": "centi", "dm": "deci", "m": ""}
+_SPELLINGS = {
+    **{
+        f"{prefix}{metre}": unit
+        for unit, prefix in _PREFIXES.items()
+        for metre in ("meter", "meters", "metre", "metres")
+    },
+    **{unit: unit for unit in _METRES},
+    **dict.fromkeys(("inch", "inches"), "in"),
+}
+_GUESSES = ("mm", "cm", "m")
+_PERSON = 1.5
+"""m, the largest extent of the markers on a person: about 0.9 m for legs alone, up to 2.3 m with arms spread or
+raised.
+"""
+
+_PLATE = 0.6  # m, the longest side of a force plate: 0.4 m to 1.2 m in the makers' sheets
+
+_CORNERS = ("FORCE_PLATFORM", "CORNERS")
+_BELIEVABLE = (0.05, 4.75)
+"""Extents, m, that a declared unit may give: the markers on a hand, a person who lies or leaps; outside it is
+overruled.
+"""
+
+
+def metres_per_unit(
+    parameters: Parameters, points: Array, *, where: str
+) -> tuple[float, tuple[str, ...], tuple[str, ...]]:
+    """Return the length of one file unit in metres, history and warnings.
+
+    ``points`` (T, K, 3) are the markers in file units. A missing or unknown unit, and one that would make the person or
+    the plates smaller than 5 cm or larger than 4.75 m, is decided by sense among mm, cm and m, and said so.
+
+    Raises
+    ------
+    FileRefused
+        The unit is missing and neither markers nor plates tell it.
+    """
+    written = next(iter(texts(parameters, "POINT", "UNITS")), "")
+    unit = _SPELLINGS.get(written.strip(" .").casefold(), "")
+    size, expected, what = _size(parameters, points)
+    if unit and (math.isnan(size) or _BELIEVABLE[0] <= size * _METRES[unit] <= _BELIEVABLE[1]):
+        return _METRES[unit], (f"Lengths are in {unit} (POINT:UNITS).",), ()
+    if math.isnan(size) and not np.isfinite(points).any() and not parameter_numbers(parameters, *_CORNERS).size:
+        return _METRES["mm"], ("The file holds no lengths, so its unit of length does not matter.",), ()
+    if math.isnan(size):
+        raise FileRefused(
+            f"{where}: POINT:UNITS is {written!r} and neither markers nor plates tell the unit of length (mm, cm or "
+            "m). Write the unit into the file and read it again."
+        )
+    guess = min(_GUESSES, key=lambda name: abs(math.log(size * _METRES[name] / expected)))
+    said = f"POINT:UNITS is {written!r}; {what} of {size:.4g} can only be in {guess}, so lengths are in {guess}."
+    return _METRES[guess], (said,), (said + " Check the sizes in the report.",)
+
+
+def _extents(points: Array) -> Array:
+    """Return the largest side of the box about the markers (T, K, 3) in frames that show four of them."""
+    frames = points[(~any_coordinate(~np.isfinite(points))).sum(axis=1) >= 4]
+    if not len(frames):
+        return np.empty(0)
+    return np.asarray((np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1)).max(axis=1))
+
+
+def _size(parameters: Parameters, points: Array) -> tuple[float, float, str]:
+    """Return a length in file units, what it should be in metres, and its name; NaN if the file holds none."""
+    extents = _extents(spread_frames(points))
+    if extents.size:
+        extent = float(np.median(extents))
+        if 0 < extent < math.inf:
+            return extent, _PERSON, "a cloud of markers"
+    corners = parameter_numbers(parameters, *_CORNERS)
+    if corners.size >= 12 and np.isfinite(corners).all():
+        longest = float(np.linalg.norm(np.diff(corners[:12].reshape(4, 3), axis=0), axis=1).max())
+        if 0 < longest < math.inf:
+            return longest, _PLATE, "a plate side"
+    return math.nan, _PERSON, ""
+
+
+_FRAMES = 4096  # Frames looked at at once: little memory, however long the recording
+
+_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
 """Parameters of POINT in which the results are listed; POINT:TYPE_GROUPS may name more."""
 
 _RESULT = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF|Cent(re|er)OfMass(Floor)?)$")
@@ -46,7 +235,7 @@ def model_outputs(labels: Sequence[str], parameters: Parameters) -> tuple[int, .
     (``PELO``, ``PELA`` ...).
     """
     declared = {group.upper() for group in texts(parameters, "POINT", "TYPE_GROUPS")[::2]} - {"MARKERS", "LABELS"}
-    listed = {label for group in declared | set(GROUPS) for label in texts(parameters, "POINT", group)}
+    listed = {label for group in declared | set(_GROUPS) for label in texts(parameters, "POINT", group)}
     listed |= {split_label(label)[1] for label in listed}
     bones = Counter(match["bone"] for label in set(labels) if (match := _BONE.match(label)))
     found = []
@@ -57,7 +246,7 @@ def model_outputs(labels: Sequence[str], parameters: Parameters) -> tuple[int, .
     return tuple(found)
 
 
-def unlabelled(labels: Sequence[str]) -> tuple[int, ...]:
+def _unlabelled(labels: Sequence[str]) -> tuple[int, ...]:
     """Return the columns without a name, or with the name that software gives to unlabelled trajectories (``*115``)."""
     return tuple(column for column, label in enumerate(labels) if _UNLABELLED.match(split_label(label)[1]))
 
@@ -107,8 +296,8 @@ class RawC3d:
 
     @cached_property
     def nameless(self) -> frozenset[int]:
-        """The columns of points without a name (`unlabelled`)."""
-        return frozenset(unlabelled(self.labels))
+        """The columns of points without a name (`_unlabelled`)."""
+        return frozenset(_unlabelled(self.labels))
 
 
 def read_raw(path: str | Path) -> RawC3d:
@@ -192,10 +381,10 @@ def point_labels(parameters: Parameters, layout: Layout) -> tuple[str, ...]:
 
 
 def _smells(
-    numbers: Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
+    numbers: _Numbers, labels: tuple[str, ...], layout: Layout, parameters: Parameters, path: Path
 ) -> tuple[tuple[str, ...], str]:
     """Have suspicious numbers judged by a second reader; return its judgement and who agrees, or refuse."""
-    no_markers = {*model_outputs(labels, parameters), *unlabelled(labels)}
+    no_markers = {*model_outputs(labels, parameters), *_unlabelled(labels)}
     markers = [column for column in range(layout.points) if column not in no_markers]
     leaps = _leaps(numbers[0], markers, parameters)
     if not leaps and not layout.notes:
@@ -213,9 +402,7 @@ def _smells(
 
 
 def _leaps(points: Array, markers: list[int], parameters: Parameters) -> int:
-    """Return how often a marker, one of these columns of ``points``, moves by more than a metre between two frames in
-    which it is seen; 0 if the unit is not known.
-    """
+    """Return how often a marker moves by more than a metre between two frames; 0 if the unit is not known."""
     try:
         metre = 1.0 / metres_per_unit(parameters, spread_frames(points)[:, markers], where="")[0]
     except FileRefused:

@@ -1,4 +1,4 @@
-"""Copies of a C3D recording with results inside, so that they open beside the markers."""
+"""Copies of a C3D recording: with results inside, or with markers that have each other's names."""
 
 import json
 import subprocess
@@ -13,18 +13,17 @@ import numpy as np
 
 from biodance.child_process import run_python
 from biodance.errors import BiodanceError, FileRefused
-from biodance.lab.c3d.declared import texts
-from biodance.lab.c3d.raw import RawC3d, read_raw
-from biodance.lab.c3d.read import file_frame
+from biodance.lab.c3d.layout import Layout, texts
+from biodance.lab.c3d.parameters import label_rows, read_header
+from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_raw, split_label
 from biodance.lab.c3d.write import FileValue
 from biodance.lab.plain_text import refuse_present, write_whole
+from biodance.lab.readers.c3d import file_frame
 from biodance.records import Array, assign, frozen_array
 
-_PATIENCE = 300.0
-"""s after which the child is given up."""
-_NEAR = 0.1
-"""s: an event that the file has already within this time is not written again."""
-Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
+_PATIENCE = 300.0  # s after which the child is given up
+_NEAR = 0.1  # s: an event that the file has already within this time is not written again
+_Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS", "MODELED_MARKERS"]
 _UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"}
 """Unit of a kind of results where the parameter of POINT (`_unit_name`) declares none."""
 _PER_SI = {"deg": 180 / np.pi, "rad": 1.0, "N": 1.0, "Nm": 1.0, "Nmm": 1000.0, "W": 1.0}
@@ -41,7 +40,7 @@ class Output:
     """
 
     label: str
-    kind: Kind
+    kind: _Kind
     value: Array
     about: str
     turns: bool = True
@@ -89,7 +88,10 @@ def write_results_c3d(
     _refuse_unfitting(raw, outputs)
     metres, turn = file_frame(raw, subject=subject)
     units = [_unit(raw, output) for output in outputs]
-    scaled = [_in_file(o, unit, metres, turn) for o, unit in zip(outputs, units, strict=True)]
+    scaled = []
+    for output, unit in zip(outputs, units, strict=True):
+        value = output.value @ turn if output.turns else output.value
+        scaled.append(value / metres if output.kind == "MODELED_MARKERS" else value * _PER_SI[unit])
     labels, kinds, about = ([getattr(o, name) for o in outputs] for name in ("label", "kind", "about"))
     said: dict[str, FileValue] = {"LABELS": labels, "UNITS": units, "COMPONENTS": about, **(parameters or {})}
     first = (raw.first_frame - 1) / raw.rate
@@ -142,12 +144,6 @@ def _unit_name(kind: str) -> str:
     return f"{kind.removesuffix('S')}_UNITS"
 
 
-def _in_file(output: Output, unit: str, metres: float, turn: Array) -> Array:
-    """Return the values (T, 3) in the file's axes and unit."""
-    value = output.value @ turn if output.turns else output.value
-    return np.asarray(value / metres if output.kind == "MODELED_MARKERS" else value * _PER_SI[unit])
-
-
 def _run(original: Path, made: Path, question: Mapping[str, Any]) -> None:
     """Have the child write the copy; whatever goes wrong in it refuses the file."""
     words, asked = ("-m", "biodance.lab.c3d.results", str(original), str(made)), json.dumps(question).encode()
@@ -188,11 +184,10 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
 
     file = ezc3d.c3d(original)
     point = file["parameters"]["POINT"]
-    labels = _gathered(point, "LABELS")
+    continued = {f"{name}{tail}": name for name in ("LABELS", "UNITS", "DESCRIPTIONS") for tail in range(2, 100)}
+    taken = {key: point.pop(key, {"value": []})["value"] for key in continued}  # ezc3d writes continuations anew
+    labels = [*point["LABELS"]["value"], *(text for key in taken if continued[key] == "LABELS" for text in taken[key])]
     point["LABELS"]["value"] = [*labels, *question["labels"]]
-    for name in ("UNITS", "DESCRIPTIONS"):
-        for tail in range(2, 100):
-            point.pop(f"{name}{tail}", None)
     _add_points(file, np.load(Path(made).with_name("values.npy")))
     for kind in dict.fromkeys(question["kinds"]):
         new = [label for label, own in zip(question["labels"], question["kinds"], strict=True) if own == kind]
@@ -203,12 +198,6 @@ def _copy(original: str, made: str, question: dict[str, Any]) -> None:
         file.add_parameter("BIODANCE", name, value)
     _add_events(file, question["events"])
     file.write(made)
-
-
-def _gathered(group: dict[str, Any], name: str) -> list[str]:
-    """Return a list of texts with its continuations NAME2 ..., taken out of the group: ezc3d writes them anew."""
-    rest = [text for tail in range(2, 100) for text in group.pop(f"{name}{tail}", {"value": []})["value"]]
-    return [*group[name]["value"], *rest]
 
 
 def _add_points(file: Any, values: Array) -> None:
@@ -234,6 +223,56 @@ def _add_events(file: Any, events: list[Any]) -> None:
     for time, context, label in events:
         if not any(abs(time - when) < _NEAR and (context, label) == (side, name) for when, side, name in known):
             file.add_event([float(time // 60), float(time % 60)], context=context, label=label, description="biodance")
+
+
+def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, str], Sequence[tuple[int, int]]]) -> Path:
+    """Write ``source`` to ``target`` with the two markers of each pair of labels ``exchanged`` in frames (start, stop),
+    stop excluded; return the path. Every other byte is as in the recording.
+
+    Where all frames are exchanged the labels change places (the subject's prefix stays), else the points do.
+
+    Raises
+    ------
+    FileRefused
+        The source is no C3D file or lacks a label, or the target exists or cannot be written.
+    """
+    content, parameters, layout, _ = open_c3d(source)
+    columns = {split_label(label)[1]: column for column, label in enumerate(point_labels(parameters, layout))}
+    changed, names = bytearray(content), dict[str, str]()
+    for pair, spans in exchanged.items():
+        if absent := [label for label in pair if label not in columns]:
+            raise FileRefused(
+                f"{source}: holds no point {absent[0]}, so it cannot be exchanged. Name one of its points."
+            )
+        if tuple(spans) == ((0, layout.frames),):
+            names |= {pair[0]: pair[1], pair[1]: pair[0]}
+        else:
+            _exchange_points(changed, layout, [columns[label] for label in pair], spans)
+    _rename(changed, source, names)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return write_whole(target, bytes(changed))
+
+
+def _exchange_points(
+    content: bytearray, layout: Layout, columns: Sequence[int], spans: Sequence[tuple[int, int]]
+) -> None:
+    """Exchange two points, coordinates and residual, in the frames of the data section."""
+    word = 4 if layout.floating else 2
+    row = word * (4 * layout.points + layout.channels * layout.samples)
+    data = np.frombuffer(content, dtype=np.uint8, count=layout.frames * row, offset=layout.start)
+    one, other = (data.reshape(layout.frames, row)[:, 4 * word * k : 4 * word * (k + 1)] for k in columns)
+    for start, stop in spans:
+        one[start:stop], other[start:stop] = other[start:stop].copy(), one[start:stop].copy()
+
+
+def _rename(content: bytearray, source: Path, names: Mapping[str, str]) -> None:
+    """Write other ``names`` over the labels of points."""
+    header = read_header(bytes(content), str(source))
+    for start, width in label_rows(bytes(content), header, str(source)):
+        prefix, name = split_label(content[start : start + width].decode("latin-1").split("\0")[0])
+        if name in names:
+            label = f"{prefix}:{names[name]}" if prefix else names[name]
+            content[start : start + width] = label.encode("latin-1").ljust(width)[:width]
 
 
 if __name__ == "__main__":

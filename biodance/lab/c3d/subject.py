@@ -11,11 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from biodance.errors import FileRefused
-from biodance.lab.c3d.declared import parameter_numbers, texts
-from biodance.lab.c3d.layout import Layout
-from biodance.lab.c3d.numbers import read_numbers
+from biodance.lab.c3d.layout import Layout, parameter_numbers, texts
 from biodance.lab.c3d.parameters import Parameters
-from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, segment_poses, split_label
+from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_numbers, segment_poses, split_label
 from biodance.records import Array
 
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
@@ -33,9 +31,7 @@ class FileEvent:
 
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
-    """``angles`` by label, (T, 3) deg, NaN = none; ``events`` of the feet in the order of time; ``program`` that says
-    it wrote them, "" = not said.
-    """
+    """``angles`` by label, (T, 3) deg, NaN = none; foot ``events`` by time; ``program`` that wrote them, or ""."""
 
     angles: Mapping[str, Array]
     events: tuple[FileEvent, ...]
@@ -81,9 +77,7 @@ def _events(parameters: Parameters, layout: Layout) -> tuple[FileEvent, ...]:
 
 @dataclass(frozen=True)
 class MarkerLabels:
-    """The chosen points: ``columns`` in the file, their ``names``, what was decided (``history``), what is
-    suspicious (``warnings``).
-    """
+    """The chosen points: ``columns`` in the file, ``names``, ``history`` of decisions, ``warnings``."""
 
     columns: tuple[int, ...]
     names: tuple[str, ...]
@@ -98,28 +92,22 @@ show no pelvis with two legs.
 
 
 def subjects_of(raw: RawC3d) -> tuple[str, ...]:
-    """Return the names of the subjects in a file: label prefixes (`people_of`), or SUBJECTS:NAMES where labels have
-    none.
-    """
+    """Return the names of the subjects in a file: label prefixes (`_people_of`), else SUBJECTS:NAMES."""
     prefixes = [prefix for i, (prefix, _) in enumerate(raw.split_labels) if i not in raw.nameless]
     if any(prefixes):
-        return people_of(prefixes)
+        return _people_of(prefixes)
     return tuple(name for name in texts(raw.parameters, "SUBJECTS", "NAMES") if name)
 
 
-def people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
-    """Return those of the prefixes, one for each marker, that name people: not those of things, which carry few
-    markers; all of them where nobody carries more.
-    """
+def _people_of(prefixes: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the prefixes, one for each marker, that name people; all where nobody carries many."""
     counts = Counter(prefixes)
     enough = {prefix for prefix, count in counts.items() if count > _OBJECT}
     return tuple(prefix for prefix in counts if prefix and (prefix in enough or not enough))
 
 
 def poses_only(raw: RawC3d) -> str:
-    """Return the sentence for a file with segment poses (group ROTATION) and no point that was ever seen; "" for
-    others.
-    """
+    """Return the sentence for a file with segment poses (group ROTATION) and no point ever seen; "" for others."""
     said = "" if np.isfinite(raw.points).any() else segment_poses(raw.parameters)
     return f"{raw.path}: {said}" if said else ""
 
@@ -151,7 +139,7 @@ def marker_labels(raw: RawC3d, *, subject: str | None) -> MarkerLabels:
 
 def _of_subject(raw: RawC3d, columns: list[int], subject: str | None, history: list[str]) -> list[int]:
     """Return the columns whose label belongs to the chosen subject."""
-    prefixes = people_of(raw.split_labels[i][0] for i in columns)
+    prefixes = _people_of(raw.split_labels[i][0] for i in columns)
     columns = _without_things(raw, columns, prefixes, history)
     if subject is None and len(prefixes) > 1:
         raise FileRefused(
@@ -225,13 +213,13 @@ _OF_A_SIDE = (
     "LegLength KneeWidth AnkleWidth ShoulderOffset ElbowWidth WristWidth HandThickness AsisTrocanterDistance "
     "FemurLength TibiaLength FootLength SoleDelta"
 )
-LENGTHS = (*_WHOLE.split(), *(side + name for side in "LR" for name in _OF_A_SIDE.split()))
+_LENGTHS = (*_WHOLE.split(), *(side + name for side in "LR" for name in _OF_A_SIDE.split()))
 _OTHER_NAMES = {"WEIGHT": "BODYMASS", "MASS": "BODYMASS", "STATURE": "HEIGHT", "SEX": "GENDER"}
 _PLAIN = ("Bodymass", "age", "gender")
 _LEGAL = {"Bodymass": (2.0, 400.0), "age": (0.0, 120.0), "gender": (0.0, 1.0)}
-STATURE, _LEG = (0.4, 2.6), (0.2, 1.4)
+_STATURE, _LEG = (0.4, 2.6), (0.2, 1.4)
 _SCALES = (1e-3, 1.0, 1e-2)
-_NAMES = {"".join(name.upper()): name for name in (*LENGTHS, *_PLAIN)}
+_NAMES = {name.upper(): name for name in (*_LENGTHS, *_PLAIN)}
 
 
 def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
@@ -247,10 +235,10 @@ def measurements_of(raw: RawC3d) -> tuple[dict[str, float], tuple[str, ...], tup
     warnings: list[str] = []
     measures: dict[str, float] = {}
     for name, value in written.items():
-        low, high = _LEGAL.get(name, (-0.1, STATURE[1]))
+        low, high = _LEGAL.get(name, (-0.1, _STATURE[1]))
         value = value if name in _PLAIN else value * scale
         if name == "Height":
-            low, high = STATURE
+            low, high = _STATURE
         if low <= value <= high:
             measures[name] = value
         else:
@@ -283,7 +271,7 @@ def _written(raw: RawC3d) -> dict[str, float]:
 
 def _scale(written: dict[str, float]) -> float:
     """Return metres per unit by which stature, else a leg, is a person's; mm if neither is there."""
-    for name, (low, high) in (("Height", STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG)):
+    for name, (low, high) in (("Height", _STATURE), ("LLegLength", _LEG), ("RLegLength", _LEG)):
         if name in written:
             fitting = [scale for scale in _SCALES if low <= written[name] * scale <= high]
             if fitting:

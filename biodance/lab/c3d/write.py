@@ -10,14 +10,16 @@ from numpy.typing import ArrayLike
 
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
+from biodance.lab.c3d.subject import as_written
 from biodance.lab.plain_text import write_whole
-from biodance.records import Array, Markers, assign, freeze, frozen_array
+from biodance.lab.plates.corners import plate_axes
+from biodance.records import Array, Markers, Plate, Trial, assign, freeze, frozen_array
+from biodance.spatial import wrench_about_point
 
 FileValue = str | Sequence[str] | ArrayLike
-FileParameters = Mapping[str, Mapping[str, FileValue]]
+_FileParameters = Mapping[str, Mapping[str, FileValue]]
 
-_MOST = 255
-"""The longest dimension of a parameter: one byte tells it."""
+_MOST = 255  # The longest dimension of a parameter: one byte tells it
 _MM = 1000.0
 _CHANNEL_KINDS = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "VVVVVV"}
 """What each channel of a plate TYPE holds: force N, length m, moment N·m or volt."""
@@ -73,7 +75,7 @@ def write_c3d(
     markers: Markers | None,
     plates: Sequence[PlateRecording] = (),
     analog_rate: float = 0.0,
-    parameters: FileParameters | None = None,
+    parameters: _FileParameters | None = None,
     first_frame: int = 1,
     prefix: str = "",
 ) -> None:
@@ -225,17 +227,8 @@ def _header(points: Array, analog: Array, samples: int, first_frame: int, rate: 
     return (head + tail).ljust(C3D_BLOCK, b"\0")
 
 
-def _parameter_section(groups: FileParameters) -> bytes:
-    """Return the section: 4 bytes of header, every group with its parameters, padded to whole blocks.
-
-    Text becomes a character array, whole numbers within 16 bits become integers, other numbers 32-bit floats; arrays
-    keep their dimensions, first one fastest. Lists of more than 255 strings or numbers continue in NAME2, NAME3 ...
-
-    Raises
-    ------
-    BiodanceError
-        A value has a form that C3D cannot store, or the section grows beyond 255 blocks.
-    """
+def _parameter_section(groups: _FileParameters) -> bytes:
+    """Return the section: 4 bytes of header, every group with its parameters, padded to whole blocks."""
     records = []
     for number, (group, values) in enumerate(groups.items(), start=1):
         records.append(_record_bytes(group, -number, b""))
@@ -281,3 +274,25 @@ def _number_piece(array: np.ndarray[Any, Any]) -> tuple[bytes, bytes]:
     shape = b"" if array.shape == (1,) else bytes(array.shape)
     data = array.astype("<i2" if whole else "<f4").tobytes(order="F")
     return bytes([2 if whole else 4, len(shape)]) + shape, data
+
+
+def write_trial(trial: Trial, path: Path) -> None:
+    """Write a trial as a C3D file: as `to_ezc3d` says; what it does not hold (other analog channels, events) is left
+    out.
+
+    Raises
+    ------
+    BiodanceError
+        Markers and plates have rates that do not fit, a wrench is not finite, or the file exists.
+    """
+    plates = [plate_recording(plate) for plate in trial.plates]
+    rate = trial.plates[0].wrench.rate if trial.plates else 0.0
+    said = {"PROCESSING": as_written(trial.measurements)} if trial.measurements else None
+    first = trial.source.first_frame
+    write_c3d(path, markers=trial.markers, plates=plates, analog_rate=rate, first_frame=first, parameters=said)
+
+
+def plate_recording(plate: Plate) -> PlateRecording:
+    """Return what a plate of TYPE 2 records: the wrench in its own axes, about the centre of its surface."""
+    axes, wrench = plate_axes(plate.corners), wrench_about_point(plate.wrench.value, plate.centre)
+    return PlateRecording(2, plate.corners, np.zeros(3), np.hstack([wrench[:, :3] @ axes, wrench[:, 3:] @ axes]))

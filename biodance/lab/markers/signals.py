@@ -1,13 +1,16 @@
 """What a marker on a person cannot do: stand still to the last bit while the others move, or jump away and back within
-three frames. Such frames count as not seen.
+three frames. Such frames count as not seen; gaps are reported and filled.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
-from biodance.records import Array, Markers, Mask, runs
+from biodance.records import Array, Markers, Mask, longest_run, runs
+from biodance.spatial import rigid_fit
 
 _REPEATS = 5
 """Frames that repeat the one before to the last bit. In 62 trials of 14 laboratories no marker of somebody who moves
@@ -19,10 +22,8 @@ than somebody who stands for the static trial sways in that time.
 """
 _SLOWER = 0.5
 """Share of the step before it from which on a marker does not come to rest by and by, as computed movement does."""
-_FELT = 1e-5
-"""m: smaller steps are the last digits of a computed movement."""
-_LONGEST = 3
-"""Frames of a spike at most; what lasts longer may be another marker."""
+_FELT = 1e-5  # m: smaller steps are the last digits of a computed movement
+_LONGEST = 3  # Frames of a spike at most; what lasts longer may be another marker
 _OFF = 0.03
 """m from where the frames on both sides expect the marker. Skin, wands and heads of markers swing by 4 to 9 mm after
 heel strikes of running at 2.5 and 3.5 m/s (10 people, 150 Hz), by 16 mm at most in runs, drop jumps and squats of 14
@@ -34,8 +35,7 @@ in the frames on both sides; impacts reach 200, but move a marker by millimetres
 """
 
 
-_TOLD = 8
-"""Times that are told one by one."""
+_TOLD = 8  # Times that are told one by one
 
 
 class MarkerFault(Enum):
@@ -81,7 +81,8 @@ def faulty_markers(markers: Markers) -> tuple[FaultyMarker, ...]:
     clean = np.where(frozen[:, :, None], np.nan, markers.xyz)
     found = [_faulty(label, MarkerFault.FROZEN, frozen[:, k], float("nan")) for k, label in enumerate(markers.names)]
     step = 1 / markers.rate if markers.time.size > 1 else np.nan
-    for k in np.flatnonzero(_suspects(clean, step)):
+    off = [_off_its_way(clean, frames)[0].max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
+    for k in np.flatnonzero(np.max(off, axis=0) > _limit(step)):
         jumps, size = _spikes(clean[:, k], step)
         found.append(_faulty(markers.names[k], MarkerFault.SPIKE, jumps, size))
     return tuple(one for one in found if one.spans)
@@ -119,9 +120,7 @@ def _frozen(xyz: Array) -> Mask:
 
 
 def _breaks_off(steps: Array, start: int, stop: int) -> bool:
-    """Return whether a marker with ``steps`` (T,) m a frame does not come to rest by and by before ``start``, or not
-    start so at ``stop``; unseen frames and the ends of the recording tell nothing.
-    """
+    """Return whether ``steps`` (T,) m a frame break off before ``start`` or set in at ``stop`` in full."""
     for near, far, farther in ((start - 1, start - 2, start - 3), (stop, stop + 1, stop + 2)):
         if min(near, farther) >= 0 and max(near, farther) < steps.size:
             slow = steps[near] < _SLOWER * steps[far] and steps[far] < steps[farther]
@@ -172,16 +171,8 @@ def _limit(step: float) -> float:
     return max(_OFF, _FASTER * step**2)
 
 
-def _suspects(xyz: Array, step: float) -> Mask:
-    """Return (K,) which markers are off their way anywhere."""
-    off = [_off_its_way(xyz, frames)[0].max(axis=0, initial=0.0) for frames in range(1, _LONGEST + 1)]
-    return np.asarray(np.max(off, axis=0) > _limit(step))
-
-
 def _spikes(path: Array, step: float) -> tuple[Mask, float]:
-    """Return (T,) where a marker's ``path`` (T, 3) jumps, and how far at most: the clearest jump is taken out first,
-    for the frames beside it seem to be off, too.
-    """
+    """Return (T,) where a marker's ``path`` (T, 3) jumps, the clearest taken out first, and how far at most."""
     path, spiky, farthest = path.copy(), np.zeros(len(path), dtype=bool), 0.0
     while True:
         found = [_off_its_way(path, frames) for frames in range(1, _LONGEST + 1)]
@@ -193,3 +184,157 @@ def _spikes(path: Array, step: float) -> tuple[Mask, float]:
         frames = slice(int(at), int(at) + int(shorter) + 1)
         farthest = max(farthest, float(off[shorter, at]))
         spiky[frames], path[frames] = True, np.nan
+
+
+# Gaps in marker trajectories: report them, bridge the short ones, fill from the rigid segment, leave the rest. Nothing
+# is extrapolated.
+#
+# - Short: a cubic spline between the two ends, whose positions and slopes come from a parabola through the last six
+#   frames on each side.
+# - Longer: the other markers of the same segment carry the marker across. Those are chosen whose distance to it hardly
+#   changes in the recording; the prediction from the frame before the gap and that from the frame after it are blended
+#   (Kabsch 1976, doi:10.1107/S0567739476001873, for the rotation).
+# - Whatever is left stays NaN: the kinematics give it no weight.
+
+_FLANK = 6  # Seen frames that each side of a short gap must have
+_CARRIERS = 5  # At most so many neighbours carry a marker across a gap; at least three are needed
+_RIGID = 0.01
+"""m: a neighbour carries a marker if their distance has a smaller standard deviation than this."""
+_OFF_LINE = 0.01  # m: so far from one line the neighbours must lie to fix a rotation
+_CLOSURE = 0.02
+"""m: the neighbours must predict the marker across the gap to this, or it is left unseen."""
+
+
+@dataclass(frozen=True)
+class MarkerGaps:
+    """How often a marker was not seen: ``percent`` of all frames, ``longest`` gap in s (ends count)."""
+
+    label: str
+    percent: float
+    longest: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Frames ``start`` to ``stop`` (excluded) of a marker that were not seen; ``how`` it was dealt with."""
+
+    label: str
+    start: int
+    stop: int
+    how: str = ""
+
+
+def unseen_at_origin(xyz: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return samples (T, K, 3) with NaN where all three coordinates are exactly zero, as many programs write a marker
+    that was not seen, and how many there were in a sentence; nothing is said where there were none.
+    """
+    zero = (xyz == 0).all(axis=2)
+    if not zero.any():
+        return xyz, ()
+    said = f"{int(zero.sum())} of {zero.size} samples of markers are (0, 0, 0): they count as not seen."
+    return np.where(zero[:, :, None], np.nan, xyz), (said,)
+
+
+def report_gaps(markers: Markers) -> tuple[MarkerGaps, ...]:
+    """Return percentage and longest gap of every marker, in the order of ``markers``."""
+    step = 1 / markers.rate if markers.time.size > 1 else 0.0
+    found = []
+    for label, hidden in zip(markers.names, ~markers.seen.T, strict=True):
+        start, stop = longest_run(hidden)
+        found.append(MarkerGaps(label, 100.0 * float(np.mean(hidden)) if hidden.size else 0.0, (stop - start) * step))
+    return tuple(found)
+
+
+def fill_gaps(markers: Markers, segments: Mapping[str, str], *, short: float = 0.2) -> tuple[Markers, tuple[Gap, ...]]:
+    """Return the markers with their gaps filled where that is safe, and every gap with the way it was dealt with.
+
+    ``segments`` label -> segment; markers without one are only bridged. Gaps up to ``short`` s are bridged by a spline,
+    longer ones and those without six seen frames on both sides are filled from at least three other markers of the
+    segment that were seen throughout.
+    """
+    hidden = {label: runs(~seen) for label, seen in zip(markers.names, markers.seen.T, strict=True)}
+    if not any(map(len, hidden.values())):
+        return markers, ()
+    xyz = markers.xyz.copy()
+    gaps: list[Gap] = []
+    later: list[Gap] = []
+    for column, (label, found) in enumerate(hidden.items()):
+        for start, stop in found:
+            is_short = stop - start <= short * markers.rate + 1e-9
+            bridge = _bridge(markers.time, markers.xyz[:, column], start, stop) if is_short else None
+            if bridge is None:
+                later.append(Gap(label, start, stop))
+            else:
+                xyz[start:stop, column] = bridge
+                gaps.append(Gap(label, start, stop, "bridged by a spline"))
+    xyz.setflags(write=False)  # the record keeps it without a copy
+    bridged = Markers(markers.names, markers.time, xyz, _filled(markers, xyz))
+    if not later:
+        return bridged, tuple(gaps)
+    xyz = xyz.copy()
+    for gap in later:
+        carried, how = _carry(bridged, gap, segments)
+        if carried is not None:
+            xyz[gap.start : gap.stop, markers.names.index(gap.label)] = carried
+        gaps.append(Gap(gap.label, gap.start, gap.stop, how))
+    xyz.setflags(write=False)
+    return Markers(markers.names, markers.time, xyz, _filled(markers, xyz)), tuple(gaps)
+
+
+def _filled(markers: Markers, xyz: Array) -> NDArray[np.bool_]:
+    """Return (T, K) where places ``xyz`` are known that the ``markers`` as recorded do not show."""
+    return np.asarray(~markers.seen & np.isfinite(xyz).all(axis=2))
+
+
+def _bridge(time: Array, xyz: Array, start: int, stop: int) -> Array | None:
+    """Return the spline over one gap of one marker (T, 3); None where a side has fewer than FLANK seen frames."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    before, after = slice(start - _FLANK, start), slice(stop, stop + _FLANK)
+    if start < _FLANK or stop + _FLANK > len(time) or np.isnan(xyz[before]).any() or np.isnan(xyz[after]).any():
+        return None
+    ends = []
+    for side, edge in ((before, start - 1), (after, stop)):
+        offset = time[side] - time[edge]
+        powers = np.stack([np.ones(_FLANK), offset, offset**2], axis=1)
+        place, slope, _ = np.linalg.lstsq(powers, xyz[side], rcond=None)[0]
+        ends.append((time[edge], place, slope))
+    knots, places, slopes = zip(*ends, strict=True)
+    return CubicHermiteSpline(knots, places, slopes)(time[start:stop])
+
+
+def _carry(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> tuple[Array | None, str]:
+    """Return the positions (n, 3) of a marker over its gap from its segment, or None; and how, or why not."""
+    if gap.start == 0 or gap.stop == markers.time.size:
+        return None, "left unseen: it reaches the end of the recording, and nothing is extrapolated"
+    carriers = _carriers(markers, gap, segments)
+    if len(carriers) < 3:
+        return None, "left unseen: fewer than three markers that keep their distance to it were seen throughout"
+    span = slice(gap.start - 1, gap.stop + 1)
+    others, own = np.stack([markers[label][span] for label in carriers], axis=1), markers[gap.label][span]
+    ways = ((rigid_fit(others[edge], others), own[edge]) for edge in (0, -1))
+    forward, backward = (turn @ point + place for (turn, place), point in ways)
+    closure = max(np.linalg.norm(forward[-1] - own[-1]), np.linalg.norm(backward[0] - own[0]))
+    if closure > _CLOSURE:
+        error = f"with an error of {1000 * closure:.0f} mm across the gap"
+        return None, f"left unseen: {', '.join(carriers)} predict it {error}"
+    part = np.linspace(0.0, 1.0, len(own))[:, None]
+    blend = (1 - part) * forward + part * backward
+    return blend[1:-1], f"filled from {', '.join(carriers)} ({1000 * closure:.0f} mm off across the gap)"
+
+
+def _carriers(markers: Markers, gap: Gap, segments: Mapping[str, str]) -> list[str]:
+    """Return the labels of the segment, seen throughout, whose distance to the marker varies least."""
+    own = markers[gap.label]
+    spread = {}
+    for label in markers.names:
+        same = label != gap.label and label in segments and segments[label] == segments.get(gap.label)
+        if same and not np.isnan(markers[label][gap.start - 1 : gap.stop + 1]).any():
+            distance = np.linalg.norm(markers[label] - own, axis=1)
+            spread[label] = float(np.nanstd(distance))
+    rigid = sorted((label for label, value in spread.items() if value < _RIGID), key=spread.__getitem__)[:_CARRIERS]
+    if len(rigid) < 3:
+        return []
+    points = np.stack([markers[label][gap.start - 1] for label in rigid])
+    from_a_line = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1]
+    return rigid if from_a_line > _OFF_LINE else []

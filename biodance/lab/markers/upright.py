@@ -1,18 +1,152 @@
-"""Who stands here: a person's right, ahead, floor and stature, told by labels or by the points alone, and where such a
-person has landmarks (``anthropometry/standing.toml``).
+"""Who stands here, and when quietly: a person's right, ahead, floor and stature, told by labels or by the points alone,
+and where such a person has landmarks (``anthropometry/standing.toml``).
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from biodance.lab.markers.set_file import part_of
-from biodance.lab.markers.spelling import plain_labels
+from biodance.errors import TrialRefused
+from biodance.lab.markers.names import meanings, meanings_of, plain_labels
+from biodance.lab.markers.sets import LANDMARKS, MarkerSet, landmark, part_of, segment_of
 from biodance.library import locate, read_toml
-from biodance.records import SIDES, Array
+from biodance.records import SIDES, Array, Markers, Mask, Trial, Wrench, longest_run, spread_frames
+from biodance.settings import STANDARD_GRAVITY, StandingRules
+
+WINDOW = 0.5
+"""s: length of the quietest part of the static trial that is averaged."""
+_UNSEEN = 0.1  # m a frame: an unseen marker counts as one that moves so fast
+_STILL = 0.02  # m, standard deviation over half a second beyond which a marker does not stand still
+_BLOCK = 0.05  # s: the force is averaged over blocks of this length before it is judged
+_NUMBERS = 1_000_000  # Numbers ordered at once, so that a long trial needs little memory
+_MOVEMENT: WeakKeyDictionary[Markers, float] = WeakKeyDictionary()
+"""How far markers moved, kept as long as they live: reader, roles and checks ask for it."""
+_PLACES = 16  # As many places in an order are found without ordering all
+
+
+def movement(markers: Markers) -> float:
+    """Return how far the typical marker travels in the trial, m: the median over markers of the diagonal of the box it
+    stays in.
+
+    The box is taken between the 2nd and 98th percentile of each coordinate, so that a flickering marker does not count
+    as movement. NaN if no marker was ever seen.
+    """
+    if markers not in _MOVEMENT:
+        _MOVEMENT[markers] = _movement(markers)
+    return _MOVEMENT[markers]
+
+
+def _movement(markers: Markers) -> float:
+    seen = np.flatnonzero(markers.seen.any(axis=0))
+    if not seen.size:
+        return float("nan")
+    some, boxes = max(1, _NUMBERS // (3 * markers.time.size)), []
+    for start in range(0, seen.size, some):
+        low, high = _percentiles(markers.xyz[:, seen[start : start + some]], 0.02, 0.98)
+        boxes.append(np.linalg.norm(high - low, axis=1))
+    return float(np.median(np.concatenate(boxes)))
+
+
+def _percentiles(values: Array, *shares: float) -> list[Array]:
+    """Return `numpy.nanpercentile` of the numbers along the first axis at ``shares``, 20 times as fast."""
+    last = np.isfinite(values).sum(axis=0) - 1
+    places = [share * last for share in shares]
+    around = [(np.floor(at).astype(int), np.minimum(np.floor(at).astype(int) + 1, last)) for at in places]
+    needed = np.unique(around)
+    few = needed.size <= _PLACES and needed[0] >= 0
+    ordered = np.partition(values, needed, axis=0) if few else np.sort(values, axis=0)  # NaN last
+    found = []
+    for at, (below, above) in zip(places, around, strict=True):
+        low, high = (np.take_along_axis(ordered, place[None], axis=0)[0] for place in (below, above))
+        found.append(low + (at - below) * (high - low))
+    return found
+
+
+def is_still(trial: Trial) -> bool:
+    """Return True if the trial has markers and the typical one stays within ``trial.settings.standing.still``."""
+    return trial.markers is not None and movement(trial.markers) <= trial.settings.standing.still
+
+
+def standing_mass(trial: Trial) -> float | None:
+    """Return the mass in kg that the plates carry in the longest quiet part (as ``trial.settings.standing`` has it);
+    None without one.
+
+    Only for trials in which the markers are still or that have no markers: a walker may have one foot beside the
+    plates.
+    """
+    if not trial.plates or (trial.markers is not None and not is_still(trial)):
+        return None
+    try:
+        return steady_mass(trial.wrench, rules=trial.settings.standing, gravity=trial.settings.gravity)
+    except TrialRefused:
+        return None
+
+
+def steady_mass(
+    wrench: Wrench, *, rules: StandingRules | None = None, gravity: float = STANDARD_GRAVITY
+) -> float | None:
+    """Return the mass in kg that a wrench carries in its longest quiet part (3 % for 0.4 s); None without one."""
+    vertical = wrench.force[:, 2]
+    size = max(1, round(_BLOCK * wrench.rate)) if np.isfinite(wrench.rate) else 1
+    count = vertical.size // size
+    quiet = _longest_steady(vertical[: count * size].reshape(count, size).mean(axis=1), rules or StandingRules())
+    return float(quiet.mean() / gravity) if quiet is not None else None
+
+
+def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
+    """Return the longest run of blocks within the sway of their median; None if too short, or of nobody."""
+    middle = float(np.nanmedian(blocks)) if np.isfinite(blocks).any() else 0.0
+    if not middle >= rules.force:
+        return None
+    run = blocks[slice(*longest_run(np.abs(blocks - middle) <= rules.sway * middle))]
+    return run if run.size and run.size * _BLOCK >= rules.shortest - 1e-9 else None
+
+
+def _quietest(markers: Markers) -> Mask:
+    """Return (T,) True for the ``WINDOW`` s in which the markers move least while most of them are seen."""
+    frames = markers.time.size
+    length = frames if frames < 3 else round(WINDOW * markers.rate)
+    if frames <= max(length, 2):
+        return np.ones(frames, dtype=bool)
+    step = np.linalg.norm(np.diff(markers.xyz, axis=0), axis=2)
+    unseen = np.isnan(step)
+    cost = np.where(unseen, _UNSEEN, step).sum(axis=1)
+    total = np.convolve(cost, np.ones(max(length - 1, 1)), mode="valid")
+    start = int(np.argmin(total))
+    return np.isin(np.arange(frames), np.arange(start, start + length))
+
+
+def posture_frames(markers: Markers) -> tuple[Mask, bool]:
+    """Return (T,) True for the frames that show one posture, and whether the person stands still in them.
+
+    They are the quietest half second; where nobody stands still, the one frame, among those that show most markers, in
+    which the lowest third of the markers is lowest: both feet are on the ground.
+    """
+    quiet = _quietest(markers)
+    near = markers.xyz[quiet]
+    several = np.isfinite(near).all(axis=2).sum(axis=0) > 1
+    if markers.time.size <= 2:
+        return quiet, True
+    if several.any() and np.nanmedian(np.nanstd(near[:, several], axis=0).max(axis=1)) <= _STILL:
+        return quiet, True
+    height = np.sort(np.where(markers.seen, markers.xyz[:, :, 2], np.inf), axis=1)
+    lowest = height[:, : max(1, len(markers.names) // 3)].mean(axis=1)
+    unseen = (~markers.seen).sum(axis=1)
+    lowest[unseen > unseen.min()] = np.inf
+    return np.arange(markers.time.size) == int(np.argmin(lowest)), False
+
+
+def median_places(markers: Markers, frames: Mask) -> dict[str, Array]:
+    """Return label -> (3,) m: the median over some frames (T,) of every marker that is seen in one of them."""
+    near = markers.xyz[frames].swapaxes(0, 1)
+    seen = np.asarray(np.isfinite(near).all(axis=2))
+    paths = zip(markers.names, near, seen, strict=True)
+    return {name: np.median(path[there], axis=0) for name, path, there in paths if there.any()}
+
 
 OUTWARDS = {"right": 1.0, "left": -1.0}
 """Sign of a person's right on each side."""
@@ -25,8 +159,7 @@ _FRONT_AND_BACK = (("toe", "{}_heel"), ("toe_lateral", "{}_heel"), ("asis", "{}_
 _ABOVE = ("ankle_lateral", "asis")
 _FEET = ("_heel", "_toe", "_toe_lateral", "_toe_medial")
 _NEEDED = ("asis", "knee_lateral", "ankle_lateral", "heel", "toe")
-_STATURES = np.geomspace(0.85, 2.15, 40)
-"""m: statures that are tried."""
+_STATURES = np.geomspace(0.85, 2.15, 40)  # m: statures that are tried
 
 
 @cache
@@ -66,9 +199,7 @@ class Standing:
         return np.asarray(xyz @ np.stack([self.right, self.ahead, [0.0, 0.0, 1.0]]).T / self.stature)
 
     def misfit(self, place: str, label: str) -> float:
-        """Return how far a marker is from the usual height of a landmark: 1 at the limit where it is believed; 0 where
-        the height tells nothing.
-        """
+        """Return how far a marker is from a landmark's usual height: 1 where hardly believed; 0 if untold."""
         usual = _height_of(place)
         return float(abs(self.shares([label])[0, 2] - usual[0]) / usual[1]) if usual else 0.0
 
@@ -163,9 +294,7 @@ def mirror_images(stand: Standing) -> list[tuple[str, str]]:
 
 
 def _plane_between(xyz: Array) -> tuple[Array, float] | None:
-    """Return the horizontal unit vector (3,) across the body and the place of the middle along it, m: of the planes
-    between two markers of one height the one that mirrors most markers onto others; None if it mirrors too few.
-    """
+    """Return the unit vector (3,) across the body and its middle, m: the plane that mirrors most; or None."""
     step = xyz[:, None] - xyz[None]
     flat = np.hypot(step[..., 0], step[..., 1])
     first, second = np.nonzero(np.triu((np.abs(step[..., 2]) < bound("level_m")) & (flat > bound("wide_m"))))
@@ -220,10 +349,7 @@ def _fitted(at: Mapping[str, Array], right: Array, offset: float) -> tuple[float
 
 
 def _misfit(shares: Array, origin: Array) -> Array:
-    """Return (O,) the sum over the needed landmarks of both sides of how far the nearest of the markers (N, 3) is, in
-    squared standard deviations, each at most twice what is believed; more for a person with markers above the head.
-    ``origin`` (O, 1): where the ankles are ahead. All in shares of the stature.
-    """
+    """Return (O,) the sum of squared sds of the nearest markers (N, 3) from needed landmarks, each bounded."""
 
     def nearest(part: str, side: float) -> Array:
         usual = usual_standing()["places"][part]
@@ -237,3 +363,86 @@ def _misfit(shares: Array, origin: Array) -> Array:
     trunk = shares[np.abs(shares[:, 0]) < 0.12]
     over = max(float(trunk[:, 2].max(initial=0.0)) - 1.03, 0.0) / 0.02
     return np.asarray(np.minimum([*near, behind], 2 * bound("near")).sum(axis=0) + over**2)
+
+
+_UPPER = ("head_front", "head_back", "c7", "jugular_notch", "mid_psis", "right_asis", "left_asis")
+_LOWER = ("right_heel", "left_heel", "right_toe", "left_toe", "right_ankle_lateral", "left_ankle_lateral")
+_HIGH, _DEEP = ("trunk_head", "pelvis"), ("right_foot", "left_foot", "right_shank", "left_shank")
+"""Segments of the upper and of the lowest part of the body, for sets that nobody described."""
+_CLEARLY_TALLER = 1.3
+"""A body stands along an axis along which it is so many times as long: arms spread sideways stay below."""
+
+
+def axis_to_head(markers: Markers, known: MarkerSet | None) -> Array | None:
+    """Return the signed coordinate axis (3,) from the feet to the head or pelvis in most frames, by what labels say of
+    high and low markers; where they say nothing, the only way up in which somebody stands. None if neither tells it.
+    ``known`` is the set of the labels (`recognise`).
+    """
+    few = Markers(markers.names, spread_frames(markers.time), spread_frames(markers.xyz))
+    ends = [
+        [p for name in names if known and (p := landmark(few, known, name)) is not None] for names in (_UPPER, _LOWER)
+    ]
+    if not all(ends):
+        # Read in the whole set or, where that says nothing, alone: sides do not matter.
+        together = meanings_of(markers.names)
+        said = {label: together.get(label) or meanings(label) for label in markers.names}
+        on = {label: ways[0].place for label, ways in said.items() if ways}
+        on = {label: segment_of(place) if place in LANDMARKS else place for label, place in on.items()}
+        ends = [[few[label] for label in on if on[label] in group] for group in (_HIGH, _DEEP)]
+    if not all(ends):
+        return _only_way_to_stand(markers)
+    top, bottom = (np.concatenate(points) for points in ends)
+    if not (np.isfinite(top).any() and np.isfinite(bottom).any()):
+        return None
+    return clear_axis(np.nanmedian(top, axis=0) - np.nanmedian(bottom, axis=0))
+
+
+def _only_way_to_stand(markers: Markers) -> Array | None:
+    """Return the signed axis (3,) along which alone the points are a standing person; None if none or several are."""
+    points = median_places(markers, _quietest(markers))
+    at = {label: points[label] for label in plain_labels(points)}
+    if len(at) < bound("cloud"):
+        return None
+    extent = np.ptp(np.percentile(list(at.values()), (5, 95), axis=0), axis=0)
+    found = []
+    for up in (
+        sign * np.eye(3)[k] for k in np.flatnonzero(extent > bound("tall") * extent.max()) for sign in (1.0, -1.0)
+    ):
+        first = np.roll(np.abs(up), 1)
+        turned = np.stack([first, np.cross(up, first), up])
+        if standing_by_points({label: turned @ point for label, point in at.items()}) is not None:
+            found.append(up)
+    return found[0] if len(found) == 1 else None
+
+
+def clear_axis(direction: Array) -> Array | None:
+    """Return the signed coordinate axis that a direction (3,) clearly follows; None if none."""
+    size = np.sort(np.abs(direction))
+    if not np.isfinite(size).all() or size[2] <= bound("clear") * size[1]:
+        return None
+    i = int(np.argmax(np.abs(direction)))
+    axis: Array = np.eye(3)[i] * np.sign(direction[i])
+    return axis
+
+
+def turn_to(up: Array) -> Array:
+    """Return the rotation (3, 3) whose third row is a coordinate axis ``up``; its first row is x where possible."""
+    first = np.array([1.0, 0.0, 0.0]) if up[0] == 0 else np.array([0.0, 1.0, 0.0])
+    return np.stack([first, np.cross(up, first), up]) + 0.0
+
+
+def body_is_tall_along_z(xyz: Array) -> bool:
+    """Return True if the marker cloud (T, K, 3) is clearly taller along the third axis than along the second.
+
+    The extent is taken frame by frame and its median over time is compared, so that walking does not count as height;
+    arms that are spread sideways stay below 1.3 times the stature. A single marker has no extent: the answer is then
+    False.
+    """
+    seen = xyz[:, np.logical_not(np.isnan(xyz).all(axis=(0, 2)))]
+    if seen.shape[1] < 2:
+        return False
+    frames = seen[np.logical_not(np.isnan(seen).any(axis=2)).sum(axis=1) >= 2]
+    if not len(frames):
+        return False
+    extent = np.median(np.nanmax(frames, axis=1) - np.nanmin(frames, axis=1), axis=0)
+    return bool(extent[2] > _CLEARLY_TALLER * extent[1])

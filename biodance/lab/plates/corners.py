@@ -1,12 +1,20 @@
-"""The outline of a force plate: whether it is a plate at all, and which way its axes point."""
+"""The outline of a force plate: whether it is one, which way its axes point, what the analyst says of it
+(``[plates.NAME]`` in session.toml, before what the file says), and one place for all trials.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.records import Array
+from biodance.records import Array, Plate, Trial, Wrench
+from biodance.records.attention import WARNING
+from biodance.spatial import wrench_about_origin, wrench_about_point
 
 SHORTEST_SIDE, LONGEST_SIDE = 0.2, 2.0  # m
-NOT_CLOSED, CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
+_NOT_CLOSED, _CROOKED = 0.02, 0.005  # m: refused from here on; worth a sentence from here on
 _UNEVEN = 0.1  # share of the shortest side by which a rectangle may miss its closure
 _STEEPEST = 0.7  # the plate's normal must have at least this vertical share (45 degrees)
 _SWAPS = {(0, 1, 3, 2): "3 and 4 (or 1 and 2)", (0, 2, 1, 3): "2 and 3 (or 1 and 4)"}
@@ -38,12 +46,12 @@ def corners_in_lab(corners: Array, *, metres: float, turn: Array) -> tuple[Array
     _refuse_disorder(lab)
     _refuse_size(lab, corners)
     gap, skew = _gap(lab), _skew(lab)
-    if gap > NOT_CLOSED or skew > NOT_CLOSED:
+    if gap > _NOT_CLOSED or skew > _NOT_CLOSED:
         raise TrialRefused(
             f"CORNERS are no rectangle: opposite sides differ by {1000 * gap:.0f} mm and the angles by "
-            f"{1000 * skew:.0f} mm at a side's end (legal: {1000 * NOT_CLOSED:.0f} mm). Measure the corners again."
+            f"{1000 * skew:.0f} mm at a side's end (legal: {1000 * _NOT_CLOSED:.0f} mm). Measure the corners again."
         )
-    if gap > CROOKED or skew > CROOKED:
+    if gap > _CROOKED or skew > _CROOKED:
         decisions.append(
             f"CORNERS deviate from a rectangle by {1000 * max(gap, skew):.0f} mm; the best-fitting axes were used."
         )
@@ -110,7 +118,7 @@ def _refuse_disorder(lab: Array) -> None:
     if sides[0] @ sides[2] < 0 and sides[1] @ sides[3] < 0:
         return
     for order, which in _SWAPS.items():
-        if _gap(lab[list(order)]) < NOT_CLOSED:
+        if _gap(lab[list(order)]) < _NOT_CLOSED:
             raise TrialRefused(
                 f"CORNERS are out of order: the outline is a bow-tie; corners {which} are exchanged. The legal order "
                 "is +x+y, -x+y, -x-y, +x-y of the plate axes. Correct FORCE_PLATFORM:CORNERS."
@@ -146,3 +154,136 @@ def _skew(lab: Array) -> float:
 
 def _point(p: Array) -> str:
     return "(" + ", ".join(f"{c:.4g}" for c in p) + ")"
+
+
+_C3D_ONLY = ("type", "channels", "sensitivity", "origin_m")
+
+
+@dataclass(frozen=True, eq=False)
+class ToldPlate:
+    """What is said of one plate; None = nothing, the file decides.
+
+    ``corners`` (4, 3) m in the lab frame (z up, as `inspect` shows them), in the order +x+y, -x+y, -x-y, +x-y of the
+    plate axes; ``type`` of the C3D standard; ``channels`` labels, or numbers from 1; ``sensitivity`` (rows, channels)
+    N and N·m per unit of a channel as the file gives it; ``origin`` (3,) m from the sensor to the centre of the
+    surface, plate axes; ``foot`` that stands on it, "" = as the markers show; ``use`` False leaves the plate out.
+    """
+
+    corners: Array | None = None
+    type: int | None = None
+    channels: tuple[str | int, ...] | None = None
+    sensitivity: Array | None = None
+    origin: Array | None = None
+    foot: str = ""
+    use: bool = True
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of session.toml that say something of what the plate measures and where."""
+        said = {
+            "corners_m": self.corners,
+            "type": self.type,
+            "channels": self.channels,
+            "sensitivity": self.sensitivity,
+            "origin_m": self.origin,
+            "foot": self.foot or None,
+        }
+        return tuple(key for key, value in said.items() if value is not None)
+
+    @property
+    def sentence(self) -> str:
+        """What is taken from session.toml, for the history; "" for nothing."""
+        return f"{', '.join(self.keys)} as session.toml says." if self.keys else ""
+
+
+NOTHING_TOLD = ToldPlate()
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What the analyst says to readers of forces: ``plates`` by name, declared body ``mass`` kg or None."""
+
+    plates: Mapping[str, ToldPlate] = field(default_factory=lambda: MappingProxyType({}))
+    mass: float | None = None
+
+
+def as_told(trial: Trial, told: Told) -> Trial:
+    """Return a trial of a format whose plates come as wrenches (text, AMTI) with what the analyst says of them.
+
+    A plate of unknown place gets its corners; one that was placed in a frame of its own is moved there with what it
+    measured. What only the channels of a C3D file can follow is named in a warning.
+    """
+    plates, history, warnings = [], [], []
+    for plate in trial.plates:
+        said = told.plates.get(plate.name, NOTHING_TOLD)
+        if not said.use:
+            history.append(f"{plate.name} was left out, as session.toml says.")
+            continue
+        idle = [key for key in said.keys if key in _C3D_ONLY]
+        if idle:
+            warnings.append(f"{plate.name}: {', '.join(idle)} of session.toml can be followed in C3D files only.")
+        done = plate if said.corners is None else _placed(plate, said.corners)
+        if used := ", ".join(key for key in said.keys if key not in idle):
+            taken = f"{used} as session.toml says."
+            done = replace(done, foot=said.foot, decisions=(*done.decisions, f"{taken[0].upper()}{taken[1:]}"))
+            history.append(f"{plate.name}: {taken}")
+        plates.append(done)
+    return replace(
+        trial,
+        plates=tuple(plates),
+        history=(*trial.history, *history),
+        warnings=(*trial.warnings, *warnings),
+    )
+
+
+def _placed(plate: Plate, corners: Array) -> Plate:
+    """Return the plate at ``corners`` (4, 3) m."""
+    if not plate.placed:
+        return replace(plate, corners=corners, placed=True)
+    turn = plate_axes(corners) @ plate_axes(plate.corners).T
+    local = wrench_about_point(plate.wrench.value, plate.centre)
+    turned = np.hstack([local[:, :3] @ turn.T, local[:, 3:] @ turn.T])
+    wrench = Wrench(plate.wrench.time, wrench_about_origin(turned, corners.mean(axis=0)))
+    return replace(plate, corners=corners, wrench=wrench, zero=turn @ plate.zero)
+
+
+_MOVED = 0.05
+"""m between two trials from which on the plate was another one, or moved: nearly three times what the feet
+leave open in two (0.013 m each)."""
+
+
+def one_place(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
+    """Return the trials with every plate that was put by the feet (``Plate.put``) at the median of what they say, and
+    notes: a plate does not move between the trials of one visit, while people lean otherwise in each.
+    """
+    puts: dict[str, list[Array]] = {}
+    for trial in trials:
+        for plate in trial.plates:
+            if plate.put is not None:
+                puts.setdefault(plate.name, []).append(plate.put)
+    place, notes = {}, []
+    for name, found in puts.items():
+        apart = float(np.ptp(found, axis=0).max())
+        if apart > _MOVED:
+            notes.append(
+                f"{WARNING}{name} would lie up to {1000 * apart:.0f} mm elsewhere in another trial by where the feet "
+                f"stand: each trial keeps its own place. Give corners_m in [plates.{name}] of session.toml."
+            )
+        elif len(found) > 1:
+            place[name] = np.median(found, axis=0)
+            x, y = place[name]
+            notes.append(
+                f"{name} was put at ({x:.3f}, {y:.3f}, 0) m in all trials, the median of what the feet of "
+                f"{len(found)} say, which are up to {1000 * apart:.0f} mm apart."
+            )
+    return [replace(trial, plates=tuple(_moved(plate, place) for plate in trial.plates)) for trial in trials], notes
+
+
+def _moved(plate: Plate, place: dict[str, Array]) -> Plate:
+    """Return the plate, with its wrench, at its ``place``."""
+    if plate.put is None or plate.name not in place:
+        return plate
+    shift = np.array([*(place[plate.name] - plate.put), 0.0])
+    value = np.hstack([plate.wrench.force, plate.wrench.moment + np.cross(shift, plate.wrench.force)])
+    moved = Wrench(plate.wrench.time, value)
+    return replace(plate, corners=plate.corners + shift, wrench=moved, put=place[plate.name])

@@ -41,11 +41,12 @@ _DEAD, _LONG = 1.5, 0.5
 _FEW = 10  # samples: a shorter ZERO is only used where nothing better is found
 
 
+FOOT_HEIGHT = 0.15  # m above the surface: markers of a standing foot, ankle included
+
+
 @dataclass(frozen=True)
 class Decisions:
-    """What was decided about a plate, step by step: from session.toml, corners, origin, units, gaps, what the load
-    shows, zero.
-    """
+    """What was decided about a plate, step by step, from session.toml to its zero."""
 
     told: tuple[str, ...] = ()
     corners: tuple[str, ...] = ()
@@ -118,10 +119,8 @@ class _Geometry(NamedTuple):
     origin_said: tuple[str, ...]
 
 
-class DecodedPlates(NamedTuple):
-    """The ``readings`` of the plates of a file, the reason by number why others are ``refused``, and what a person
-    should look at.
-    """
+class _DecodedPlates(NamedTuple):
+    """The ``readings`` of a file's plates, why others are ``refused`` by number, and ``warnings``."""
 
     readings: list[PlateReading]
     refused: dict[int, str]
@@ -130,7 +129,7 @@ class DecodedPlates(NamedTuple):
 
 def decode_plates(
     raw: RawC3d, plates: Sequence[PlateParameters], *, metres: float, turn: Array, mass: float | None
-) -> DecodedPlates:
+) -> _DecodedPlates:
     """Return the readings of all plates of a C3D file, without ANALOG:SCALE where it was applied already.
 
     Programs that store floating-point channels in their units may leave the SCALE of the integers in the file. It is
@@ -165,22 +164,22 @@ def decode_plates(
     done, lost = _decode_each(raw, placed, refused)
     used = [column for reading in done for column in reading.plate.channels]
     if not mass or not mass > 0 or raw.layout is None or not raw.layout.floating or not used:
-        return DecodedPlates(done, lost, ())
+        return _DecodedPlates(done, lost, ())
     gain, share = raw.layout.gain[used], _weight_share(done, mass)
     if not np.isfinite(gain).all() or (gain == 1).all() or _SCALE_OFF < share < 1 / _SCALE_OFF:
-        return DecodedPlates(done, lost, ())
+        return _DecodedPlates(done, lost, ())
     scale = np.where(np.isfinite(raw.layout.gain) & (raw.layout.gain != 0), raw.layout.gain, 1.0)
     stored = replace(raw, analog=raw.analog / scale + raw.layout.offset)
     plain, lost_plain = _decode_each(stored, placed, refused)
     whole = _weight_share(plain, mass)
     if len(plain) < len(done) or abs(whole - 1) > _SCALE_RIGHT:
-        return DecodedPlates(done, lost, ())
+        return _DecodedPlates(done, lost, ())
     said = (
         f"Read with ANALOG:SCALE the plates carry {share:.1g} of the weight ({mass:.4g} kg), without it all of it "
         f"({whole:.2f}): the floating-point data are already scaled, and SCALE was not applied. Write 1 into "
         f"ANALOG:SCALE, or export the file again."
     )
-    return DecodedPlates(plain, lost_plain, (said,))
+    return _DecodedPlates(plain, lost_plain, (said,))
 
 
 def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
@@ -192,9 +191,7 @@ def _geometry(plate: PlateParameters, metres: float, turn: Array) -> _Geometry:
 
 
 def _origin(plate: PlateParameters, half: Array, metres: float) -> tuple[Array, tuple[str, ...]]:
-    """Return ORIGIN (3,) in m, in the file's unit, or in m or mm where only that makes sense, and what was decided;
-    TrialRefused where nothing does.
-    """
+    """Return ORIGIN (3,) in m, in the unit that makes sense, and what was decided."""
     four = plate.type in FOUR_SENSORS
     fits = []
     for unit in dict.fromkeys((metres, 0.001, 1.0)):
@@ -230,11 +227,7 @@ def _decode_each(
 
 
 def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReading:
-    """Return the reading of one plate; TrialRefused where no sample is known.
-
-    ``sensor = W(k * C (channels - zero))`` with the SI units k, the calibration matrix C and the formula W of the TYPE
-    (`sensor_wrench`).
-    """
+    """Return the reading of one plate; TrialRefused where no sample is known."""
 
     def in_si(samples: Array) -> Array:
         output = samples if plate.calibration is None else samples @ plate.calibration.T
@@ -261,9 +254,7 @@ def _decode(raw: RawC3d, plate: PlateParameters, place: _Geometry) -> PlateReadi
 
 
 def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask, tuple[str, ...]]:
-    """Return the channels with the nearest known sample where one is no number, where all are known, and what was
-    masked; TrialRefused where nothing is known.
-    """
+    """Return the channels with the nearest known sample in gaps, where all are known, and what was masked."""
     known = np.asarray(np.isfinite(channels).all(axis=1))
     if known.all():
         return channels, known, ()
@@ -281,9 +272,7 @@ def _without_gaps(channels: Array, plate: PlateParameters) -> tuple[Array, Mask,
 
 @dataclass(frozen=True)
 class Baseline:
-    """Samples ``start`` to ``stop`` (exclusive) over which each channel is averaged, both 0 for none; ``said`` is
-    the sentence about it.
-    """
+    """Samples ``start`` to ``stop`` (exclusive) to average, both 0 for none; ``said`` is the sentence about it."""
 
     start: int
     stop: int
@@ -373,9 +362,7 @@ def is_unloaded(level: float, vertical: Array) -> bool:
 
 
 def block_means(values: Array, rate: float, *, length: float = _BLOCK) -> tuple[Array, int]:
-    """Return the means of ``values`` (S,) over whole blocks of ``length`` s, and the samples per block (at least one
-    block).
-    """
+    """Return the means of ``values`` (S,) over whole blocks of ``length`` s (one at least), and samples a block."""
     size = min(max(1, round(length * rate)), values.size)
     count = values.size // size
     return values[: count * size].reshape(count, size).mean(axis=1), size
@@ -439,3 +426,8 @@ def _weight_share(readings: Sequence[PlateReading], mass: float) -> float:
     total = np.sum([np.abs(reading.sensor[:, 2]) for reading in readings], axis=0)
     loaded = total >= _SOMEBODY_ON * total.max()
     return float(np.median(total[loaded]) / (mass * STANDARD_GRAVITY))
+
+
+def left_out_said(number: int, why: TrialRefused | str) -> str:
+    """Return the sentence that a plate is not used."""
+    return f"Plate {number} was left out, and what it carried is missing from the total: {why}"

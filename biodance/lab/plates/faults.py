@@ -1,8 +1,5 @@
 """What can be wrong with an installed plate, each fault as one object: what the plate reads instead of the wrench that
 is there, and its inverse.
-
-Effects, witnesses, a laboratory's corrections and the tolerances of plates share these formulas. The virtual laboratory
-makes its faults by other code on purpose.
 """
 
 from collections.abc import Mapping

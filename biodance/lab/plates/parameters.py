@@ -15,7 +15,7 @@ import numpy as np
 
 from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.plates.told import NOTHING_TOLD, ToldPlate
+from biodance.lab.plates.corners import NOTHING_TOLD, ToldPlate
 from biodance.records import Array
 from biodance.settings import STANDARD_GRAVITY
 
@@ -25,8 +25,7 @@ FOUR_SENSORS = (3, 6, 7)
 CONTENT = {1: "FFFLLM", 2: "FFFMMM", 3: "FFFFFFFF", 4: "FFFMMM", 5: "FFFMMM", 6: "F" * 12, 7: "F" * 8}
 """What each channel (after the calibration matrix) holds: F force, M moment, L length."""
 _MATRIX_OF_TYPE = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}
-_USUAL_TYPE = 2
-"""Three forces and three moments: taken for channels of which nothing else is said."""
+_USUAL_TYPE = 2  # Three forces and three moments: taken for channels of which nothing else is said
 _NAMES_OF_TYPE = {8: "not defined", **dict.fromkeys((11, 12), "a Kistler split-belt treadmill"), 21: "AMTI stairs"}
 
 _SIX = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -35,19 +34,19 @@ _AROUND_NAMES = re.compile(r"force|moment|torque|[\s._+:-]", flags=re.IGNORECASE
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 _WORDS = {"F": "force", "M": "moment", "L": "length"}
 
-POUND, KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
+POUND, _KILOGRAM_FORCE, INCH = 4.4482216152605, STANDARD_GRAVITY, 0.0254
 FORCE = {
     **dict.fromkeys(("n", "newton", "newtons", "nt"), 1.0),
     "kn": 1000.0,
     **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), POUND),
-    **dict.fromkeys(("kgf", "kp"), KILOGRAM_FORCE),
+    **dict.fromkeys(("kgf", "kp"), _KILOGRAM_FORCE),
 }
 _LENGTH = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH, "inch": INCH, "inches": INCH, "ft": 12 * INCH}
 MOMENT = {force + length: f * s for force, f in FORCE.items() for length, s in _LENGTH.items()} | {
     length + force: f * s for force, f in FORCE.items() for length, s in _LENGTH.items() if force != "n"
 }
 """N·m per unit, for unit texts without blanks and signs: ``nmm``, ``inlb``, ``lbfft`` ..."""
-TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
+_TABLES = {"F": FORCE, "M": MOMENT, "L": _LENGTH}
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,7 @@ class PlateParameters:
         return f"plate{self.number}"
 
 
-class DeclaredPlates(NamedTuple):
+class _DeclaredPlates(NamedTuple):
     """The ``plates`` that a file and session.toml describe, the reason by number why others are ``refused``, what a
     person should look at, what was decided without doubt.
     """
@@ -108,7 +107,7 @@ class DeclaredPlates(NamedTuple):
     history: tuple[str, ...]
 
 
-def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array) -> DeclaredPlates:
+def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float, turn: Array) -> _DeclaredPlates:
     """Return the plates of the file and those whose channels ``told`` names, without those that are not to be used.
 
     ``told`` by the plate's name; ``metres`` is the file's length unit in m, ``turn`` (3, 3) leads from file axes to the
@@ -117,7 +116,7 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
     count, warnings = count_plates(raw)
     more = {int(name.removeprefix("plate")): one for name, one in told.items()}
     if not count and not warnings and not more:
-        warnings = undescribed_plates(raw)
+        warnings = _undescribed_plates(raw)
     lacking = [n for n, one in more.items() if n > count and one.use and not one.channels] if raw.analog.size else []
     warnings += tuple(
         f"Plate {n} of session.toml is none of the file's {count} plates. Give its channels in [plates.plate{n}], or "
@@ -130,14 +129,14 @@ def declared_plates(raw: RawC3d, told: Mapping[str, ToldPlate], *, metres: float
     if numbers and (raw.analog.shape[0] == 0 or not raw.analog_rate > 0):
         lacks = "holds no analog samples" if raw.analog.shape[0] == 0 else f"has the analog rate {raw.analog_rate:g}"
         declared = f"The file declares {len(numbers)} force plates but {lacks}: no plate was read."
-        return DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
+        return _DeclaredPlates((), {}, (*warnings, f"{declared} Export it with the analog data."), history)
     plates, refused = [], {}
     for number in numbers:
         try:
             plates.append(plate_parameters(raw, number, more.get(number), metres=metres, turn=turn))
         except TrialRefused as error:
             refused[number] = str(error)
-    return DeclaredPlates(tuple(plates), refused, warnings, history)
+    return _DeclaredPlates(tuple(plates), refused, warnings, history)
 
 
 def count_plates(raw: RawC3d) -> tuple[int, tuple[str, ...]]:
@@ -220,9 +219,7 @@ def plate_parameters(
 
 
 def _told_columns(channels: Sequence[str | int], labels: tuple[str, ...]) -> Array:
-    """Return the channels that session.toml names as numbers (n,) from 1 among the ``labels`` of the file;
-    TrialRefused where the file has no such channel, or has it twice.
-    """
+    """Return the channels that session.toml names as numbers (n,) from 1 among the ``labels`` of the file."""
     plain = [label.strip().casefold() for label in labels]
     named = [label for label in labels if label]
     found = []
@@ -337,12 +334,7 @@ def plain_unit(text: str) -> str:
 def _unit_factors(
     kind: int, told: ToldPlate, units: Sequence[str], metres: float
 ) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Return the SI unit per unit of each channel (after the calibration matrix), and what was decided about the units.
-
-    ``units`` are the texts of the plate's channels, ``metres`` is the length unit of the file in m. The output of a
-    calibration matrix is in N and N times the file's length unit, as C3D demands. A unit that is missing or makes no
-    sense for the channel is taken as N, N times the file's length unit, or the file's length unit, and said.
-    """
+    """Return the SI unit per unit of each channel (after the calibration matrix), and what was decided."""
     content = CONTENT[kind]
     listed = ", ".join(dict.fromkeys(unit or "(none)" for unit in units))
     assumed = {"F": 1.0, "M": metres, "L": metres}
@@ -354,7 +346,7 @@ def _unit_factors(
         return tuple(assumed[what] for what in content), (said,)
     factors, strange = [], {}
     for what, unit in zip(content, units, strict=True):
-        known = TABLES[what].get(plain_unit(unit))
+        known = _TABLES[what].get(plain_unit(unit))
         factors.append(assumed[what] if known is None else known)
         if known is None:
             strange[what] = unit
@@ -382,7 +374,7 @@ def channel_groups(labels: Sequence[str]) -> tuple[tuple[int, ...], ...]:
     return tuple(sorted(found))
 
 
-def undescribed_plates(raw: RawC3d) -> tuple[str, ...]:
+def _undescribed_plates(raw: RawC3d) -> tuple[str, ...]:
     """Say that channels of a file without described plates look like some; () if none do."""
     groups = channel_groups(raw.analog_labels)
     if not groups:

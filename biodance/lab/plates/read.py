@@ -1,30 +1,168 @@
 """The force plates of a C3D file: one wrench per plate, ground on subject, about the lab origin, in SI. Every
 decision is a sentence.
 
-parameters (what the file says) -> decode (channels to wrench, in plate axes) -> left_out (what is no measurement) ->
+parameters (what the file says) -> decode (channels to wrench, in plate axes) -> what is no measurement ->
 sense (directions, and the wrench in the lab).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from biodance.errors import TrialRefused
 from biodance.lab.c3d.raw import RawC3d
-from biodance.lab.markers.still import movement, steady_mass
-from biodance.lab.plates.decode import decode_plates
-from biodance.lab.plates.left_out import left_out_said, without_dead, without_padding
+from biodance.lab.markers.upright import movement, steady_mass
+from biodance.lab.plates.corners import ToldPlate
+from biodance.lab.plates.decode import FOOT_HEIGHT, LARGEST_SHARE, PlateReading, decode_plates, left_out_said
 from biodance.lab.plates.parameters import POUND, declared_plates
 from biodance.lab.plates.sense import sense_plates, with_loads_on_plates
-from biodance.lab.plates.told import ToldPlate
-from biodance.records import Array, Defect, Markers, Plate, Wrench
-from biodance.settings import CheckLimits, StandingRules
+from biodance.records import Array, Defect, Markers, Mask, Plate, Wrench
+from biodance.settings import TOUCH_FORCE, CheckLimits, StandingRules
+
+_AROUND = 0.05  # m by which a sole reaches beyond its markers
+
+_STUCK = 2e-3  # share of its mean by which the vertical of a loaded plate varies at least, whoever moves on it
+_SAME_PLACE = 0.001  # m: standard deviation of a centre of pressure that nobody moves
+_QUIET = 2.5
+"""N: largest standard deviation of what an empty plate reads, half the spread up to which `decode` calls one quiet; a
+foot that comes or goes changes it by far more.
+"""
+_SOMEBODY = 5 * TOUCH_FORCE  # N, the load of a plate from which on somebody is on it
+_CONTACT = 0.1  # s over which the plate's noise is averaged
+
+_FEWEST = 5
+"""Equal samples in a row that are no chance: where each of six channels repeats its number half of the time, as a
+coarse converter does at rest, all of them repeat it four times in six of a hundred million rows.
+"""
+
+
+def without_dead(readings: Sequence[PlateReading], markers: Markers | None) -> tuple[list[PlateReading], list[Defect]]:
+    """Return the readings of plates that are not dead, without constants where nobody steps on them; the dead ones."""
+    alive, dead = [], []
+    for reading in readings:
+        elsewhere = _borne_elsewhere(reading, [one for one in readings if one is not reading], markers)
+        constant = _without_offset(reading, elsewhere)
+        if why := _why_dead(constant, markers, elsewhere):
+            said = left_out_said(reading.plate.number, why)
+            dead.append(Defect("dead_plate", reading.plate.name, said, float(reading.sensor[:, 2].mean()), "N"))
+        else:
+            alive.append(constant)
+    return alive, dead
+
+
+def _borne_elsewhere(reading: PlateReading, others: Sequence[PlateReading], markers: Markers | None) -> float:
+    """Return the largest force N of another plate with a foot on it; 0 with a foot on this one, or without."""
+    if markers is None or _feet_on(reading, markers):
+        return 0.0
+    loads = [float(np.abs(one.sensor[:, 2]).max()) for one in others if _feet_on(one, markers)]
+    return max((load for load in loads if load > _SOMEBODY), default=0.0)
+
+
+def _feet_on(reading: PlateReading, markers: Markers) -> bool:
+    """Return whether a marker as low as a standing foot's is ever over the plate, or no more than 0.05 m beside it."""
+    centre = reading.corners.mean(axis=0)
+    x, y, _ = (reading.axes[:, k] @ np.moveaxis(markers.xyz - centre, -1, 0).reshape(3, -1) for k in range(3))
+    low = np.abs(markers.xyz[..., 2] - centre[2]).ravel() <= FOOT_HEIGHT
+    half = reading.half + _AROUND
+    return bool((low & (np.abs(x) <= half[0]) & (np.abs(y) <= half[1])).any())
+
+
+def _without_offset(reading: PlateReading, elsewhere: float) -> PlateReading:
+    """Return the reading without the constant that it reads while the person is ``elsewhere`` (N), as its zero."""
+    level, spread, _ = _course(reading, _CONTACT)
+    if not TOUCH_FORCE < abs(level) <= LARGEST_SHARE * elsewhere or spread >= _QUIET:
+        return reading
+    zero = reading.sensor[reading.known].mean(axis=0)
+    said = f"Zero: no foot is ever on the plate, so the constant {level:.3g} N that it reads was subtracted."
+    decisions = replace(reading.decisions, zero=(said,))  # instead of the sentence that no zero was found
+    return replace(reading, sensor=reading.sensor - zero, empty=reading.empty + zero[:3], decisions=decisions)
+
+
+def _why_dead(reading: PlateReading, markers: Markers | None, elsewhere: float) -> str:
+    """Return why a plate is dead, "" for one alive: a constant load at one place though the person moves."""
+    length = _CONTACT if elsewhere else 0.0  # noise is averaged only where feet tell that nobody is on the plate
+    level, spread, wanders = _course(reading, length)
+    still = spread < _STUCK * abs(level) and wanders < _SAME_PLACE * abs(level)
+    if markers is None or abs(level) <= TOUCH_FORCE or not still:
+        return ""
+    if not (elsewhere or movement(markers) > StandingRules.still):
+        return ""
+    wires = ", ".join(str(c + 1) for c in reading.plate.channels)
+    meanwhile = "with nobody on it" if elsewhere else "while the person moves"
+    return (
+        f"it reads a constant {level:.0f} N (± {spread:.2g} N) {meanwhile}: a stuck or unplugged channel, or a "
+        f"plate whose zero was never set. Check channels {wires}."
+    )
+
+
+def _course(reading: PlateReading, length: float) -> tuple[float, float, float]:
+    """Return the mean vertical N, and the sds of its means over ``length`` s and of the worse moment's, N·m."""
+    sensor = reading.sensor[reading.known, 2:5]
+    size = min(max(1, round(length * reading.rate)), len(sensor))
+    count = len(sensor) // size
+    means = sensor[: count * size].reshape(count, size, 3).mean(axis=1)
+    level, (spread, *wanders) = float(means[:, 0].mean()), means.std(axis=0)
+    return level, float(spread), float(max(wanders))
+
+
+def without_padding(
+    raw: RawC3d, readings: Sequence[PlateReading], markers: Markers | None
+) -> tuple[list[PlateReading], list[Defect]]:
+    """Return the readings without padding at the ends of the recording, where a plate is loaded meanwhile, and it as a
+    defect. Padding: recording programs and filters that need what was before the first or after the last sample write
+    that sample again; nothing was measured there.
+    """
+    padded = _padded_samples(raw, markers)
+    if not any((np.abs(reading.sensor[padded, 2]) > TOUCH_FORCE).any() for reading in readings):
+        return [*readings], []
+    first = int(np.argmin(padded)) if padded[:1].any() else 0
+    last = int(np.argmin(padded[::-1])) if padded[-1:].any() else 0
+    ends = [
+        f"{end} {1000 * count / raw.analog_rate:.4g} ms" for end, count in (("first", first), ("last", last)) if count
+    ]
+    said = (
+        f"The {' and the '.join(ends)} of every analog channel repeat one sample: padding by the recording program. "
+        f"They were left out."
+    )
+    lost = float(padded.sum() / raw.analog_rate)
+    return [replace(one, known=one.known & ~padded) for one in readings], [Defect("padding", "", said, lost, "s")]
+
+
+def _padded_samples(raw: RawC3d, markers: Markers | None) -> Mask:
+    """Return (S,) True at the ends where all channels repeat one sample though the markers go on."""
+    padded = np.zeros(len(raw.analog), dtype=bool)
+    live = raw.analog[:, (raw.analog != raw.analog[:1]).any(axis=0)] if len(raw.analog) else raw.analog
+    if not live.size:
+        return padded
+    first, last = _repeats(live), _repeats(live[::-1])
+    if first and _moves(markers, 0.0, first / raw.analog_rate):
+        padded[:first] = True
+    if last and _moves(markers, (len(live) - last) / raw.analog_rate, np.inf):
+        padded[-last:] = True
+    return padded
+
+
+def _repeats(live: Array) -> int:
+    """Return how many samples before the first measured one repeat it; 0 for too few."""
+    count = int(np.argmax((live != live[0]).any(axis=1))) - 1
+    return count if count + 1 >= _FEWEST and live[0].any() else 0
+
+
+def _moves(markers: Markers | None, start: float, stop: float) -> bool:
+    """Return whether a marker moves between two times (s from the first frame); True where nobody can tell."""
+    if markers is None or markers.time.size < 2:
+        return True
+    time = markers.time - markers.time[0]
+    first = min(int(np.searchsorted(time, start)), time.size - 2)
+    some = markers.xyz[first : max(int(np.searchsorted(time, stop)), first + 1) + 1]
+    return bool((np.diff(some, axis=0) != 0)[np.isfinite(np.diff(some, axis=0))].any())
+
 
 _AS_POUNDS = 0.03  # share by which a ratio of weights may differ from newton per pound
 
 
-class ReadPlates(NamedTuple):
+class _ReadPlates(NamedTuple):
     """The plates of one file, what a person should look at, what was decided without doubt, and what was left out."""
 
     plates: tuple[Plate, ...] = ()
@@ -41,7 +179,7 @@ def read_plates(
     markers: Markers | None = None,
     body_mass: float | None = None,
     told: Mapping[str, ToldPlate] | None = None,
-) -> ReadPlates:
+) -> _ReadPlates:
     """Return the force plates of a C3D file, with warnings, history and defects.
 
     Each ``Plate.wrench`` is the ground's action ON the subject about the LAB origin at the analog rate, zero taken off,
@@ -60,7 +198,7 @@ def read_plates(
     refused = {**declared.refused, **decoded.refused, **beside}
     warnings = (*declared.warnings, *decoded.warnings, *(left_out_said(n, refused[n]) for n in sorted(refused)))
     if not readings:
-        return ReadPlates((), warnings, declared.history)
+        return _ReadPlates((), warnings, declared.history)
     readings, dead = without_dead(readings, markers)
     readings, padded = without_padding(raw, readings, markers)
     start = float(markers.time[0]) if markers is not None and markers.time.size else 0.0
@@ -68,19 +206,7 @@ def read_plates(
     defects = (*dead, *padded)
     followed = (f"{one.plate.name}: {one.plate.told.sentence}" for one in readings if one.plate.told.sentence)
     history = (*declared.history, *followed, *(one.text for one in defects))
-    return ReadPlates(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
-
-
-def total_wrench(plates: tuple[Plate, ...]) -> Wrench:
-    """Return the summed wrench of plates that share one time base; TrialRefused without plates or with different
-    time bases.
-    """
-    if not plates or any(not np.array_equal(p.wrench.time, plates[0].wrench.time) for p in plates):
-        raise TrialRefused(
-            "The total wrench needs at least one plate and one time base for all of them. Read the plates from one "
-            "file."
-        )
-    return Wrench(plates[0].wrench.time, np.sum([p.wrench.value for p in plates], axis=0))
+    return _ReadPlates(plates, (*warnings, *said, *_weight_said(plates, markers, body_mass)), history, defects)
 
 
 def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: float | None) -> tuple[str, ...]:
@@ -88,8 +214,7 @@ def _weight_said(plates: tuple[Plate, ...], markers: Markers | None, body_mass: 
     walks = markers is not None and movement(markers) > StandingRules.still
     if not plates or walks:
         return ()
-    total = total_wrench(plates)
-    mass = steady_mass(total)
+    mass = steady_mass(Wrench(plates[0].wrench.time, np.sum([one.wrench.value for one in plates], axis=0)))
     if mass is None or body_mass is None or not body_mass > 0 or abs(mass / body_mass - 1) <= CheckLimits.mass / 100:
         return ()
     said = f"The plates carry {mass:.2f} kg in quiet standing, {body_mass:.2f} kg are declared"

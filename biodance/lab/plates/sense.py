@@ -9,14 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.errors import TrialRefused
-from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, PlateReading
-from biodance.lab.plates.left_out import FOOT_HEIGHT, left_out_said
+from biodance.lab.plates.decode import EDGE, FARTHEST_PRESSURE, FOOT_HEIGHT, PlateReading, left_out_said
 from biodance.lab.plates.parameters import CONTENT, FOUR_SENSORS
 from biodance.records import CHANNELS, Array, Markers, Mask, Plate, Wrench, longest_run
 from biodance.settings import COP_FORCE, TOUCH_FORCE
 from biodance.spatial import wrench_about_origin, wrench_about_point, zero_moment_point
 
-Said = tuple[str, ...]
+_Said = tuple[str, ...]
 
 _INSIDE = 0.8  # share of the loaded samples that must lie on the plate
 _STILLEST = 0.0015  # m: nobody's centre of pressure stays this close to the plate's centre
@@ -45,15 +44,8 @@ _FZ_ALONE = (
 )
 
 
-def surface_wrench(reading: PlateReading) -> tuple[Array, Said]:
-    """Return the wrench (S, 6) N, N·m about the centre of the surface, plate axes, sign as recorded, and what was
-    decided.
-
-    ``M_surface = M_sensor - v x F``, v from the sensor to the centre. Where the file has Kistler's polynomial (2, 6),
-    the centre of pressure is corrected and the moment follows it; force and free moment stay. First row:
-    ``dx = (P1 y^4 + P2 y^2 + P3) x^3 + (P4 y^4 + P5 y^2 + P6) x``, x and y in mm; dy likewise with x and y exchanged;
-    (dx, dy) is subtracted (Kistler 9287C manual, 8.4.3).
-    """
+def _surface_wrench(reading: PlateReading) -> tuple[Array, _Said]:
+    """Return the wrench (S, 6) N, N·m about the surface centre, plate axes, as recorded; what was decided."""
     below, said = sensor_below(reading.vector, reading.axes)
     wrench = wrench_about_point(reading.sensor, below)
     if reading.plate.polynomial is None:
@@ -71,7 +63,7 @@ def surface_wrench(reading: PlateReading) -> tuple[Array, Said]:
 
 def pressure_point(reading: PlateReading) -> Array:
     """Return the centre of pressure (S, 3) m from the centre of the surface, plate axes; NaN below 20 N."""
-    wrench, _ = surface_wrench(reading)
+    wrench, _ = _surface_wrench(reading)
     return zero_moment_point(wrench, threshold=COP_FORCE)
 
 
@@ -259,7 +251,7 @@ def wrench_in_lab(wrench: Array, axes: Array, sign: int, centre: Array) -> Array
 
 def sense_plates(
     readings: Sequence[PlateReading], time: Array, markers: Markers | None
-) -> tuple[tuple[Plate, ...], Said]:
+) -> tuple[tuple[Plate, ...], _Said]:
     """Return the plates with the ground's wrench ON the subject about the lab origin, and warnings.
 
     The weight must point up; an unloaded plate takes the majority's sign, +1 if all are unloaded. ``time`` (S,) s of
@@ -301,7 +293,7 @@ class _Sensed(NamedTuple):
     """A plate in the lab frame, what a person should look at, and whether its Fz alone had the wrong sign."""
 
     plate: Plate
-    warnings: Said
+    warnings: _Said
     fz_alone: bool
 
 
@@ -315,25 +307,14 @@ def _in_lab(
     otherwise: int,
     odd: bool,
 ) -> _Sensed:
-    """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings.
-
-    ``sign`` as `gravity_sign` has it; ``alone`` says that no other plate is loaded, so that the sway of a standing
-    person can be used; ``otherwise`` (+1 or -1) is the sign for a plate that never carries anything; ``odd`` says that
-    the other plates have another sign: axes turned half round are then a wrong sign of Fz alone, since both together
-    turn no channel but Fz, and Mz, which is turned back.
-
-    Raises
-    ------
-    TrialRefused
-        The corners contradict the recorded forces and the markers do not decide between the two possible corrections.
-    """
+    """Return the plate with the ground's wrench ON the subject about the lab origin, and warnings."""
     reading, moved = _with_origin_under_feet(reading, time, markers)
-    wrench, said = surface_wrench(reading)
+    wrench, said = _surface_wrench(reading)
     sway = sway_sign(wrench[:, :3], pressure_point(reading), reading.rate) if alone and sign else 0
     seen, doubt, fz_alone = "", "", False
     if sway and sway != sign and reading.axes[2, 2] > 0:
         reading, seen = _unmirrored(reading, time, markers)
-        wrench, said = surface_wrench(reading)
+        wrench, said = _surface_wrench(reading)
         sign, doubt = sway, seen
     elif sway == sign and sway:
         seen = "The sway of the standing person confirms the sign of the shear."
@@ -382,7 +363,7 @@ def _sign_said(sign: int, otherwise: int) -> str:
     return f"Sign: the file holds the {held} (the weight must point up)."
 
 
-def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers | None) -> tuple[PlateReading, Said]:
+def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers | None) -> tuple[PlateReading, _Said]:
     """Return the reading, ORIGIN x, y turned where only that puts the load under the feet, and what was decided."""
     x, y, _ = 1000 * reading.vector
     if markers is None or reading.plate.type in FOUR_SENSORS or np.hypot(x, y) < 1000 * _LEAST_BESIDE:
@@ -399,11 +380,7 @@ def _with_origin_under_feet(reading: PlateReading, time: Array, markers: Markers
 
 
 def _unmirrored(reading: PlateReading, time: Array, markers: Markers | None) -> tuple[PlateReading, str]:
-    """Return a plate whose corners run the wrong way round: its z points down, so x or y must be turned too.
-
-    The markers say which; without markers both stay as the corners have them, so the lab frame of such a file is a
-    mirror image, in which forces, centre of pressure and weight still fit together.
-    """
+    """Return a plate whose corners run the wrong way round: its z points down, so x or y must be turned too."""
     why = (
         "CORNERS make the plate's z point up, but the sway of the standing person shows that its z points down: the "
         "corners run the wrong way round"
@@ -423,9 +400,7 @@ def _unmirrored(reading: PlateReading, time: Array, markers: Markers | None) -> 
 
 
 def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[PlateReading, int, str, str]:
-    """Return the reading, its axes by quarter turns where only that puts the load under the feet; by how many degrees;
-    what was decided and what is in doubt, "" for nothing.
-    """
+    """Return the reading turned by quarters if only that puts the load under the feet; degrees; said; doubt."""
     distance = _distance(reading, time, markers)
     if distance is None:
         return reading, 0, "", ""
@@ -446,12 +421,7 @@ def _under_feet(reading: PlateReading, time: Array, markers: Markers) -> tuple[P
 
 
 def _distance(reading: PlateReading, time: Array, markers: Markers) -> float | None:
-    """Return the median distance (m) of load and feet in frames spread over the trial; None if no foot is seen on the
-    plate.
-
-    The feet are all markers within 0.15 m over the surface and 0.15 m around the plate; the distance is to the nearest
-    straight line between two of them, so it is near 0 between two feet.
-    """
+    """Return the median distance (m) of load and feet; None if no foot is seen on the plate."""
     if not markers.time.size:
         return None
     frames = np.unique(np.linspace(0, markers.time.size - 1, _FRAMES).round().astype(int))

@@ -19,8 +19,8 @@ class Reader(Protocol):
 
     A reader may also have ``beside(path)``: the path of a second file that it reads together with the first and that is
     then no recording of its own (forces beside markers), None without one. With ``FOLLOWS_TOLD = True`` its ``read``
-    takes ``told`` (`biodance.lab.plates.told.Told`), what the analyst says of the plates, which it must follow; to the
-    plates of other readers corners, foot and use are applied afterwards.
+    takes ``told`` (`biodance.lab.plates.corners.Told`), what the analyst says of the plates, which it must follow; to
+    the plates of other readers corners, foot and use are applied afterwards.
     """
 
     NAME: str
@@ -50,9 +50,7 @@ FAMILY: Family[Reader] = Family(
 
 
 def readers(chosen: Chosen[Reader] = None) -> tuple[Reader, ...]:
-    """Return the readers in the order in which they are asked; ``chosen`` names choose from the family, objects join
-    it.
-    """
+    """Return the readers in the order in which they are asked; ``chosen`` names choose, objects join."""
     return tuple(sorted(FAMILY.choose(chosen).values(), key=lambda reader: (reader.PREFERENCE, reader.NAME)))
 
 

@@ -27,8 +27,7 @@ _COLUMNS = {
     "visit": ("visit", "session"),
 }
 """What a table may call its columns."""
-_KINDS = 6
-"""Different values up to which a column names conditions."""
+_KINDS = 6  # Different values up to which a column names conditions
 _CHANNEL = re.compile(r"\s*\"?(time|t|[FM][xyz])\s*[\[(]?\s*([\w·.]*)\s*[\])]?", flags=re.IGNORECASE)
 
 
@@ -46,7 +45,7 @@ class IndexedTrial:
     conditions: Mapping[str, str] = field(default_factory=dict)
 
 
-def index_of(folder: Path) -> Path | None:
+def _index_of(folder: Path) -> Path | None:
     """Return the table of a folder, None without one: a file of a known name with columns for trial and person."""
     for name in NAMES:
         path = folder / name
@@ -207,7 +206,7 @@ def archive_folder(archive: str | Path) -> Path:
 
 def _collect(folder: Path, sessions: list[Path], indices: list[Path]) -> None:
     """Add what lies in ``folder`` and below it."""
-    index = index_of(folder)
+    index = _index_of(folder)
     if index is not None:
         indices.append(index)
         return

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.markers.guess import dress
-from biodance.lab.markers.sets import read_marker_set
-from biodance.lab.markers.still import is_still, movement
-from biodance.lab.plates.one_place import one_place
+from biodance.lab.markers.guess import guess_set, said_of
+from biodance.lab.markers.sets import MarkerSet, read_marker_set
+from biodance.lab.markers.upright import is_still, movement
+from biodance.lab.plates.corners import one_place
 from biodance.lab.read import read_trial
 from biodance.lab.readers import Reader, extensions
 from biodance.lab.session.archive import visit_date
@@ -249,3 +249,47 @@ def _nothing_left(folder: Path, files: Sequence[Path], refused: Mapping[str, str
             f"{folder}: holds no recording itself, but these folders do: {', '.join(inside[:8])}. Point at one of them."
         )
     return f"{folder}: holds no recording. Legal are files of the formats {', '.join(extensions(readers))}."
+
+
+_SHARED = 6
+"""Labels of the session's set that a trial must have to be read with it: three markers on each of two segments."""
+
+
+def dress(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
+    """Return the trials, all with one marker set where their labels allow it, and what was found in sentences.
+
+    The set is that of the first static trial, else of the trial with most markers; where no known set fits that trial,
+    it is guessed from its names and posture. A moving trial that lacks markers of the static one (medial markers, an
+    alignment device) is read with the same set; a trial that a known set fits better keeps that.
+    """
+    worn = [trial for trial in trials if trial.markers is not None]
+    if not worn:
+        return list(trials), []
+    order = sorted(worn, key=lambda trial: (trial.role != "static", -len(trial.markers.names if trial.markers else ())))
+    if any(trial.marker_set for trial in order):
+        leader = next(trial for trial in order if trial.marker_set)
+        found, notes = read_marker_set(leader.marker_set), []
+    else:
+        guesses = [(trial, guess_set(trial.markers)) for trial in order if trial.markers is not None]
+        leader, guess = next(((trial, one) for trial, one in guesses if one.name), guesses[0])
+        notes = [said_of(guess, leader.name)]
+        if not guess.name:
+            why = f"No marker set could be guessed: {guess.doubts[0]}"
+            doubted = (
+                replace(trial, warnings=(*trial.warnings, why)) if trial.markers is not None else trial
+                for trial in trials
+            )
+            return list(doubted), notes
+        found = read_marker_set(guess.name)
+    return [_with(trial, found) for trial in trials], notes
+
+
+def _with(trial: Trial, found: MarkerSet) -> Trial:
+    """Return a trial with the session's set, unless its own fits more of its labels."""
+    if trial.markers is None or trial.marker_set == found.name:
+        return trial
+    matched = found.match(trial.markers.names)
+    own = len(read_marker_set(trial.marker_set).match(trial.markers.names)) if trial.marker_set else 0
+    if len(matched) < _SHARED or len(matched) < own:
+        return trial
+    return replace(trial, marker_set=found.name)

@@ -11,7 +11,7 @@ from statistics import median
 
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.markers.still import is_still, movement
+from biodance.lab.markers.upright import is_still, movement
 from biodance.lab.plain_text import COMMAS_READ
 from biodance.lab.read import read_head, sniffed
 from biodance.lab.readers import Reader, extensions
@@ -131,26 +131,20 @@ def _same_bytes(one: Path, other: Path) -> bool:
 
 
 def recordings_in(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
-    """Return the files directly in a folder whose extension or content says that they are recordings, sorted by
-    name.
-    """
+    """Return the files directly in a folder whose extension or content says they are recordings, by name."""
     legal = extensions(readers)
     files = (path for path in sorted(folder.iterdir()) if not path.is_dir() and not path.name.startswith("."))
     return [path for path in files if path.suffix.lower() in legal and _is_data(path, readers)]
 
 
 def recordings_below(folder: Path, readers: Chosen[Reader] = None) -> list[Path]:
-    """Return the recordings in a folder and all folders below it, sorted by path; tables that belong to a .trc file
-    are left out.
-    """
+    """Return the recordings in a folder and below it, by path, without tables that belong to a .trc file."""
     folders = [folder, *(path for path in sorted(folder.rglob("*")) if path.is_dir() and not path.name.startswith("."))]
     return sorted(_without_companions([file for place in folders for file in recordings_in(place, readers)], readers))
 
 
 def vicon_notes(folders: Iterable[Path]) -> tuple[dict[str, EclipseNotes], dict[str, dict[str, float]], dict[str, str]]:
-    """Return the Eclipse notes by trial name (lower case), the measurements (m, kg) by file name, and the refused
-    files with the reason.
-    """
+    """Return Eclipse notes by trial name (lower case), measurements (m, kg) by file, refused files and why."""
     eclipse: dict[str, EclipseNotes] = {}
     measurements: dict[str, dict[str, float]] = {}
     refused: dict[str, str] = {}

@@ -1,24 +1,134 @@
-"""Where results go: a folder of their own, never over or among the raw recordings, there whole or not at all.
-
-A run writes into a folder beside its place (`ResultsFolder.part`). When all is written and on the disk, the two change
-places in one step: whoever looks sees the earlier results or the new ones, never a mixture.
+"""Where results go: a folder of their own, never over or among the raw recordings, there whole or not at all. A run
+writes into a folder beside its place (`ResultsFolder.part`).
 """
 
 import atexit
 import ctypes
+import hashlib
+import json
 import os
 import platform
 import shutil
+import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from biodance.errors import SessionRefused
+from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.plain_text import flush
 from biodance.lab.readers import extensions
-from biodance.lab.session.manifest import MANIFEST, files_in, read_manifest, write_manifest
 from biodance.lab.session.recordings import RESULTS, TEXT
+from biodance.library import parse_json
+from biodance.version import __version__
+
+_MANIFEST = "manifest.json"  # Written last into a results folder
+
+
+@dataclass(frozen=True)
+class _Manifest:
+    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` absolute folder of the
+    recordings; SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
+    """
+
+    run: str
+    version: str
+    session: str
+    inputs: Mapping[str, str]
+    outputs: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class _Verified:
+    """A results folder beside its manifest: files of the run that are ``missing`` or ``changed``, and the recordings
+    that are not as they were read (``inputs_changed``).
+    """
+
+    folder: Path
+    manifest: _Manifest
+    missing: tuple[str, ...]
+    changed: tuple[str, ...]
+    inputs_changed: tuple[str, ...]
+
+    @property
+    def whole(self) -> bool:
+        """Whether every file of the run is there as it was written."""
+        return not (self.missing or self.changed)
+
+
+def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str]) -> None:
+    """Bind the files in a ``folder`` to a ``session``'s ``inputs`` (name -> SHA-256)."""
+    outputs = {name: file_hash(folder / name) for name in _files_in(folder)}
+    one = _Manifest(uuid.uuid4().hex, __version__, str(session.absolute()), dict(inputs), outputs)
+    text = json.dumps(asdict(one), indent=1, sort_keys=True)
+    (folder / _MANIFEST).write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
+
+
+def read_manifest(folder: Path) -> _Manifest | None:
+    """Return the manifest of a results folder; None where there is none (an earlier version, or no results).
+
+    Raises
+    ------
+    FileRefused
+        It is damaged.
+    """
+    path = folder / _MANIFEST
+    if not path.is_file():
+        return None
+    try:
+        found = _Manifest(**parse_json(path.read_text(encoding="utf-8")))
+        if all(isinstance(part, dict) for part in (found.inputs, found.outputs)):
+            return found
+    except (OSError, ValueError, TypeError) as error:
+        raise FileRefused(f"{path}: is damaged ({error}). Run the session again.") from error
+    raise FileRefused(f"{path}: is damaged (no list of files). Run the session again.")
+
+
+def refuse_mixture(folder: Path, names: tuple[str, ...]) -> None:
+    """Raise FileRefused where one of the files ``names`` in a results folder is not the one that its run wrote."""
+    manifest = read_manifest(folder)
+    for name in names if manifest else ():
+        assert manifest is not None
+        if not (folder / name).is_file():
+            continue
+        if name not in manifest.outputs:
+            raise FileRefused(f"{folder / name}: is not of the run that wrote this folder. Run the session again.")
+        if file_hash(folder / name) != manifest.outputs[name]:
+            raise FileRefused(
+                f"{folder / name}: is not as its run wrote it: changed by hand, damaged, or of another run. Run the "
+                f"session again, or give that file itself."
+            )
+
+
+def check_results(folder: Path) -> _Verified | None:
+    """Return how a results folder stands beside its manifest; None where it has none."""
+    manifest = read_manifest(folder)
+    if manifest is None:
+        return None
+    there = set(_files_in(folder))
+    known = manifest.outputs
+    changed = (name for name in sorted(there & set(known)) if file_hash(folder / name) != known[name])
+    recordings = ((Path(manifest.session) / name, sha) for name, sha in sorted(manifest.inputs.items()))
+    other = (str(path) for path, sha in recordings if not path.is_file() or file_hash(path) != sha)
+    return _Verified(folder, manifest, tuple(sorted(set(known) - there)), tuple(changed), tuple(other))
+
+
+def results_below(place: Path) -> tuple[Path, ...]:
+    """Return the folders at and below a place that hold a manifest, by name."""
+    return tuple(sorted(path.parent for path in place.rglob(_MANIFEST)))
+
+
+def _files_in(folder: Path) -> list[str]:
+    """Return the names below a folder of all files, sorted, but the manifest and hidden ones."""
+    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return sorted(one.as_posix() for one in found if one.name != _MANIFEST and not one.name.startswith("."))
+
+
+def file_hash(path: Path) -> str:
+    """Return the hexadecimal SHA-256 of a file."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
 
 _LOCK = ".biodance.lock"
 _EXCHANGE, _HERE = 2, -100
@@ -47,7 +157,7 @@ class ResultsFolder:
             write_manifest(self.part, session, inputs)
             (self.part / _LOCK).unlink(missing_ok=True)
             put_in_place(self.part, self.place)
-            return _cleared(self.part, ours=files_in(self.place)) if self.part.is_dir() else None
+            return _cleared(self.part, ours=_files_in(self.place)) if self.part.is_dir() else None
         return None
 
 
@@ -63,12 +173,12 @@ def put_in_place(part: Path, place: Path, *, alone: bool = False) -> None:
     for path in (*part.rglob("*"), part):
         flush(path)
     if part.parent == place:  # a disk of its own: its folder cannot change its name
-        earlier, new = read_manifest(place), files_in(part)
-        known = files_in(place) if alone else earlier.outputs if earlier else RESULTS
-        for name in (*new, *(one.name for one in part.glob(MANIFEST))):
+        earlier, new = read_manifest(place), _files_in(part)
+        known = _files_in(place) if alone else earlier.outputs if earlier else RESULTS
+        for name in (*new, *(one.name for one in part.glob(_MANIFEST))):
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (part / name).replace(place / name)
-        for name in set(known) - {*new, MANIFEST}:
+        for name in set(known) - {*new, _MANIFEST}:
             (place / name).unlink(missing_ok=True)
         shutil.rmtree(part)
     elif place.exists() and any(place.iterdir()):
@@ -93,9 +203,9 @@ def _cleared(folder: Path, *, ours: list[str]) -> Path | None:
     """Remove the files of an earlier run; return the folder in which those that biodance did not write are kept."""
     earlier = read_manifest(folder)
     known = set(earlier.outputs) if earlier else {*ours, *RESULTS}
-    for name in known | {MANIFEST, _LOCK}:
+    for name in known | {_MANIFEST, _LOCK}:
         (folder / name).unlink(missing_ok=True)
-    left = files_in(folder)
+    left = _files_in(folder)
     if not left:
         shutil.rmtree(folder)
         return None

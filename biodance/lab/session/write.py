@@ -14,21 +14,19 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import SessionRefused
-from biodance.lab.c3d.ezc3d_object import plate_recording
 from biodance.lab.c3d.subject import as_written
-from biodance.lab.c3d.write import PlateRecording, write_c3d
+from biodance.lab.c3d.write import PlateRecording, plate_recording, write_c3d
 from biodance.lab.markers.guess import guess_set
+from biodance.lab.markers.names import plain_labels
 from biodance.lab.markers.sets import GUESSED
-from biodance.lab.markers.spelling import plain_labels
 from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.corners import plate_axes
-from biodance.lab.session.file import FILES
-from biodance.lab.session.plate_lines import plate_lines
+from biodance.lab.session.file import FILES, plate_lines
 from biodance.lab.session.read import read_session
 from biodance.lab.session.results_folder import whole_folder
 from biodance.records import Markers, Plate, Session, Subject, Trial, Wrench
 
-FILE = "session.toml"
+_FILE = "session.toml"
 
 
 def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict[str, Any]:
@@ -62,7 +60,7 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     Traceback (most recent call last):
     biodance.errors.SessionRefused: visit/session.toml is there already, and nothing of yours is overwritten. ...
     """
-    target = Path(folder) / FILE
+    target = Path(folder) / _FILE
     _refuse_existing(target)
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
@@ -173,8 +171,7 @@ def _marker_lines(found: dict[str, Any]) -> Iterator[str]:
 
 _MARK = "registration.json"
 """Name of the file that says that a folder was written by `biodance register`."""
-_BESIDE = (".mp", ".vsk", ".enf", ".toml")
-"""What belongs to a session beside its recordings."""
+_BESIDE = (".mp", ".vsk", ".enf", ".toml")  # What belongs to a session beside its recordings
 
 
 def registered_folder(folder: Path, *, force: bool) -> Path:

@@ -15,9 +15,7 @@ from biodance.spatial import continuous_quaternion, unit_quaternion
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """G ball joints: ``first`` (G,) index of the first of the three joints, ``sign`` (G, 1) of their axes'
-    handedness.
-    """
+    """G ball joints: ``first`` (G,) index of each one's first joint, ``sign`` (G, 1) of their handedness."""
 
     first: np.ndarray
     sign: Array
@@ -27,8 +25,7 @@ class Balls:
         return np.stack([angles[self.first + k] for k in range(3)])
 
 
-_SAME = 1e-8
-"""m, and of the entries of rotation matrices: what differs by less is equal."""
+_SAME = 1e-8  # m, and of the entries of rotation matrices: what differs by less is equal
 
 
 def balls(body: Body) -> Balls:
@@ -49,18 +46,8 @@ def balls(body: Body) -> Balls:
     return Balls(np.array(first, dtype=np.intp), np.round(np.array(sign).reshape(-1, 1)))
 
 
-def ball_quaternion(angles: Array, sign: Array) -> Array:
-    """Return the quaternion (4, G, B) of Cardan angles (3, G, B) rad."""
-    half = 0.5 * sign * angles
-    (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
-    c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
-    return np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23])
-
-
 def continued(quaternion: Array) -> Array:
-    """Return unit quaternions (4, ..., B), components first, of ``quaternion`` (4, ..., B) without jumps of sign along
-    the last axis.
-    """
+    """Return ``quaternion`` (4, ..., B) of unit size, without jumps of sign along the last axis."""
     last = np.moveaxis(quaternion, 0, -1)
     return np.moveaxis(continuous_quaternion(unit_quaternion(last)), -1, 0)
 
@@ -69,12 +56,8 @@ def _unit(quaternion: Array) -> Array:
     return np.moveaxis(unit_quaternion(np.moveaxis(quaternion, 0, -1)), -1, 0)
 
 
-def ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
-    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B).
-
-    Every rotation has two sets of Cardan angles (and any number of full turns): that closer to ``near`` (3, G, B) is
-    taken.
-    """
+def _ball_angles(quaternion: Array, sign: Array, near: Array) -> Array:
+    """Return the Cardan angles (3, G, B) rad of unit quaternions (4, G, B)."""
     x, y, z, w = quaternion
     sine = np.clip(2 * (x * z + y * w), -1.0, 1.0)
     one = np.stack(
@@ -134,12 +117,13 @@ class Chart:
         return self.joint_count + (7 if self.n_root else 0)
 
     def smooth(self, q: Array) -> Smooth:
-        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames (signs and full turns are continued
-        along them).
-        """
+        """Return the smooth coordinates of ``q`` (nq, B), B consecutive frames, signs and turns continued."""
         angles = q[7:] if self.n_root else q
         root = continued(q[3:7]) if self.n_root else q[:0]
-        ball = continued(ball_quaternion(self.joints.angles_of(angles), self.joints.sign))
+        half = 0.5 * self.joints.sign * self.joints.angles_of(angles)
+        (s1, s2, s3), (c1, c2, c3) = np.sin(half), np.cos(half)
+        c23, s23, sc, cs = c2 * c3, s2 * s3, s2 * c3, c2 * s3
+        ball = continued(np.stack([s1 * c23 + c1 * s23, c1 * sc - s1 * cs, c1 * cs + s1 * sc, c1 * c23 - s1 * s23]))
         return Smooth(q[:3] if self.n_root else q[:0], root, ball, np.unwrap(angles[self.single], axis=-1))
 
     def split(self, stacked: Array) -> Smooth:
@@ -149,12 +133,10 @@ class Chart:
         return Smooth(stacked[: root[0]], stacked[root[0] : root[1]], ball, stacked[root[1] + count :])
 
     def posture(self, smooth: Smooth, near: Array) -> Array:
-        """Return q (nq, B); quaternions are normalised here; of equal sets of Cardan angles that closer to ``near``
-        (n, B) rad is taken.
-        """
+        """Return q (nq, B); of equal sets of Cardan angles the one closer to ``near`` (n, B) rad is taken."""
         angles = np.empty_like(near)
         angles[self.single] = smooth.angle
-        ball = ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))
+        ball = _ball_angles(_unit(smooth.ball), self.joints.sign, self.joints.angles_of(near))
         for k in range(3):
             angles[self.joints.first + k] = ball[k]
         return np.concatenate([smooth.place, _unit(smooth.root), angles]) if self.n_root else angles

@@ -17,10 +17,10 @@ from biodance.body.human.skeleton import JOINTS
 from biodance.body.parts import JointError
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import TrialRefused
-from biodance.motion.ik.elsewhere import elsewhere
 from biodance.motion.ik.joint_fit import (
     CalibrationState,
     beside_sliding_skin,
+    elsewhere,
     evaluate_joints,
     fit_joints,
     spread_postures,
@@ -35,11 +35,11 @@ from biodance.motion.ik.joint_unknowns import (
     centre_sd,
     doubted,
     excited,
+    knees_elsewhere,
     own_centre,
     own_turn,
     own_unknowns,
 )
-from biodance.motion.ik.knee_markers import knees_elsewhere
 from biodance.motion.kinematics import chains, poses
 from biodance.records import Array, Markers
 from biodance.threads import one_thread
@@ -51,12 +51,11 @@ _ALIKE = 8.0
 On virtual dances the places are the same from 1 to 16 s, their standard deviations are true at 8 s; in real walks of 2
 s less than 1 s moves joints by decimetres.
 """
-NO_FIXED_POINT = ("shoulder", "trunk")
+_NO_FIXED_POINT = ("shoulder", "trunk")
 """Joints of which no fixed point of the trunk gives the centre: what the table says of that is added to their standard
 deviations, which are then those of 12 virtual dances.
 """
-_FAULTS = 3
-"""Joints that lie elsewhere and markers that have moved, at most, in one session."""
+_FAULTS = 3  # Joints that lie elsewhere and markers that have moved, at most, in one session
 _NO_POSTURE = 0.1
 """m, RMS marker distance from which on a frame shows no posture of this body: 0.009 to 0.033 at most in eleven real
 sessions, 0.044 in one with exchanged head markers, metres where a recording went wrong.
@@ -64,7 +63,7 @@ sessions, 0.044 in one with exchanged head markers, metres where a recording wen
 
 
 @dataclass(frozen=True, eq=False)
-class FunctionalJoints:
+class _FunctionalJoints:
     """``scaling`` with the joints where the movement puts them; joint -> ``moved`` m; hinge -> ``turned`` rad;
     ``errors`` of the joints that moved; ``kept`` the joints that the movement does not show; ``rms`` m, weighted marker
     distance before and after; ``notes`` say all this in plain sentences.
@@ -80,7 +79,7 @@ class FunctionalJoints:
 
 
 @one_thread()
-def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> FunctionalJoints:
+def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> _FunctionalJoints:
     """Return ``scaling`` with joint centres and hinge axes from the moving ``trials`` (labels as in the marker set).
 
     A joint that these contradict is placed by them alone; a marker that has moved since the static trial does not
@@ -95,7 +94,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
     seconds = sum(one.time.size / one.rate for one in trials if one.time.size > 1)
     skin = error_size("soft_tissue", "marker")
     fresh = evaluate_joints(scaling, postures, np.zeros(SIZE), None, noise=skin)
-    shows = _marker_distance(scaling, postures, fresh) < _NO_POSTURE
+    body = scaling.with_centres(scaling.centres)[0]
+    place = poses(body, fresh.q).points(list(body.markers.segment), body.markers.position)
+    shows = np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)) < _NO_POSTURE
     if not shows.any():
         raise TrialRefused(_NOBODY)
     if not shows.all():
@@ -116,7 +117,9 @@ def functional_joints(scaling: Scaling, trials: Sequence[Markers]) -> Functional
         if wrong.marker:
             joint = _pulled(scaling, found, wrong.marker)
             spared[joint] = wrong.marker, float(np.linalg.norm(found.theta[own_centre(joint)]))
-            postures = _without(postures, wrong.marker)
+            xyz = np.array(postures.xyz)
+            xyz[:, postures.names.index(wrong.marker)] = np.nan
+            postures = replace(postures, xyz=xyz)
         else:
             scaling = replace(scaling, centres=doubted(scaling.centres, (*scaling.centres.contradicted, wrong.joint)))
             shown[own_unknowns(wrong.joint)] = True
@@ -148,13 +151,6 @@ def _inside_the_body(
         start = evaluate_joints(scaling, postures, theta, start.q, noise=noise)
 
 
-def _marker_distance(scaling: Scaling, postures: Markers, found: CalibrationState) -> Array:
-    """Return the RMS distance (T,) m of the markers of every posture from the body that follows them best."""
-    body = scaling.with_centres(scaling.centres)[0]
-    place = poses(body, found.q).points(list(body.markers.segment), body.markers.position)
-    return np.asarray(np.sqrt(np.nanmean(np.sum((place - postures.xyz) ** 2, axis=2), axis=1)))
-
-
 _NOBODY = (
     f"In every frame of the moving trials the markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS), so "
     "the joints stay where the static trial puts them. Are the labels right, and is it the same person?"
@@ -168,13 +164,6 @@ def _not_shown(shows: NDArray[np.bool_]) -> str:
         f"markers lie {1e3 * _NO_POSTURE:.0f} mm or more from the body (RMS). Look at the trials with the largest "
         "marker distance: labels, gaps, jumps."
     )
-
-
-def _without(postures: Markers, name: str) -> Markers:
-    """Return the postures with one marker hidden."""
-    xyz = np.array(postures.xyz)
-    xyz[:, postures.names.index(name)] = np.nan
-    return replace(postures, xyz=xyz)
 
 
 def _pulled(scaling: Scaling, found: CalibrationState, marker: str) -> str:
@@ -198,10 +187,8 @@ def _told(
     shown: NDArray[np.bool_],
     spared: Mapping[str, tuple[str, float]],
     refused: Mapping[str, float],
-) -> FunctionalJoints:
-    """Return the result with its notes; ``spared`` the markers that have moved, by the joint that they pulled, and how
-    far that would lie with them; ``refused`` how far joints would go that were kept.
-    """
+) -> _FunctionalJoints:
+    """Return the result with its notes: markers ``spared``, and how far ``refused`` joints would go."""
     covariance: Array = np.asarray(np.linalg.inv(found.information), dtype=float)
     deviation = np.sqrt(np.diag(covariance))
     kept = tuple(joint for joint in JOINTS if not shown[own_centre(joint)].any())
@@ -240,7 +227,7 @@ def _told(
     notes += knees_elsewhere(scaling.centres, found.theta, found.information, shown, known=(*wrong, *spared))
     centres = replace(JointUnknowns(scaling.centres).moved(found.theta), errors=errors)
     placed = replace(scaling, centres=centres, notes=(*scaling.notes, *notes))
-    return FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
+    return _FunctionalJoints(placed, moved, turned, errors, kept, (start.rms, found.rms), tuple(notes))
 
 
 def _outside(joint: str, far: float) -> str:
@@ -270,8 +257,7 @@ def _moved_since(joint: str, marker: str, far: float) -> str:
 def _reach(joint: str, theta: Array, covariance: Array) -> tuple[float, float]:
     """Return how far (m) a joint that the movement contradicts lies from the static trial's place, and the standard
     deviation of that: what the movement says of it (the posterior of the unknowns ``theta`` (37,) with ``covariance``
-    (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off. The placing is
-    more cautious: along a bone, where a movement shows little, it leaves half of a knee's error where it was.
+    (37, 37), less the prior under which it was placed), under a prior as wide as wrong centres are off.
     """
     own, before = own_centre(joint), centre_sd(joint, contradicted=True)
     told = np.linalg.inv(covariance[own, own])
@@ -291,4 +277,4 @@ def _centre_sd(joint: str, deviation: Array) -> float:
 def fixed_point(joint: str) -> float:
     """Return what no fixed point can give of a joint's centre, m per axis."""
     kind = joint.split("_")[-1]
-    return error_size("fixed_point", kind, state="after") if kind in NO_FIXED_POINT else 0.0
+    return error_size("fixed_point", kind, state="after") if kind in _NO_FIXED_POINT else 0.0

@@ -16,7 +16,7 @@ from biodance.records import SIDES, Array
 from biodance.spatial import axis_rotation, skew
 
 HINGES = ("right_knee", "left_knee", "right_elbow", "left_elbow")
-ABOVE = {"knee": "hip", "elbow": "shoulder"}
+_ABOVE = {"knee": "hip", "elbow": "shoulder"}
 _LIMBS = (("hip", "knee"), ("knee", "ankle"))
 """Joints at the ends of the limbs that a person has equally long on both sides, within `error_size("side_length")`."""
 _TURNS = 3 * len(JOINTS)
@@ -62,7 +62,7 @@ class JointUnknowns:
     def bone(self, hinge: str) -> Array:
         """Return the unit vector (3,), lab, upwards along the bone above a hinge."""
         side, joint = hinge.split("_")
-        along = self.centres.place[f"{side}_{ABOVE[joint]}"] - self.centres.place[hinge]
+        along = self.centres.place[f"{side}_{_ABOVE[joint]}"] - self.centres.place[hinge]
         return np.asarray(along / np.linalg.norm(along))
 
     def moved(self, theta: Array) -> Centres:
@@ -97,9 +97,7 @@ class JointUnknowns:
         return np.concatenate([residual, apart]), np.concatenate([slope, apart_slope])
 
     def _sides(self, theta: Array) -> tuple[Array, Array]:
-        """Return by how many standard deviations the limbs of ``_LIMBS`` are longer on the right (2,), and the slope
-        (2, 37); of a limb that ends at a joint which the movement contradicts, only as far as such a joint is known.
-        """
+        """Return by how many sds the limbs are longer on the right (2,), and the slope (2, 37)."""
         more, slope = np.zeros(len(_LIMBS)), np.zeros((len(_LIMBS), SIZE))
         sd = np.full(len(_LIMBS), error_size("side_length", "limb"))
         for row, (upper, lower) in enumerate(_LIMBS):
@@ -121,13 +119,13 @@ class JointUnknowns:
         """
         side, joint = hinge.split("_")
         centres = self.moved(theta)
-        upper, lower = centres.place[f"{side}_{ABOVE[joint]}"], centres.place[hinge]
+        upper, lower = centres.place[f"{side}_{_ABOVE[joint]}"], centres.place[hinge]
         length, right = np.linalg.norm(upper - lower), centres.right[hinge]
         y = (upper - lower) / length
         across = right - (right @ y) * y
         z = across / np.linalg.norm(across)
         slope_y, slope_right = np.zeros((3, SIZE)), np.zeros((3, SIZE))
-        slope_y[:, own_centre(f"{side}_{ABOVE[joint]}")] = (np.eye(3) - np.outer(y, y)) / length
+        slope_y[:, own_centre(f"{side}_{_ABOVE[joint]}")] = (np.eye(3) - np.outer(y, y)) / length
         slope_y[:, own_centre(hinge)] = -(np.eye(3) - np.outer(y, y)) / length
         slope_right[:, own_turn(hinge)] = np.cross(self.bone(hinge), right)
         slope = slope_right - np.outer(y, y @ slope_right + right @ slope_y) - (right @ y) * slope_y
@@ -171,7 +169,7 @@ def own_turn(hinge: str) -> int:
     return _TURNS + HINGES.index(hinge)
 
 
-EXCITED = 0.3
+_EXCITED = 0.3
 """Share of a joint's prior standard deviation that the movement must remove; below it the static trial's answer is
 kept, because what little the markers say of such a joint is soft tissue.
 """
@@ -179,7 +177,7 @@ kept, because what little the markers say of such a joint is soft tissue.
 
 def excited(centres: Centres, theta: Array, information: Array) -> NDArray[np.bool_]:
     """Return (37,) True for the unknowns of the joints of whose standard deviation the movement removes the share
-    ``EXCITED``, from the ``information`` (37, 37) at ``theta``.
+    ``_EXCITED``, from the ``information`` (37, 37) at ``theta``.
 
     A hinge is judged by its axis.
     """
@@ -188,7 +186,7 @@ def excited(centres: Centres, theta: Array, information: Array) -> NDArray[np.bo
     out = np.zeros(SIZE, dtype=bool)
     for joint in JOINTS:
         judged = [own_turn(joint)] if joint in HINGES else list(range(SIZE))[own_centre(joint)]
-        out[own_unknowns(joint)] = np.linalg.norm(after[judged]) < (1 - EXCITED) * np.linalg.norm(before[judged])
+        out[own_unknowns(joint)] = np.linalg.norm(after[judged]) < (1 - _EXCITED) * np.linalg.norm(before[judged])
     return out
 
 
@@ -202,3 +200,63 @@ def doubted(centres: Centres, wrong: tuple[str, ...]) -> Centres:
 def own_unknowns(joint: str) -> list[int]:
     """Return the unknowns of a joint: its centre, of a hinge also its axis."""
     return [*range(SIZE)[own_centre(joint)], *([own_turn(joint)] if joint in HINGES else [])]
+
+
+BEYOND = 3.0
+"""Standard deviations from which a knee was not marked where it bends."""
+
+
+def knees_elsewhere(
+    centres: Centres, theta: Array, information: Array, shown: NDArray[np.bool_], *, known: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Return a warning for every knee whose axis the movement shows elsewhere than the static trial, by more than
+    markers usually are beside it.
+
+    Parameters
+    ----------
+    centres : Centres
+        Joints as the static trial has them.
+    theta, information : Array
+        (37,) m, rad: the unknowns found; (37, 37) what prior and movement together say of them.
+    shown : NDArray
+        (37,) unknowns that the movement shows; the others are where the static trial has them.
+    known : tuple of str
+        Joints of which something is said already.
+
+    Returns
+    -------
+    tuple of str
+        Sentences that begin with "Warning".
+    """
+    free, slope = np.flatnonzero(shown), JointUnknowns(centres).prior(theta)[1]
+    before, after = (np.linalg.inv(one[np.ix_(free, free)]) for one in (slope.T @ slope, information))
+    notes = []
+    for knee in (hinge for hinge in HINGES if hinge.endswith("_knee") and hinge not in known):
+        if not shown[own_turn(knee)]:
+            continue
+        ways = _ways(centres, knee)
+        ahead, turned = ways @ theta
+        expected = np.einsum("ki,ij,kj->k", ways[:, free], before - after, ways[:, free])
+        far = float(np.max(np.abs([ahead, turned]) / np.sqrt(expected)))
+        if far > BEYOND:
+            notes.append(_warning(knee, float(ahead), float(turned), far))
+    return tuple(notes)
+
+
+def _ways(centres: Centres, knee: str) -> Array:
+    """Return (2, 37): what the unknowns move a knee's axis forwards, m, and turn it about the bone, rad."""
+    bone, out = JointUnknowns(centres).bone(knee), np.zeros((2, SIZE))
+    forwards = np.cross(bone, centres.right[knee])
+    forwards /= np.linalg.norm(forwards)
+    out[0, own_centre(knee)] = forwards
+    out[0, own_turn(knee)] = -forwards @ np.cross(bone, centres.place[knee] - centres.lateral[knee])
+    out[1, own_turn(knee)] = 1.0
+    return out
+
+
+def _warning(knee: str, ahead: float, turned: float, far: float) -> str:
+    return (
+        f"Warning: the {knee.replace('_', ' ')} bends about an axis {abs(1e3 * ahead):.0f} mm "
+        f"{'before' if ahead > 0 else 'behind'} its lateral marker and {abs(np.degrees(turned)):.0f} degrees from the "
+        f"one that was marked, {far:.1f} standard deviations of how examiners differ: check the markers of that knee."
+    )

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.errors import BiodanceError
+from biodance.motion.ik.compiled.leg_closure import LegJoints, close_leg, lead, scratch
 from biodance.records import Array
 from biodance.spatial import axis_rotation, zxy_angles
 
@@ -18,9 +20,7 @@ LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion", "ankle_do
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """One leg of a body: columns of its six angles, sign of the mirrored axes, and the constant placements between
-    its joints.
-    """
+    """One leg: columns of its six angles, sign of the mirrored axes, placements between its joints."""
 
     columns: tuple[int, ...]
     sign: float
@@ -50,9 +50,7 @@ class Leg:
 
     @staticmethod
     def fits(body: Body, side: str) -> bool:
-        """Return whether the ``side`` leg of a body has the joints of this closed form: names, order, axes, meeting
-        in hip and ankle.
-        """
+        """Return whether the ``side`` leg has the joints of this closed form: names, order, axes, centres."""
         names, s = [joint.name for joint in body.joints], -1.0 if side == "left" else 1.0
         index = [names.index(name) if (name := f"{side}_{movement}") in names else -2 for movement in LEG]
         if min(index) < 0 or any(body.joints[j].parent != p for j, p in zip(index, [-1, *index[:-1]], strict=True)):
@@ -114,9 +112,7 @@ class Leg:
 
 
 def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
-    """Return ``value`` unchanged below ``limit - width`` and smoothly (three derivatives) approaching ``limit``
-    above.
-    """
+    """Return ``value`` as it is below ``limit - width``, smoothly (three derivatives) nearing ``limit`` above."""
     over = np.maximum(value - (limit - width), 0.0) / width
     return np.where(over > 0, limit - width + width * (over / (1 + over**4) ** 0.25), value)
 
@@ -124,3 +120,131 @@ def soft_limit(value: Array, limit: Array | float, width: float) -> Array:
 def _solve_sine(y: Array, z: Array, wanted: Array) -> Array:
     """Return the small angle i with ``y sin i + z cos i = wanted``."""
     return np.arcsin(np.clip(wanted / np.hypot(y, z), -1.0, 1.0)) - np.arctan2(z, y)
+
+
+KNEE = 3
+"""Place of the knee among the six joints."""
+_SQUAT = np.radians(60.0)  # Flexion of the knee in the posture from which all others are found
+_LOCKED = np.radians(0.3)  # Flexion of the longest leg
+_SOFT = 0.0025
+"""Share of the leg's length within which a foot out of reach is drawn towards the hip, smoothly."""
+_BENDS = 0.1  # How much a knee must change the square of the leg's length, in that square
+_POSTURES = 16  # Postures of hip and ankle in which the length of the leg is judged
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralLeg:
+    """One leg: ``columns`` of its six joints in the body; their ``joints``; ``hip`` (3,) m the point nearest to its
+    first three axes, in the root's frame; ``straight`` rad the knee's angle where the leg is longest and ``sense`` +-1
+    in which it bends; ``length_terms`` (3, K) m² a, b, c with (hip-ankle distance)² = a + b cos(knee) + c sin(knee) in
+    K postures; ``squat`` (6,) rad.
+    """
+
+    columns: tuple[int, ...]
+    joints: LegJoints
+    hip: Array
+    straight: float
+    sense: float
+    length_terms: Array
+    squat: Array
+
+    @classmethod
+    def of(cls, body: Body, side: str) -> "GeneralLeg":
+        """Return the leg that carries the ``side`` foot of a body in standing frames (`standing_frames`).
+
+        Raises
+        ------
+        BiodanceError
+            The leg has not six joints, or it cannot squat; the message says which leg and what is legal.
+        """
+        columns = _path(body, side)
+        rotation, translation, axis = (
+            np.array([getattr(body.joints[j], name) for j in columns]) for name in ("rotation", "translation", "axis")
+        )
+        hip = _meeting(rotation[:3], translation[:3], axis[:3])
+        low, high = (np.array([limit[j] for j in columns]) for limit in (body.limits.lower, body.limits.upper))
+        terms = _length_terms(rotation, translation, axis, hip, low, high)
+        straight = float(np.arctan2(terms[2, 0], terms[1, 0]))
+        sense = 1.0 if high[KNEE] + low[KNEE] > 2 * straight else -1.0
+        longest = float(np.sqrt(terms[0, 0] + np.hypot(terms[1, 0], terms[2, 0])))
+        joints = LegJoints(rotation, translation, axis, hip, longest)
+        leg = cls(columns, joints, hip, straight, sense, terms, np.zeros(6))
+        bent = np.where(np.arange(6) == KNEE, straight + sense * _SQUAT, 0.0)
+        squat, away = np.empty(6), np.inf
+        if np.hypot(terms[1, 0], terms[2, 0]) > _BENDS * longest**2:
+            under = hip - np.array([0.0, float(leg.length(_SQUAT)), 0.0])
+            away = float(lead(joints, bent, squat, np.eye(3), under, scratch()))
+        if not away < 1e-9:
+            raise BiodanceError(
+                f"{body.name}: the {side} leg does not squat: its fourth joint, {body.joints[columns[KNEE]].name}, "
+                f"must be the knee, with "
+                "three joints of the hip above it and two of the ankle below it. No dance can be designed for other "
+                "legs."
+            )
+        return cls(columns, joints, hip, straight, sense, terms, squat)
+
+    def length(self, knee: Array | float) -> Array:
+        """Return the least hip-ankle distance (...) m at knee flexions (...) rad from the straight leg."""
+        a, b, c = self.length_terms
+        angle = self.straight + self.sense * np.asarray(knee)[..., None]
+        return np.asarray(np.sqrt(np.min(a + b * np.cos(angle) + c * np.sin(angle), axis=-1)))
+
+    def solve(self, pelvis_turn: Array, pelvis: Array, foot_turn: Array, ankle: Array) -> Array:
+        """Return the six angles (T, 6) rad in the order of the joints.
+
+        ``pelvis_turn`` (T, 3, 3), ``pelvis`` (T, 3) m: pose of the pelvis; ``foot_turn`` (T, 3, 3), ``ankle`` (T, 3) m:
+        pose of the foot; lab frame. A foot out of reach is drawn towards the hip, smoothly, along the line from the
+        ankle.
+        """
+        back = np.swapaxes(pelvis_turn, 1, 2)
+        away = (back @ (ankle - pelvis)[:, :, None])[..., 0] - self.hip
+        distance = np.linalg.norm(away, axis=1)
+        longest = float(self.length(_LOCKED))
+        length = soft_limit(distance, longest, _SOFT * longest)
+        place = self.hip + away * (length / distance)[:, None]
+        out = np.empty((len(place), 6))
+        close_leg(
+            self.joints, self.squat, np.ascontiguousarray(back @ foot_turn), place, scratch(), out, np.empty(len(place))
+        )
+        return out
+
+
+def _path(body: Body, side: str) -> tuple[int, ...]:
+    """Return the six joints from the root to the ``side`` foot; BiodanceError where there are more or fewer."""
+    path = body.path_to(body.feet[side].segment)
+    if len(path) != 6:
+        names = ", ".join(body.joints[j].name for j in path) or "none"
+        raise BiodanceError(
+            f"{body.name}: the {side} leg has {len(path)} joints between the root and "
+            f"{body.segments[body.feet[side].segment]} ({names}); "
+            "a foot that stands still needs exactly six. Choose the root and the feet so that each leg has six joints."
+        )
+    return path
+
+
+def _meeting(rotation: Array, translation: Array, axis: Array) -> Array:
+    """Return the point (3,) nearest to the axes of joints in a row, at zero angles."""
+    turn, place = np.eye(3), np.zeros(3)
+    normal, right = np.zeros((3, 3)), np.zeros(3)
+    for R, p, a in zip(rotation, translation, axis, strict=True):
+        place, turn = place + turn @ p, turn @ R
+        across = np.eye(3) - np.outer(turn @ a, turn @ a)
+        normal, right = normal + across, right + across @ place
+    return np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
+
+
+def _length_terms(rotation: Array, translation: Array, axis: Array, hip: Array, low: Array, high: Array) -> Array:
+    """Return a, b, c (3, K) of the squared hip-ankle distance, in the middle and in K - 1 postures."""
+    angles = np.random.default_rng(0).uniform(low, high, (_POSTURES, 6))
+    angles[0] = (low + high) / 2
+    squares = []
+    for knee in (0.0, np.pi / 2, np.pi):
+        angles[:, KNEE] = knee
+        turn, place = np.tile(np.eye(3), (_POSTURES, 1, 1)), np.zeros((_POSTURES, 3))
+        for k in range(6):
+            place = place + turn @ translation[k]
+            turn = turn @ rotation[k] @ axis_rotation(axis[k], angles[:, k])
+        squares.append(np.sum((place - hip) ** 2, axis=1))
+    at_zero, at_right, at_half = squares
+    a = (at_zero + at_half) / 2
+    return np.stack([a, at_zero - a, at_right - a])

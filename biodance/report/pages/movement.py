@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biodance.cycles.curves import CurveGroup, NormalCurve
+from biodance.cycles.curves import ANGLE_PANELS, LOAD_PANELS, CurveGroup, NormalCurve
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
-from biodance.cycles.key_values import ANGLE_PANELS, LOAD_PANELS
 from biodance.cycles.movement import TrialMovement
 from biodance.display import GREY, spaced
 from biodance.identification.knowledge import SIGMAS

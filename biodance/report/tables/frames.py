@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
 from biodance.diagnosis.diagnosis import Diagnosis
-from biodance.motion.regressor import predict_wrench
+from biodance.motion.dynamics import predict_wrench
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult

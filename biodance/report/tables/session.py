@@ -7,7 +7,7 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT, STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
-from biodance.lab.filters import force_filter, motion_filter
+from biodance.lab.prepare import force_filter, motion_filter
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.provenance import Provenance
 from biodance.pipeline.results import SessionResult

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from biodance.body.body import load_pinocchio
 from biodance.body.parts import GRAVITY, UPRIGHT
-from biodance.body.pinocchio_model import load_pinocchio
 from biodance.errors import BiodanceError
 from biodance.motion.ik.legs import Leg
 from biodance.records import SIDES, Array, Wrench

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from biodance.body.body import load_pinocchio
 from biodance.body.parts import GRAVITY
-from biodance.body.pinocchio_model import load_pinocchio
 from biodance.records import Array, Motion, Wrench
 from biodance.virtual_lab.movement.posing import (
     Curves,

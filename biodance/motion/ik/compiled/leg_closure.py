@@ -1,5 +1,5 @@
 """Six joint angles that hold a foot under a pelvis, compiled: Newton's method from the neighbouring frame (see
-``general_legs``).
+``legs``).
 
 All poses are in the pelvis' frame. Each frame starts from the one before it; where that does not converge nearby, the
 foot is led from a known posture of the leg to its goal in small steps, so that the knee bends to the same side in every
@@ -13,14 +13,11 @@ import numpy as np
 from biodance.motion.ik.compiled import compiled
 from biodance.records import Array
 
-CLOSED = 1e-12
-"""Distance (leg lengths) and angle (rad) from the goal at which a foot is there."""
+_CLOSED = 1e-12  # Distance (leg lengths) and angle (rad) from the goal at which a foot is there
 _NEAR = 0.5
 """rad: a larger change of an angle from frame to frame may lead to another solution and is not trusted."""
-LEADS = 8
-"""Steps in which a foot is led from the known posture."""
-_LONGEST = 0.3
-"""rad: longest step of an angle in one iteration."""
+_LEADS = 8  # Steps in which a foot is led from the known posture
+_LONGEST = 0.3  # rad: longest step of an angle in one iteration
 _DAMPING = 1e-2, 1e-14
 """Damping of the normal equations per squared distance from the goal, and at the goal itself."""
 
@@ -37,7 +34,7 @@ class LegJoints(NamedTuple):
     size: float
 
 
-class Scratch(NamedTuple):
+class _Scratch(NamedTuple):
     """Room for one leg: ``turn`` (3, 3), ``place`` (3,) of the foot, ``origin``, ``direction`` (6, 3) of the axes;
     ``goal`` (3, 3), ``spot`` (3,) on the way; ``first`` (3, 3), ``begin`` (3,) of the known posture; ``a``, ``b`` (3,
     3), ``w`` (3,); ``jacobian``, ``normal`` (6, 6), ``gap``, ``step`` (6,).
@@ -60,16 +57,16 @@ class Scratch(NamedTuple):
     step: Array
 
 
-def scratch() -> Scratch:
+def scratch() -> _Scratch:
     """Return room for one leg, filled with zeros."""
     turn, place, axes = (3, 3), (3,), (6, 3)
     foot, way, known, products = (turn, place, axes, axes), (turn, place), (turn, place), (turn, turn, place)
     newton = ((6, 6), (6, 6), (6,), (6,))
-    return Scratch(*(np.zeros(shape) for shape in (*foot, *way, *known, *products, *newton)))
+    return _Scratch(*(np.zeros(shape) for shape in (*foot, *way, *known, *products, *newton)))
 
 
 @compiled
-def multiply(a, b, out):
+def _multiply(a, b, out):
     """Fill ``out`` (3, 3) with a b."""
     for i in range(3):
         for j in range(3):
@@ -77,7 +74,7 @@ def multiply(a, b, out):
 
 
 @compiled
-def rotation_about(x, y, z, angle, out):
+def _rotation_about(x, y, z, angle, out):
     """Fill ``out`` (3, 3) with the rotation about the unit axis x, y, z by ``angle``."""
     s, c = np.sin(angle), np.cos(angle)
     r = 1.0 - c
@@ -87,7 +84,7 @@ def rotation_about(x, y, z, angle, out):
 
 
 @compiled
-def rotation_vector(a, b, out):
+def _rotation_vector(a, b, out):
     """Fill ``out`` (3,) with the rotation vector of a b' (both (3, 3)), which turn by less than half a turn apart."""
     trace = 0.0
     for k in range(3):
@@ -103,7 +100,7 @@ def rotation_vector(a, b, out):
 
 
 @compiled
-def place_foot(leg, angles, s):
+def _place_foot(leg, angles, s):
     """Fill turn and place of the foot, origins and directions of the axes."""
     for i in range(3):
         s.place[i] = 0.0
@@ -111,17 +108,17 @@ def place_foot(leg, angles, s):
             s.turn[i, j] = 1.0 if i == j else 0.0
     for k in range(6):
         p, e = leg.translation[k], leg.axis[k]
-        multiply(s.turn, leg.rotation[k], s.a)
+        _multiply(s.turn, leg.rotation[k], s.a)
         for i in range(3):
             s.place[i] += s.turn[i, 0] * p[0] + s.turn[i, 1] * p[1] + s.turn[i, 2] * p[2]
             s.origin[k, i] = s.place[i]
             s.direction[k, i] = s.a[i, 0] * e[0] + s.a[i, 1] * e[1] + s.a[i, 2] * e[2]
-        rotation_about(e[0], e[1], e[2], angles[k], s.b)
-        multiply(s.a, s.b, s.turn)
+        _rotation_about(e[0], e[1], e[2], angles[k], s.b)
+        _multiply(s.a, s.b, s.turn)
 
 
 @compiled
-def solve_step(s, damping):
+def _solve_step(s, damping):
     """Fill the step: (J'J + damping) step = J' gap, by Cholesky's factor in ``normal``."""
     for i in range(6):
         for j in range(i + 1):
@@ -144,20 +141,18 @@ def solve_step(s, damping):
 
 
 @compiled
-def reach_for(leg, angles, turn, place, rounds, s):
-    """Improve ``angles`` (6,) until the foot has the pose ``turn``, ``place``; return how far it is from it in the
-    end.
-    """
+def _reach_for(leg, angles, turn, place, rounds, s):
+    """Improve ``angles`` (6,) until the foot has the pose ``turn``, ``place``; return how far it is from it."""
     away = np.inf
     for _ in range(rounds):
-        place_foot(leg, angles, s)
-        rotation_vector(turn, s.turn, s.w)
+        _place_foot(leg, angles, s)
+        _rotation_vector(turn, s.turn, s.w)
         square = 0.0
         for i in range(3):
             s.gap[i], s.gap[3 + i] = (place[i] - s.place[i]) / leg.size, s.w[i]
             square += s.gap[i] * s.gap[i] + s.w[i] * s.w[i]
         away = np.sqrt(square)
-        if away < CLOSED:
+        if away < _CLOSED:
             break
         for k in range(6):
             for i in range(3):
@@ -166,7 +161,7 @@ def reach_for(leg, angles, turn, place, rounds, s):
                     s.place[m] - s.origin[k, m]
                 )
                 s.jacobian[i, k], s.jacobian[3 + i, k] = lever / leg.size, s.direction[k, i]
-        solve_step(s, _DAMPING[0] * square + _DAMPING[1])
+        _solve_step(s, _DAMPING[0] * square + _DAMPING[1])
         longest = _LONGEST
         for k in range(6):
             longest = max(longest, abs(s.step[k]))
@@ -177,13 +172,11 @@ def reach_for(leg, angles, turn, place, rounds, s):
 
 @compiled
 def lead(leg, known, angles, turn, place, s):
-    """Fill ``angles`` (6,) for the pose ``turn``, ``place``, led there from the angles ``known``; return how far the
-    foot is from it.
-    """
+    """Fill ``angles`` (6,) for the pose ``turn``, ``place``, led from ``known``; return the foot's distance."""
     for k in range(6):
         angles[k] = known[k]
-    place_foot(leg, angles, s)
-    rotation_vector(turn, s.turn, s.w)
+    _place_foot(leg, angles, s)
+    _rotation_vector(turn, s.turn, s.w)
     size = np.sqrt(s.w[0] * s.w[0] + s.w[1] * s.w[1] + s.w[2] * s.w[2])
     x, y, z = (s.w[0] / size, s.w[1] / size, s.w[2] / size) if size > 1e-12 else (1.0, 0.0, 0.0)
     short, long = 0.0, 0.0
@@ -192,33 +185,31 @@ def lead(leg, known, angles, turn, place, s):
         short, long = short + s.begin[i] ** 2, long + (place[i] - leg.hip[i]) ** 2
         for j in range(3):
             s.first[i, j] = s.turn[i, j]
-    for k in range(1, LEADS):
-        share, length = k / LEADS, 0.0
-        rotation_about(x, y, z, share * size, s.b)
-        multiply(s.b, s.first, s.goal)
+    for k in range(1, _LEADS):
+        share, length = k / _LEADS, 0.0
+        _rotation_about(x, y, z, share * size, s.b)
+        _multiply(s.b, s.first, s.goal)
         for i in range(3):
             s.spot[i] = (1.0 - share) * s.begin[i] + share * (place[i] - leg.hip[i])
             length += s.spot[i] ** 2
         longer = ((1.0 - share) * np.sqrt(short) + share * np.sqrt(long)) / np.sqrt(length)
         for i in range(3):
             s.spot[i] = leg.hip[i] + longer * s.spot[i]
-        reach_for(leg, angles, s.goal, s.spot, 6, s)
-    return reach_for(leg, angles, turn, place, 60, s)
+        _reach_for(leg, angles, s.goal, s.spot, 6, s)
+    return _reach_for(leg, angles, turn, place, 60, s)
 
 
 @compiled
 def close_leg(leg, known, turn, place, s, out, away):
-    """Fill ``out`` (T, 6) with the angles for poses ``turn`` (T, 3, 3), ``place`` (T, 3) of the foot, ``away`` (T,) how
-    far it stays from them.
-    """
+    """Fill ``out`` (T, 6) with the angles for foot poses ``turn``, ``place``, ``away`` (T,) how far it stays."""
     for t in range(len(place)):
         change = np.inf
-        if t and away[t - 1] < CLOSED:
+        if t and away[t - 1] < _CLOSED:
             for k in range(6):
                 out[t, k] = out[t - 1, k]
-            away[t] = reach_for(leg, out[t], turn[t], place[t], 10, s)
+            away[t] = _reach_for(leg, out[t], turn[t], place[t], 10, s)
             change = 0.0
             for k in range(6):
                 change = max(change, abs(out[t, k] - out[t - 1, k]))
-        if not (away[t] < CLOSED and change < _NEAR):
+        if not (away[t] < _CLOSED and change < _NEAR):
             away[t] = lead(leg, known, out[t], turn[t], place[t], s)

@@ -1,12 +1,15 @@
 """The motion of a tree of joints and the regressor of its segments, compiled (numba): what `motion.kinematics` and
-`motion.regressor` define, frame by frame.
+`motion.dynamics` define, frame by frame.
 
 ``parent`` (n,) is the joint before each, -1 the root. Functions fill the arrays that come last.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from biodance.motion.ik.compiled import compiled
+from biodance.records import Array
 
 
 @compiled
@@ -40,25 +43,25 @@ def _multiply(A, B, out):
 
 
 @compiled
-def three_of(v):
+def _three_of(v):
     """Return the vector (3,) as three numbers, which the compiler keeps in registers."""
     return v[0], v[1], v[2]
 
 
 @compiled
-def cross_of(a, b):
+def _cross_of(a, b):
     """Return the vector product a x b of three numbers each."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @compiled
-def matrix_of(R):
+def _matrix_of(R):
     """Return the rows of R (3, 3), three numbers each."""
-    return three_of(R[0]), three_of(R[1]), three_of(R[2])
+    return _three_of(R[0]), _three_of(R[1]), _three_of(R[2])
 
 
 @compiled
-def dot_of(a, b):
+def _dot_of(a, b):
     """Return the scalar product of three numbers each."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
@@ -70,18 +73,18 @@ def place_joints(parent, turn, translation, root_rotation, root_position, angle,
     """
     for t in range(angle.shape[0]):
         for j in range(parent.shape[0]):
-            k, sine, versine, arm = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j]), three_of(translation[j])
-            above, place = matrix_of(root_rotation[t]), three_of(root_position[t])
+            k, sine, versine, arm = parent[j], np.sin(angle[t, j]), 1 - np.cos(angle[t, j]), _three_of(translation[j])
+            above, place = _matrix_of(root_rotation[t]), _three_of(root_position[t])
             if k >= 0:
-                above, place = matrix_of(rotation[t, k]), three_of(position[t, k])
+                above, place = _matrix_of(rotation[t, k]), _three_of(position[t, k])
             for d in range(3):
                 a = turn[j, 0, 0, d] + sine * turn[j, 1, 0, d] + versine * turn[j, 2, 0, d]
                 b = turn[j, 0, 1, d] + sine * turn[j, 1, 1, d] + versine * turn[j, 2, 1, d]
                 c = turn[j, 0, 2, d] + sine * turn[j, 1, 2, d] + versine * turn[j, 2, 2, d]
                 for e in range(3):
-                    rotation[t, j, e, d] = dot_of(above[e], (a, b, c))
+                    rotation[t, j, e, d] = _dot_of(above[e], (a, b, c))
             for e in range(3):
-                position[t, j, e] = place[e] + dot_of(above[e], arm)
+                position[t, j, e] = place[e] + _dot_of(above[e], arm)
 
 
 @compiled
@@ -92,15 +95,19 @@ def move_joints(parent, axis, rotation, position, root, rate, rate2, moved):
     for t in range(rate.shape[0]):
         for j in range(parent.shape[0]):
             k = parent[j]
-            w, dw, a = three_of(root[0, t]), three_of(root[1, t]), three_of(root[2, t])
-            place = three_of(root[3, t])
+            w, dw, a = _three_of(root[0, t]), _three_of(root[1, t]), _three_of(root[2, t])
+            place = _three_of(root[3, t])
             if k >= 0:
-                w, dw, a = three_of(moved[0, t, k]), three_of(moved[1, t, k]), three_of(moved[2, t, k])
-                place = three_of(position[t, k])
-            (first, second, third), own, here = matrix_of(rotation[t, j]), three_of(axis[j]), three_of(position[t, j])
-            spin = dot_of(first, own), dot_of(second, own), dot_of(third, own)
+                w, dw, a = _three_of(moved[0, t, k]), _three_of(moved[1, t, k]), _three_of(moved[2, t, k])
+                place = _three_of(position[t, k])
+            (first, second, third), own, here = (
+                _matrix_of(rotation[t, j]),
+                _three_of(axis[j]),
+                _three_of(position[t, j]),
+            )
+            spin = _dot_of(first, own), _dot_of(second, own), _dot_of(third, own)
             arm = here[0] - place[0], here[1] - place[1], here[2] - place[2]
-            across, lifted, swung = cross_of(w, spin), cross_of(dw, arm), cross_of(w, cross_of(w, arm))
+            across, lifted, swung = _cross_of(w, spin), _cross_of(dw, arm), _cross_of(w, _cross_of(w, arm))
             for c in range(3):
                 moved[0, t, j, c] = w[c] + spin[c] * rate[t, j]
                 moved[1, t, j, c] = dw[c] + spin[c] * rate2[t, j] + across[c] * rate[t, j]
@@ -151,9 +158,7 @@ def fill_regressor(rotation, position, omega, alpha, drive, W):
 
 @compiled
 def fill_wrench(rotation, position, omega, alpha, drive, phi, wrench):
-    """Fill wrench (T, 6) with what links with the parameters ``phi`` (N, 10) need: `fill_regressor` times phi; it holds
-    zeros.
-    """
+    """Fill wrench (T, 6), which holds zeros, with `fill_regressor` times the parameters ``phi`` (N, 10)."""
     w, dw, h, spin, force, moment = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     first, about = np.empty(3), np.empty(3)
     for t in range(position.shape[0]):
@@ -196,3 +201,98 @@ def _inertia_columns(v, L):
     L[0, 0], L[0, 1], L[0, 3] = x, y, z
     L[1, 1], L[1, 2], L[1, 4] = x, y, z
     L[2, 3], L[2, 4], L[2, 5] = x, y, z
+
+
+class PlacedJoints(NamedTuple):
+    """The n joints of T postures, lab frame: the own ``axis`` (n, 3) of each, ``rotation`` (T, n, 3, 3) and ``origin``
+    (T, n, 3) m; the ``root`` (T, 3) m and how many coordinates move it (``roots``: 6, or 0).
+    """
+
+    axis: Array
+    rotation: Array
+    origin: Array
+    root: Array
+    roots: int
+
+
+@compiled
+def fill_places(hangs, joints, points, J):
+    """Fill J (T, K, 3, nv): how ``points`` (T, K, 3) m move with each coordinate of `PlacedJoints`."""
+    axis, rotation, origin, root, roots = joints
+    for t in range(points.shape[0]):
+        for k in range(points.shape[1]):
+            if roots:
+                for c in range(3):
+                    J[t, k, c, c] = 1.0
+                x, y, z = points[t, k, 0] - root[t, 0], points[t, k, 1] - root[t, 1], points[t, k, 2] - root[t, 2]
+                J[t, k, 0, 4], J[t, k, 0, 5], J[t, k, 1, 3] = z, -y, -z
+                J[t, k, 1, 5], J[t, k, 2, 3], J[t, k, 2, 4] = x, y, -x
+        for j in range(axis.shape[0]):
+            turn, o = _turned_axis(rotation[t, j], axis[j]), origin[t, j]
+            for k in range(points.shape[1]):
+                if hangs[j, k]:
+                    arm = points[t, k, 0] - o[0], points[t, k, 1] - o[1], points[t, k, 2] - o[2]
+                    moved = _cross_of(turn, arm)
+                    for c in range(3):
+                        J[t, k, c, roots + j] = moved[c]
+
+
+@compiled
+def _turned_axis(R, axis):
+    """Return R times an axis (3,)."""
+    first, second, third = _matrix_of(R)
+    own = _three_of(axis)
+    return _dot_of(first, own), _dot_of(second, own), _dot_of(third, own)
+
+
+@compiled
+def fill_tangent(hangs, joints, com, place, turn, tangent):
+    """Fill tangent (T, L, nv): what each coordinate of `PlacedJoints` does to L functionals that are ``place``
+    (T, N, L, 3) of the moved ``com`` (T, N, 3) m of N segments and ``turn`` (T, N, L, 3) of their turn.
+    """
+    axis, rotation, origin, root, roots = joints
+    for t in range(com.shape[0]):
+        for s in range(com.shape[1]):
+            P, D, at = place[t, s], turn[t, s], _three_of(com[t, s])
+            if roots:
+                arm = at[0] - root[t, 0], at[1] - root[t, 1], at[2] - root[t, 2]
+                for f in range(P.shape[0]):
+                    across = _cross_of(arm, _three_of(P[f]))
+                    for c in range(3):
+                        tangent[t, f, c] += P[f, c]
+                        tangent[t, f, 3 + c] += D[f, c] + across[c]
+            for j in range(axis.shape[0]):
+                if hangs[j, s]:
+                    a, o = _turned_axis(rotation[t, j], axis[j]), origin[t, j]
+                    moved = _cross_of(a, (at[0] - o[0], at[1] - o[1], at[2] - o[2]))
+                    for f in range(P.shape[0]):
+                        tangent[t, f, roots + j] += _dot_of(_three_of(P[f]), moved) + _dot_of(_three_of(D[f]), a)
+
+
+_NINE, FOUR = 9, 4
+"""Functionals of a frame, and frames taken together: known beforehand, so that their loops are unrolled."""
+
+
+@compiled
+def add_products(value, angle, back, work, out):
+    """Add to out (R, n, p) the sum over time and functionals of ``value`` (T, 9, R) times ``angle`` (T, n) times
+    ``back`` (T, 9, p); ``work`` (4, p) is scratch.
+    """
+    frames, _, size = back.shape
+    for first in range(0, frames, FOUR):
+        for r in range(value.shape[2]):
+            for t in range(FOUR):
+                if first + t < frames:
+                    for j in range(size):
+                        total = 0.0
+                        for f in range(_NINE):
+                            total += value[first + t, f, r] * back[first + t, f, j]
+                        work[t, j] = total
+                else:
+                    work[t] = 0.0
+            for n in range(angle.shape[1]):
+                for j in range(size):
+                    total = 0.0
+                    for t in range(FOUR):
+                        total += angle[min(first + t, frames - 1), n] * work[t, j]
+                    out[r, n, j] += total

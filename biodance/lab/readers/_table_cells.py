@@ -4,6 +4,7 @@ decimal points or commas, or from Parquet.
 
 import io
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +12,10 @@ import numpy as np
 
 from biodance.errors import FileRefused
 from biodance.lab.plain_text import COMMAS_READ, decode
+from biodance.lab.plates.parameters import channel_groups
 from biodance.records import Array
 
-QUOTES = "'\"`´‘’‚‛“”„‟′″"
-"""What programs and spreadsheets put around a label."""
+_QUOTES = "'\"`´‘’‚‛“”„‟′″"  # What programs and spreadsheets put around a label
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
 _HEADER_ROWS = 30
 _PARQUET = b"PAR1"
@@ -24,9 +25,7 @@ _NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN|NA|")
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """``labels`` (C) without quotes and units, ``units`` (C) as written, "" = not said; ``values`` (T, C), NaN = empty;
-    ``said`` how they were read.
-    """
+    """``labels``, ``units`` (C) as written, "" = not said; ``values`` (T, C), NaN = empty; ``said`` how read."""
 
     labels: tuple[str, ...]
     units: tuple[str, ...]
@@ -52,9 +51,7 @@ def read_cells(content: bytes, path: Path) -> Cells:
 
 
 def header_of(text: str) -> tuple[int, str, tuple[str, ...]] | None:
-    """Return row (from 0), separator and cells of the labels: of the first row of at least four cells of which most are
-    no numbers; None without one.
-    """
+    """Return row (from 0), separator and cells of the labels: the first row of >= 4 cells, most no numbers."""
     for row, line in enumerate(text.split("\n")[:_HEADER_ROWS]):
         for separator in sorted(_SEPARATORS, key=line.count, reverse=True)[:1]:
             found = tuple(cell.strip() for cell in line.split(separator))
@@ -66,10 +63,10 @@ def header_of(text: str) -> tuple[int, str, tuple[str, ...]] | None:
 
 def clean_label(cell: str) -> tuple[str, str]:
     """Return label and unit of a cell such as ``"LASI x (mm)"`` or ``’time'``, without quotes; "" = no unit."""
-    plain = cell.strip().strip(QUOTES + " ")
+    plain = cell.strip().strip(_QUOTES + " ")
     tuple_like = re.fullmatch(r"\((.*)\)", plain)  # several rows of labels, as pandas writes them
     if tuple_like and "," in plain:
-        return "_".join(part.strip().strip(QUOTES) for part in tuple_like[1].split(",")), ""
+        return "_".join(part.strip().strip(_QUOTES) for part in tuple_like[1].split(",")), ""
     unit = _UNIT.fullmatch(plain)
     return (unit[1].strip(), unit[2]) if unit and unit[1] else (plain, "")
 
@@ -167,3 +164,66 @@ def _of_parquet(content: bytes, path: Path) -> Cells:
         for _, c in kept
     ]
     return Cells(labels, units, np.stack(values, axis=1) if values else np.empty((0, 0)), ("Read from Parquet.",))
+
+
+_TIME = re.compile(
+    r"(?:time|t|time[\s_]?stamps?|stamps?|elapsed(?:[\s_]?time)?|seconds?|secs?)"
+    r"(?:[\s_.]*(s|secs?|seconds?|ms|msecs?|milliseconds?|us|µs|ns))?",
+    flags=re.IGNORECASE,
+)
+_BEHIND = re.compile(r"(.+?)[\s_.:\-]*([xyz])(?:[\s_.]+(mm|cm|m))?", flags=re.IGNORECASE)
+_BEFORE = re.compile(r"([xyz])[\s_.:\-]+(.+?)(?:[\s_.]+(mm|cm|m))?", flags=re.IGNORECASE)
+_TURNED = re.compile(r"(force|moment|torque)[\s_.]*([xyz])|(?<![A-Za-z])(t)([xyz])(?![a-z])", flags=re.IGNORECASE)
+FEWEST_MARKERS = 3
+"""Markers that a table must hold: fewer have no frame."""
+
+
+@dataclass(frozen=True)
+class TableColumns:
+    """``time`` column, None = none, and the unit that its label says; ``markers`` label -> columns of x, y, z, and the
+    ``length`` unit their labels say; ``plates`` columns of Fx Fy Fz Mx My Mz of each; ``others`` labels of columns that
+    are none of these; ``broken`` markers of which an axis is missing.
+    """
+
+    time: int | None
+    time_unit: str
+    markers: dict[str, tuple[int, int, int]]
+    length: str
+    plates: tuple[tuple[int, ...], ...]
+    others: tuple[str, ...]
+    broken: tuple[str, ...]
+
+
+def columns_in(labels: Sequence[str]) -> TableColumns:
+    """Return what the columns with these ``labels`` hold."""
+    times = [(k, match) for k, label in enumerate(labels) if (match := _TIME.fullmatch(label))]
+    time = times[0][0] if times else None
+    forces = [_as_channel(label) for label in labels]
+    plates = tuple(group for group in channel_groups(forces) if len(group) == 6)
+    taken = {*(k for group in plates for k in group), *([time] if time is not None else [])}
+    free = [k for k in range(len(labels)) if k not in taken]
+    behind, before = (_triples(labels, free, pattern, axis) for pattern, axis in ((_BEHIND, 2), (_BEFORE, 1)))
+    found, length = max((behind, before), key=lambda some: sum(len(axes) == 3 for axes in some[0].values()))
+    markers = {name: (axes["x"], axes["y"], axes["z"]) for name, axes in found.items() if len(axes) == 3}
+    broken = tuple(name for name, axes in found.items() if len(axes) == 2)
+    used = taken | {k for some in markers.values() for k in some}
+    others = tuple(labels[k] for k in range(len(labels)) if k not in used and labels[k])
+    return TableColumns(time, (times[0][1][1] or "") if times else "", markers, length, plates, others, broken)
+
+
+def _as_channel(label: str) -> str:
+    """Return the label of a force column as ``Fx``, ``Mz`` with what else it says: Force_X_1 is FX_1, Tz is Mz."""
+    return _TURNED.sub(lambda m: ("F" if (m[1] or "").lower() == "force" else "M") + (m[2] or m[4]), label)
+
+
+def _triples(
+    labels: Sequence[str], free: Sequence[int], pattern: re.Pattern[str], axis: int
+) -> tuple[dict[str, dict[str, int]], str]:
+    """Return the columns of each marker by axis, and the unit of length of the labels."""
+    found: dict[str, dict[str, int]] = {}
+    units = set()
+    for k in free:
+        if match := pattern.fullmatch(labels[k]):
+            found.setdefault(match[3 - axis].strip(), {}).setdefault(match[axis].lower(), k)
+            units.add((match[3] or "").lower())
+    return found, units.pop() if len(units) == 1 else ""

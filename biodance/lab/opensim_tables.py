@@ -1,20 +1,23 @@
-"""Tables over time as text: the .mot and .sto files of OpenSim (forces of the plates, joint coordinates, anything with
-a time column).
-
-A name, header rows ``key=value`` up to ``endheader``, a row of column labels (the first is ``time``), then numbers, one
-a cell or three (``x,y,z``, DataType=Vec3). What the columns mean is not said in the file, apart from ``inDegrees``;
-``plate_columns.py`` knows the columns of force plates.
+"""OpenSim's tables over time as text (.mot, .sto: forces of the plates, joint coordinates, anything with a time
+column), and the ground forces with their set-up files for its tools.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
 from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text, with_points, write_whole
-from biodance.records import Array, assign, frozen_array
+from biodance.records import Array, Wrench, assign, frozen_array
+from biodance.settings import COP_FORCE
+from biodance.spatial import wrench_about_point
+
+Y_UP_TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""(3, 3) lab_R_file of a Y-up recording (OpenSim: x forward, y up, z right): x stays, y becomes z, z becomes -y."""
 
 _LONGEST_HEADER = 200
 
@@ -81,9 +84,7 @@ def read_mot(path: str | Path) -> TimeTable:
 
 
 def columns_of(path: str | Path) -> tuple[str, ...]:
-    """Return the column labels of a .mot or .sto file without ``time``; raises FileRefused as `read_mot` does for a
-    wrong header.
-    """
+    """Return the column labels of a .mot or .sto file without ``time``; FileRefused as of `read_mot`."""
     return _parts(Path(path)).labels[1:]
 
 
@@ -142,13 +143,12 @@ def _parts(path: Path) -> _Parts:
         found = repr(labels[0]) if labels else "missing"
         raise FileRefused(f"{path}: the first column is {found}, it must be 'time'. Export it again.")
     vectors = _vectors(labels, body[1][1], path) if len(body) > 1 else ()
-    history = [*[COMMAS_READ] * commas, *[VECTORS_READ] * bool(vectors)]
+    history = [*[COMMAS_READ] * commas, *[_VECTORS_READ] * bool(vectors)]
     return _Parts(header, _columns(labels, vectors), body[1:], vectors, tuple(history))
 
 
-VECTORS_READ = "Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z."
-_BRACKETS = str.maketrans("", "", "~()[] ")
-"""What some writers put around the numbers of one cell."""
+_VECTORS_READ = "Cells hold three numbers (Vec3): each label became three columns, _x, _y, _z."
+_BRACKETS = str.maketrans("", "", "~()[] ")  # What some writers put around the numbers of one cell
 _OF_PLATE = {"f": "v", "p": "p", "m": "m"}
 """Force, point and moment of plate N are fN, pN, mN in the tables that OpenSim makes of C3D files."""
 
@@ -184,3 +184,64 @@ def _numbers(row: str, width: int, where: str) -> list[float]:
     if len(found) != width:
         raise FileRefused(f"{where}: holds {len(found)} cells, {width} are expected. Export the file again.")
     return [parse_number(cell, where) for cell in found]
+
+
+_VERSION = "40000"
+_AXES = "xyz"
+
+
+def ground_table(feet: Mapping[str, Wrench], *, name: str) -> TimeTable:
+    """Return the ground's force on each segment as a table, y up: nine columns a segment, its name in front.
+
+    ``feet`` segment -> wrench of the ground on it about the lab origin. Force and torque stand at one point of the
+    ground that does not move, the mean centre of pressure: a centre of pressure that jumps with every step has no
+    derivative, and OpenSim draws splines through it.
+    """
+    columns, values = [], []
+    for segment, wrench in feet.items():
+        cop = wrench.cop(height=0.0, threshold=COP_FORCE)
+        known = np.isfinite(cop).all(axis=1)
+        middle = cop[known].mean(axis=0) if known.any() else np.zeros(3)
+        point = np.broadcast_to(middle, (wrench.time.size, 3))
+        torque = wrench_about_point(wrench.value, point)[:, 3:]
+        columns += [f"{segment}_{part}{axis}" for part in ("force_v", "force_p", "torque_") for axis in _AXES]
+        values += [part @ Y_UP_TO_Z_UP for part in (wrench.force, point, torque)]
+    return TimeTable(name, tuple(columns), next(iter(feet.values())).time, np.hstack(values))
+
+
+def external_loads(segments: tuple[str, ...], *, data_file: str) -> str:
+    """Return ExternalLoads.xml: the columns of `ground_table` in ``data_file`` on their segments, in the ground."""
+    root = Element("OpenSimDocument", Version=_VERSION)
+    loads = SubElement(root, "ExternalLoads", name="ground")
+    objects = SubElement(loads, "objects")
+    for segment in segments:
+        force = SubElement(objects, "ExternalForce", name=f"ground_on_{segment}")
+        _say(force, applied_to_body=segment, force_expressed_in_body="ground", point_expressed_in_body="ground")
+        _say(force, force_identifier=f"{segment}_force_v", point_identifier=f"{segment}_force_p")
+        _say(force, torque_identifier=f"{segment}_torque_", data_source_name="Unassigned")
+    _say(loads, datafile=data_file)
+    return _text(root)
+
+
+def inverse_dynamics_setup(
+    name: str, *, model: str, coordinates: str, loads: str, between: tuple[float, float], out: str
+) -> str:
+    """Return the set-up of OpenSim's InverseDynamicsTool: files relative to its own, times s; no filter, since the
+    coordinates are smooth already.
+    """
+    root = Element("OpenSimDocument", Version=_VERSION)
+    tool = SubElement(root, "InverseDynamicsTool", name=name)
+    _say(tool, results_directory=".", model_file=model, time_range=f"{between[0]:.10g} {between[1]:.10g}")
+    _say(tool, forces_to_exclude="Muscles", external_loads_file=loads, coordinates_file=coordinates)
+    _say(tool, lowpass_cutoff_frequency_for_coordinates="-1", output_gen_force_file=out)
+    return _text(root)
+
+
+def _say(parent: Element, **values: str) -> None:
+    for tag, value in values.items():
+        SubElement(parent, tag).text = value
+
+
+def _text(root: Element) -> str:
+    indent(root, space="  ")
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"

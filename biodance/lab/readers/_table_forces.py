@@ -14,23 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from biodance.lab.markers.sets import MarkerSet, landmark
-from biodance.lab.plates.corners import plate_axes
+from biodance.lab.plates.corners import NOTHING_TOLD, Told, ToldPlate, plate_axes
 from biodance.lab.plates.decode import find_baseline
 from biodance.lab.plates.parameters import FORCE, MOMENT, plain_unit
-from biodance.lab.plates.told import NOTHING_TOLD, Told, ToldPlate
 from biodance.records import SIDES, Array, Markers, Mask, Plate, Wrench
 from biodance.settings import COP_FORCE, STANDARD_GRAVITY
 from biodance.spatial import wrench_about_origin
 
-_PERSON = (50.0, 4000.0)
-"""N that the mean load on plates can be: a child of 5 kg to 400 kg."""
+_PERSON = (50.0, 4000.0)  # N that the mean load on plates can be: a child of 5 kg to 400 kg
 _FARTHEST = 20.0
 """m from the point of the moments that a pressure can lie; farther, the moments are in N·mm."""
 _SPELLED = {"n": "N", "kn": "kN", "nm": "N·m", "nmm": "N·mm"}
-_UNDER = 0.25
-"""m between pressure and feet up to which they belong together: a foot's length."""
-_MARGIN = 0.15
-"""m that a foot reaches beyond its markers and pressures."""
+_UNDER = 0.25  # m between pressure and feet up to which they belong together: a foot's length
+_MARGIN = 0.15  # m that a foot reaches beyond its markers and pressures
 _FLAT = 0.03
 """m over its lowest place (5th percentile) up to which a marker of a foot stands on the ground."""
 _SINKS = 0.02
@@ -39,8 +35,7 @@ _PRESSED = 0.58
 """Share of the way from heel to toe marker at which the pressure of somebody who stands lies: 12 people of 4
 laboratories on plates of known place, 13 mm before the middle, sd 13 mm along the feet and 8 mm across.
 """
-PLACE_SD = 0.013
-"""m along the feet, the same 12 people: what their way of leaning leaves open."""
+_PLACE_SD = 0.013  # m along the feet, the same 12 people: what their way of leaning leaves open
 
 
 class Load(NamedTuple):
@@ -51,7 +46,7 @@ class Load(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TablePlates:
+class _TablePlates:
     """The plates of a table, what was decided, and what a person should look at."""
 
     plates: tuple[Plate, ...] = ()
@@ -98,7 +93,7 @@ def _arm(groups: Sequence[tuple[int, ...]], values: Array) -> float:
 
 def table_plates(
     loads: Sequence[Load], time: Array, turn: Array, markers: Markers, worn: MarkerSet | None, told: Told
-) -> TablePlates:
+) -> _TablePlates:
     """Return the plates of a table in the lab frame, ground on subject.
 
     ``loads`` on ``time`` (T,) s, with the wrench in the axes of the file; ``turn`` (3, 3) lab_R_file; ``markers`` (m,
@@ -116,11 +111,11 @@ def table_plates(
         placed += done.plates
         history += done.history
         if done.warnings:
-            return TablePlates(tuple(placed), tuple(history), done.warnings)
+            return _TablePlates(tuple(placed), tuple(history), done.warnings)
     plates = sorted((_told(plate, told.plates.get(plate.name, NOTHING_TOLD)) for plate in placed), key=_number)
     idle = [f"{n}: {', '.join(keys)}" for n, keys in _idle(told).items()]
     warnings = [f"{one} of session.toml can be followed in C3D files only." for one in idle]
-    return TablePlates(tuple(plates), tuple(history), tuple(warnings))
+    return _TablePlates(tuple(plates), tuple(history), tuple(warnings))
 
 
 def _idle(told: Told) -> Mapping[str, list[str]]:
@@ -206,7 +201,7 @@ def _pressure(value: Array) -> Array:
     return np.where((np.abs(vertical) >= COP_FORCE)[:, None], cop, np.nan)
 
 
-def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> TablePlates:
+def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _Feet | None) -> _TablePlates:
     """Return plates of which nobody tells the place, by where the feet are; a warning where these do not tell it."""
     turned = [np.hstack([load.value[:, :3] @ turn.T, load.value[:, 3:] @ turn.T]) for _, load in free]
     zeroed = [_zeroed(value, time) for value in turned]
@@ -214,7 +209,7 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
     total = np.sum([value for value, _ in signed], axis=0)
     shift = None if feet is None else _shift(total, time, feet)
     if shift is None or (np.linalg.norm(shift) > _UNDER and len(free) > 1):
-        return TablePlates(warnings=(_lacking([n for n, _ in free], feet, shift),))
+        return _TablePlates(warnings=(_lacking([n for n, _ in free], feet, shift),))
     own = float(np.linalg.norm(shift)) > _UNDER
     at, about = (np.array([*shift, 0.0]), _put(shift)) if own else (np.zeros(3), _ABOUT_THE_ORIGIN)
     plates, history = [], []
@@ -225,10 +220,12 @@ def _by_feet(free: Sequence[tuple[int, Load]], time: Array, turn: Array, feet: _
             history.append(f"plate{number} ({load.columns}) is never loaded above {COP_FORCE:g} N and was left out.")
             continue
         decisions = (f"Columns {load.columns}, along the axes of the markers.", empty, said, about)
-        corners = _around(np.concatenate([cop, feet.middle]) if own and feet is not None else cop)
+        points = np.concatenate([cop, feet.middle]) if own and feet is not None else cop
+        (x0, y0), (x1, y1) = np.nanmin(points, axis=0) - _MARGIN, np.nanmax(points, axis=0) + _MARGIN
+        corners = np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
         name, put = f"plate{number}", shift if own else None
         plates.append(Plate(name, 0, corners, wrench, decisions, zero, placed=False, columns=load.columns, put=put))
-    return TablePlates(tuple(plates), tuple(history))
+    return _TablePlates(tuple(plates), tuple(history))
 
 
 _ABOUT_THE_ORIGIN = "Place: the moments are about the lab's origin: the pressures that follow lie under the feet."
@@ -240,14 +237,12 @@ def _put(shift: Array) -> str:
         f"Place: the table does not say it. The moments are not about the lab's origin (the pressure would lie "
         f"{np.linalg.norm(shift):.2f} m beside the feet), so they are about the plate's own point, which was put at "
         f"({shift[0]:.3f}, {shift[1]:.3f}, 0) m, where the pressure lies under the feet as people stand: known "
-        f"to {1000 * PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
+        f"to {1000 * _PLACE_SD:.0f} mm. Give corners_m in [plates.plate1] of session.toml to know it better."
     )
 
 
 def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
-    """Return the median (2,) m by which the feet on the ground lie beside the pressure, while the person stands upright
-    on both where that is seen. None where no foot is on the ground under load.
-    """
+    """Return the median (2,) m by which loaded feet on the ground lie beside the pressure; None without any."""
     known = np.isfinite(_pressure(total)).all(axis=1)
     if known.sum() < 1:
         return None
@@ -256,12 +251,6 @@ def _shift(total: Array, time: Array, feet: _Feet) -> Array | None:
     told = np.isfinite(beside).all(axis=1)
     best = told & feet.standing if (told & feet.standing).any() else told
     return np.asarray(np.median(beside[best], axis=0)) if best.any() else None
-
-
-def _around(points: Array) -> Array:
-    """Return the corners (4, 3) m around points (n, 2) on the floor, counter-clockwise seen from above."""
-    (x0, y0), (x1, y1) = np.nanmin(points, axis=0) - _MARGIN, np.nanmax(points, axis=0) + _MARGIN
-    return np.array([[x1, y1, 0.0], [x0, y1, 0.0], [x0, y0, 0.0], [x1, y0, 0.0]])
 
 
 def _lacking(numbers: Sequence[int], feet: _Feet | None, shift: Array | None) -> str:

@@ -1,1 +1,0 @@
-"""AMTI's native recordings: NetForce's .bsf and its text exports."""

@@ -1,1 +1,0 @@
-"""Which frames are fully measured: soles, plates, surfaces."""
