@@ -18,6 +18,8 @@ _LARGEST_TEXT = 2**26
 """Bytes of a TOML or JSON file: hundreds of times what biodance writes."""
 _DEEPEST = 20
 """Tables and lists in each other; biodance writes five."""
+_DIGITS = 40
+"""Of a whole number: a run's number has fewer."""
 _COMMA = re.compile(r"=\s*[-+]?\d+,\d")
 """A number with a decimal comma."""
 
@@ -107,9 +109,16 @@ def parse_json(text: str) -> Any:
     if len(text) > _LARGEST_TEXT:
         raise ValueError(f"{len(text) / 1e6:.0f} MB of text, legal are up to {_LARGEST_TEXT / 1e6:.0f}")
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_whole)
     except RecursionError as error:
         raise ValueError("lists lie in each other too deeply") from error
+
+
+def _whole(digits: str) -> int:
+    """Return a whole number; ValueError for one that no computation can take."""
+    if len(digits) > _DIGITS:
+        raise ValueError(f"{digits[:_DIGITS]}... is larger than anything that is counted")
+    return int(digits)
 
 
 def refuse_large(path: Path, largest: int) -> None:

@@ -1,5 +1,6 @@
 """Stand-ins for the work on one session, for processes that import them: quick, deadly, slow."""
 
+import fcntl
 import json
 import os
 import signal
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from biodance.batch.outcome import OUTCOME, Outcome, SessionStatus, SessionTask, outcome_of
 from biodance.batch.work import process_session
+from biodance.lab.session.results_folder import write_manifest
 
 
 def count(task: SessionTask) -> Outcome:
@@ -20,6 +22,7 @@ def count(task: SessionTask) -> Outcome:
     outcome = Outcome(task.name, task.fingerprint, SessionStatus.DONE, rows=({"trial": "walk", "status": "ok"},))
     Path(task.out).mkdir(parents=True, exist_ok=True)
     (Path(task.out) / OUTCOME).write_text(json.dumps(asdict(outcome)))
+    write_manifest(Path(task.out), Path(task.session), {})
     return outcome
 
 
@@ -45,17 +48,13 @@ def die_beside(task: SessionTask) -> Outcome:
     return die_once(task) if task.name == "s1" else die_in_s2(task)
 
 
-def slow(task: SessionTask) -> Outcome:
-    """Go through a session that is refused, then wait to be killed with the one that asked."""
+def stuck(task: SessionTask) -> Outcome:
+    """Go through a session that is refused; in s3 wait to be killed with the one that asked."""
     if (found := outcome_of(task)) is None:
         found = process_session(replace(task, pages=False))
-    time.sleep(30.0 if task.name == "s3" else 0.0)
+    if task.name == "s3":
+        alive = (Path(task.session) / "alive").open("w")
+        fcntl.flock(alive, fcntl.LOCK_EX)
+        (Path(task.out).parent / ".part-at-work").mkdir()
+        signal.pause()
     return found
-
-
-def die_beside_slow(task: SessionTask) -> Outcome:
-    """Be killed in s2 each time, while all others are at work for longer."""
-    with (Path(task.session) / "begun.log").open("a") as log:
-        log.write(f"{os.getpid()}\n")
-    time.sleep(0.3 if task.name == "s2" else 0.6)
-    return die_in_s2(task)

@@ -176,7 +176,7 @@ def test_a_full_disk_is_told_with_the_path(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(BiodanceError, match=r"results.json: cannot be written \(No space left on device\)"):
         write_files(tmp_path, {"results.json": "{}"})
 

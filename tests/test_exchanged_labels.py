@@ -130,7 +130,7 @@ def test_a_copy_with_other_labels_is_the_same_to_the_byte_elsewhere(tmp_path: Pa
     assert after.labels == ("S:RASI", "S:LASI", "S:C7")
     np.testing.assert_array_equal(before.points, after.points)
     assert sum(a != b for a, b in zip(source.read_bytes(), copy.read_bytes(), strict=True)) == 2
-    with pytest.raises(FileRefused, match="nothing is overwritten"):
+    with pytest.raises(FileRefused, match="is not overwritten"):
         write_exchanged(source, copy, {})
 
 

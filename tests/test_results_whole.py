@@ -8,7 +8,6 @@ import pytest
 
 from biodance.cli import run as command
 from biodance.errors import FileRefused, SessionRefused
-from biodance.lab.plain_text import write_new
 from biodance.lab.session import results_folder as rooms
 from biodance.lab.session.results_folder import (
     check_results,
@@ -17,6 +16,7 @@ from biodance.lab.session.results_folder import (
     read_manifest,
     refuse_mixture,
     results_folder,
+    whole_folder,
 )
 
 
@@ -66,55 +66,6 @@ def test_results_of_a_version_without_manifest_are_replaced_too(session: Path, t
     assert content(out) == SECOND
 
 
-class Stopped(Exception):
-    """The power is cut."""
-
-
-def steps(monkeypatch: pytest.MonkeyPatch, stop_at: int) -> list[str]:
-    """Count every step that changes names or flushes, and stop before one of them."""
-    done: list[str] = []
-
-    def counted(what: str, act):
-        def wrapped(*words, **more):
-            if len(done) == stop_at:
-                raise Stopped
-            done.append(what)
-            return act(*words, **more)
-
-        return wrapped
-
-    for name in ("flush", "write_manifest", "_exchange", "_cleared"):
-        monkeypatch.setattr(rooms, name, counted(name, getattr(rooms, name)))
-    return done
-
-
-def test_a_stop_at_any_step_leaves_the_earlier_or_the_new_results(session: Path, tmp_path: Path, monkeypatch) -> None:
-    seen, number = set(), 0
-    while True:
-        out = tmp_path / f"out{number}"
-        run(session, out, FIRST)
-        with monkeypatch.context() as patch:
-            done = steps(patch, number)
-            try:
-                run(session, out, SECOND, force=True)
-                stopped = False
-            except Stopped:
-                stopped = True
-        now = content(out)
-        assert now in (FIRST, SECOND), done
-        found = check_results(out)
-        assert found is not None
-        assert found.whole
-        seen.add(now == SECOND)
-        run(session, out, SECOND, force=True)
-        assert content(out) == SECOND, "what was stopped can be done again"
-        if not stopped:
-            break
-        number += 1
-    assert seen == {True, False}
-    assert number >= 6
-
-
 def test_a_full_disk_leaves_what_was_there(session: Path, tmp_path: Path, monkeypatch) -> None:
     run(session, tmp_path / "out", FIRST)
 
@@ -143,6 +94,22 @@ def test_a_place_that_is_a_disk_of_its_own_is_filled_from_within(session: Path, 
     assert content(out) == FIRST
     run(session, out, SECOND, force=True)
     assert content(out) == SECOND
+
+
+def test_a_folder_on_a_disk_of_its_own_holds_nothing_stale(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(os.path, "ismount", lambda path: Path(path) == tmp_path / "tables")
+    for names in (("angles.csv", "findings.csv"), ("angles.csv",)):
+        with whole_folder(tmp_path / "tables", over=True) as part:
+            for name in names:
+                (part / name).write_text("of this run")
+    assert [path.name for path in (tmp_path / "tables").iterdir()] == ["angles.csv"]
+
+
+def test_verify_finds_the_recordings_from_anywhere(session: Path, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(Path("visit"), Path("out"), FIRST)
+    monkeypatch.chdir("/")
+    assert command(["verify", str(tmp_path / "out")]) == 0
 
 
 def test_the_manifest_binds_the_parts_and_the_recordings(session: Path, tmp_path: Path) -> None:
@@ -187,24 +154,3 @@ def test_verify_tells_whole_results_from_changed_ones(session: Path, tmp_path: P
     assert [(one["whole"], one["changed"]) for one in found] == [(True, []), (False, ["body.json"])]
     assert command(["verify", str(session)]) == 2
     assert "holds no results" in capsys.readouterr().err
-
-
-def test_a_new_file_is_whole_or_not_there(tmp_path: Path, monkeypatch) -> None:
-    path = tmp_path / "model.osim"
-
-    class Full:
-        def __init__(self, place: Path, *_: object) -> None:
-            os.close(os.open(place, os.O_CREAT))
-
-        def __enter__(self) -> "Full":
-            return self
-
-        def __exit__(self, *_: object) -> None: ...
-
-        def write(self, _: bytes) -> None:
-            raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("builtins.open", Full)
-    with pytest.raises(FileRefused, match="No space left on device"):
-        write_new(path, b"<whole/>")
-    assert not path.exists()

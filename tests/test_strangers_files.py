@@ -7,17 +7,20 @@ import subprocess
 import sys
 import urllib.request
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from biodance.body.body import body_text, read_body
 from biodance.cli.app import say
 from biodance.dance.dance import Dance
 from biodance.errors import FileRefused, without_codes
 from biodance.lab.corrections import read_corrections
 from biodance.lab.plain_text import for_spreadsheet
+from biodance.lab.robot import read_encoders
 from biodance.lab.session.results_folder import read_manifest
 from biodance.library import read_toml
 from biodance.pipeline.lab_file import read_lab
@@ -51,6 +54,35 @@ def test_deep_json_is_one_sentence(tmp_path: Path) -> None:
         read_manifest(tmp_path)
 
 
+@pytest.mark.parametrize("digits", ["9" * 400, "-" + "9" * 400])
+def test_a_number_that_no_computation_takes_is_one_sentence(tmp_path: Path, digits: str) -> None:
+    from small_dances import BODY
+
+    (tmp_path / "body.json").write_text(body_text(BODY, "").replace("1", digits, 1))
+    with pytest.raises(FileRefused, match="larger than anything that is counted"):
+        read_body(tmp_path / "body.json")
+
+
+def test_samples_that_an_encoder_lacks_are_said(tmp_path: Path) -> None:
+    time = np.delete(np.arange(100) / 100, [40, 41, 70])
+    rows = [f"{t:.2f},{np.sin(t):.6f}" for t in time]
+    (tmp_path / "a.csv").write_text("\n".join(["time,left_knee (rad)", *rows]) + "\n")
+    found = read_encoders(tmp_path / "a.csv").notes
+    assert found == ("Samples are missing after 0.390 s and at 1 other place: up to 0.03 s without one.",)
+    (tmp_path / "a.csv").write_text("\n".join(["time,left_knee (rad)", *rows[:40]]) + "\n")
+    assert read_encoders(tmp_path / "a.csv").notes == ()
+
+
+def test_a_covariance_that_is_none_is_refused(tmp_path: Path) -> None:
+    from small_dances import BODY as body
+
+    wrong = body.sip.covariance.copy()
+    wrong[0, 1] += 0.1
+    (tmp_path / "body.json").write_text(body_text(replace(body, sip=replace(body.sip, covariance=wrong)), ""))
+    with pytest.raises(FileRefused, match="stands there twice, and differs"):
+        read_body(tmp_path / "body.json")
+
+
 def test_a_huge_toml_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "lab.toml").open("wb") as stream:
         stream.truncate(2**27)
@@ -59,13 +91,12 @@ def test_a_huge_toml_is_not_read(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def dance_parts() -> dict[str, np.ndarray]:
+def dance_parts(tmp_path_factory) -> dict[str, np.ndarray]:
     from small_dances import small_dance
 
-    stream = io.BytesIO()
-    small_dance().save(stream)  # type: ignore[arg-type]
-    stream.seek(0)
-    with np.load(stream) as found:
+    path = tmp_path_factory.mktemp("dance") / "dance.npz"
+    small_dance().save(path)
+    with np.load(path) as found:
         return {name: found[name] for name in found.files}
 
 
@@ -142,6 +173,10 @@ def test_a_correction_that_no_plate_needs_is_refused(tmp_path: Path, line: str, 
         ("[norms.x]\nvalue = 0\nsd = -1.0", r"norms\.x\.sd = -1\.0"),
         ("[corection]", r"\[corection\] is nothing"),
         ('[tolerances]\norigin = "x"\nthreshold = 1\nnoise = [[1]]\nmovement = []', "noise"),
+        (
+            '[tolerances]\norigin = "x"\nthreshold = 1\nnoise = []\nmovement = []\nsizes = {"plate_gian Fz" = 0.1}',
+            "'plate_gian Fz' is the size of nothing",
+        ),
         ('[normal."gait knee_flexion"]\nunit = "deg"\npeople = 0\nmean = [1, 2]\nsd = [1, 2]', "people = 0"),
     ],
 )

@@ -5,7 +5,7 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import distributed
 
 Work = Callable[[SessionTask], Outcome]
+Outcomes = Generator[tuple[SessionTask, Outcome], None, None]
 TRIES = 3
 """Times that a session may lose its process before it is given up."""
 _AHEAD = 2
@@ -26,7 +27,7 @@ _FRESH = 50
 """Sessions after which a process is replaced, so that memory stays flat."""
 
 
-def run_here(tasks: Iterable[SessionTask], work: Work, *, workers: int) -> Iterator[tuple[SessionTask, Outcome]]:
+def run_here(tasks: Iterable[SessionTask], work: Work, *, workers: int) -> Outcomes:
     """Yield every task with its outcome, worked on by processes of this machine, as they are finished.
 
     A process that dies (killed, out of memory) is replaced and takes no other along; its session is tried again when
@@ -41,9 +42,7 @@ def run_here(tasks: Iterable[SessionTask], work: Work, *, workers: int) -> Itera
         yield task, _killed(task)
 
 
-def _beside(
-    waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask]
-) -> Iterator[tuple[SessionTask, Outcome]]:
+def _beside(waiting: deque[SessionTask], work: Work, workers: int, lost: deque[SessionTask]) -> Outcomes:
     """Yield what is finished until all is; the tasks whose process died go to ``lost``.
 
     Each worker is a pool of one process: the death of a process ends every process of its pool.
@@ -65,6 +64,10 @@ def _beside(
                     free.append(pool)
                     yield task, future.result()
     finally:
+        for _, pool in flying.values():  # stopped: what is at work would write while the next run clears up
+            for process in tuple(pool._processes.values()):
+                process.kill()
+                process.join()
         for pool in (*free, *(pool for _, pool in flying.values())):
             pool.shutdown(wait=False, cancel_futures=True)
 
@@ -107,7 +110,7 @@ def end_with_parent() -> None:
         threading.Thread(target=watch, daemon=True).start()
 
 
-def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> Iterator[tuple[SessionTask, Outcome]]:
+def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> Outcomes:
     """Yield every task with its outcome, worked on by the Dask cluster at the address ``scheduler``.
 
     Recordings and results must lie where all workers see them under the same names. Dask replaces workers that die.
@@ -115,7 +118,7 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
     Raises
     ------
     BiodanceError
-        Dask is not installed, or nobody answers at the address.
+        Dask is not installed, nobody answers at the address, or the scheduler goes away.
     """
     try:
         import distributed as dask
@@ -125,10 +128,17 @@ def run_on_dask(tasks: Iterable[SessionTask], work: Work, *, scheduler: str) -> 
         client = dask.Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
         raise BiodanceError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error}).") from error
-    with client:
-        waiting, alone = deque(tasks), deque[SessionTask]()
-        yield from _on_cluster(client, work, waiting, alone, lambda: _AHEAD * max(1, sum(client.nthreads().values())))
-        yield from _on_cluster(client, work, alone, None, lambda: 1)
+    waiting, alone = deque(tasks), deque[SessionTask]()
+    try:
+        with client:
+            places = lambda: _AHEAD * max(1, sum(client.nthreads().values()))  # noqa: E731
+            yield from _on_cluster(client, work, waiting, alone, places)
+            yield from _on_cluster(client, work, alone, None, lambda: 1)
+    except (dask.CancelledError, OSError) as error:
+        raise BiodanceError(
+            f"--scheduler {scheduler}: the Dask scheduler went away. What was done is kept: start it again, and run "
+            f"the same command."
+        ) from error
 
 
 def _on_cluster(
@@ -137,7 +147,7 @@ def _on_cluster(
     waiting: deque[SessionTask],
     alone: deque[SessionTask] | None,
     places: Callable[[], int],
-) -> Iterator[tuple[SessionTask, Outcome]]:
+) -> Outcomes:
     """Yield what is finished until all is, with as many tasks sent as there are ``places``.
 
     Dask blames a worker's death on all that it held: such a task goes to ``alone``, or, without it, is given up.

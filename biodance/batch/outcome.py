@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from biodance.errors import FileRefused
-from biodance.lab.session.results_folder import refuse_mixture
+from biodance.lab.session.results_folder import read_manifest, refuse_mixture
 from biodance.library import parse_json
 from biodance.version import __version__
 
 OUTCOME = "outcome.json"
-"""Written last into a session's folder: where it is, the session is done."""
+"""In a session's folder: where it and the manifest are, the session is done."""
 TrialRows = tuple[dict[str, Any], ...]
 """One row of plain values for each trial."""
 
@@ -135,10 +135,12 @@ def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
 def outcome_of(task: SessionTask) -> Outcome | None:
     """Return what became of a session as it is now, in this or an earlier run; None where that is not known."""
     try:
+        if read_manifest(Path(task.out)) is None:
+            return None
         found = parse_json((Path(task.out) / OUTCOME).read_text(encoding="utf-8"))
         told = {"status": SessionStatus(found["status"]), "rows": tuple(found["rows"]), "why": Why(found["why"])}
         outcome = Outcome(**{**found, **told})
-        refuse_mixture(Path(task.out), ("results.json",))
+        refuse_mixture(Path(task.out), (OUTCOME, "results.json"))
     except (OSError, ValueError, TypeError, KeyError, FileRefused):
         return None
     return outcome if outcome.fingerprint == task.fingerprint else None

@@ -8,8 +8,8 @@ import os
 import shutil
 import sqlite3
 from collections import Counter
-from collections.abc import Callable, Iterable
-from contextlib import closing
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
@@ -62,7 +62,7 @@ class Ledger:
         known = folder / LEDGER
         if folder.exists() and not folder.is_dir():
             raise BiodanceError(f"{folder}: is a file; the results need a folder. Choose another --out.")
-        if folder.is_dir() and any(folder.iterdir()) and not known.exists():
+        if folder.is_dir() and any(folder.iterdir()) and not (known.exists() or (folder / _LOCK).exists()):
             raise BiodanceError(
                 f"{folder}: holds files that are not of a batch run; nothing is overwritten. Choose another --out."
             )
@@ -76,7 +76,11 @@ class Ledger:
                 f"{folder}: another run is writing here. Wait for it, or choose another --out."
             ) from None
         self._book = sqlite3.connect(known)
-        self._book.executescript(_TABLE)
+        try:
+            self._book.executescript(_TABLE)
+        except sqlite3.Error:
+            self.close()
+            raise
         place = readable(archive.resolve())
         with self._book:
             self._book.execute("INSERT INTO archive SELECT ? WHERE NOT EXISTS (SELECT 1 FROM archive)", (place,))
@@ -210,7 +214,7 @@ def run_batch(
     if not tasks:
         left = f"only recordings of plates ({indices[0]}): see biodance plates" if indices else "only results"
         raise BiodanceError(f"{archive}: holds no session, {left}.")
-    with closing(Ledger(folder, archive)) as ledger:
+    with _told_of_book(folder), closing(Ledger(folder, archive)) as ledger:
         for part in (folder / SESSIONS).glob(f"{PART}*"):  # of a run that was killed
             shutil.rmtree(part, ignore_errors=True)
         fresh = _work_off(tasks, ledger, workers, work, tell)
@@ -219,6 +223,18 @@ def run_batch(
         tell("writing the summary", len(tasks), len(tasks))
         write_summary(folder, archive.resolve().name, outcomes, left_out)
     return BatchRun(archive, folder, outcomes, fresh, left_out)
+
+
+@contextmanager
+def _told_of_book(folder: Path) -> Iterator[None]:
+    """Raise BiodanceError where the book cannot be written or is none: sessions' folders tell what is done."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise BiodanceError(
+            f"{folder / LEDGER}: {error}. Make room, or delete that file if it is damaged, and run the same command: "
+            f"what is done is kept."
+        ) from error
 
 
 def _work_off(
@@ -243,10 +259,11 @@ def _work_off(
         finished = run_on_dask(open_tasks, work, scheduler=workers)
     else:
         finished = run_here(open_tasks, work, workers=min(workers or os.cpu_count() or 1, len(open_tasks)))
-    for task, outcome in finished:
-        ledger.write(outcome)
-        done += 1
-        tell(f"{task.name}: {outcome.status}", done, len(tasks))
+    with closing(finished):  # Ctrl-C while a line is told ends what is at work, too
+        for task, outcome in finished:
+            ledger.write(outcome)
+            done += 1
+            tell(f"{task.name}: {outcome.status}", done, len(tasks))
     return len(open_tasks)
 
 

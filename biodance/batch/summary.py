@@ -12,6 +12,7 @@ from biodance.batch.outcome import Outcome
 from biodance.batch.work import ROW_TYPES
 from biodance.diagnosis.archive.alike import SessionLeft, likenesses
 from biodance.display import BLUE, RED
+from biodance.lab.plain_text import whole_file
 from biodance.library import parse_json
 from biodance.report.files import for_spreadsheets, write_files
 
@@ -60,8 +61,8 @@ def write_summary(folder: Path, name: str, outcomes: Sequence[Outcome], left_out
     is replaced whole.
     """
     table = summary_table(outcomes)
-    table.to_parquet(folder / ".summary.parquet.part", index=False)
-    (folder / ".summary.parquet.part").replace(folder / "summary.parquet")
+    with whole_file(folder / "summary.parquet", over=True) as part:
+        table.to_parquet(part, index=False)
     alike = [one.text for one in likenesses(left_in_archive(folder, [one.name for one in outcomes]))]
     page = _page(name, outcomes, table, left_out, _links(folder, outcomes), alike)
     write_files(folder, {"summary.csv": for_spreadsheets(table).to_csv(index=False, lineterminator="\n"), _PAGE: page})

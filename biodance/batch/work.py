@@ -57,12 +57,13 @@ def process_session(task: SessionTask) -> Outcome:
             log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
             log.flush()
 
-        outcome = _attempt(task, part, tell)
+        outcome, inputs = _attempt(task, part, tell)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     seconds = time.perf_counter() - started
     outcome = replace(outcome, seconds=round(seconds, 2), memory_mb=round(memory, 1), limit=task.limit)
     try:
         (part / OUTCOME).write_text(json.dumps(asdict(outcome), indent=1), encoding="utf-8")
+        write_manifest(part, Path(task.session), inputs)
         put_in_place(part, place)
         shutil.rmtree(part, ignore_errors=True)  # of an earlier version of these recordings
     except OSError as error:
@@ -71,13 +72,13 @@ def process_session(task: SessionTask) -> Outcome:
     return outcome
 
 
-def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> Outcome:
-    """Return what became of a session; what is raised becomes a status."""
+def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[Outcome, dict[str, str]]:
+    """Return what became of a session and the hashes of its recordings; what is raised becomes a status."""
     status, why = SessionStatus.FAILED, Why.MACHINE
     try:
         with _limited(task.limit):
-            status, reason, rows = _examined(task, folder, tell)
-            return Outcome(task.name, task.fingerprint, status, reason, rows)
+            status, reason, rows, inputs = _examined(task, folder, tell)
+            return Outcome(task.name, task.fingerprint, status, reason, rows), inputs
     except BiodanceError as error:
         status, why, reason = SessionStatus.REFUSED, _hangs_on(error), str(error)
     except _OutOfTimeError:
@@ -91,7 +92,7 @@ def _attempt(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> Ou
         why, reason = Why.SESSION, f"biodance itself failed ({type(error).__name__}: {error}); see {_LOG}."
     reason = readable(reason)
     tell(f"{status}: {reason}")
-    return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why)
+    return Outcome(task.name, task.fingerprint, status, reason, only_row(status, reason), why=why), {}
 
 
 def _hangs_on(error: BaseException) -> Why:
@@ -102,8 +103,10 @@ def _hangs_on(error: BaseException) -> Why:
     return _hangs_on(cause) if cause else Why.SESSION
 
 
-def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> tuple[SessionStatus, str, TrialRows]:
-    """Return status, reason and rows of a session that goes through."""
+def _examined(
+    task: SessionTask, folder: Path, tell: Callable[[str], None]
+) -> tuple[SessionStatus, str, TrialRows, dict[str, str]]:
+    """Return status, reason, rows and the hashes of the recordings of a session that goes through."""
     from biodance.lab.session.read import read_session
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.load import as_diagnosed
@@ -122,9 +125,8 @@ def _examined(task: SessionTask, folder: Path, tell: Callable[[str], None]) -> t
     well = all(row["level"] == "note" for row in document["attention"])
     status = SessionStatus.DONE if well else SessionStatus.NEEDS_A_PERSON
     read = {trial.source.path: trial.source.sha256 for trial in session.trials}
-    write_manifest(folder, session.folder, inputs_of(read, session.folder), growing=_LOG)
     tell(f"{status}: {first}")
-    return status, first, trial_rows(document)
+    return status, first, trial_rows(document), inputs_of(read, session.folder)
 
 
 @contextmanager

@@ -352,6 +352,8 @@ def _possible(body: Body) -> Body:
     for what, array in places.items():
         if np.abs(array).max(initial=0.0) > _FARTHEST:
             raise ValueError(f"{what}: {np.abs(array).max():.3g} m; legal are up to {_FARTHEST:g} m")
+    if not np.allclose(sip.covariance, sip.covariance.T, rtol=1e-6, atol=1e-15):
+        raise ValueError("covariance of the parameters: what two have in common stands there twice, and differs")
     worst, whole = float(sip.mass.min()), float(sip.mass.sum())
     if worst < 0 or not 0 < whole <= _HEAVIEST:
         raise ValueError(

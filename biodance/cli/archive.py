@@ -108,13 +108,16 @@ def learn_command(
     archive
         Folder that contains session folders, at any depth.
     """
+    from biodance.lab.plain_text import refuse_present, write_whole
     from biodance.pipeline.learn import learn_laboratory
-    from biodance.report.laboratory import learned_document, print_learned, refuse_existing, write_lab_file
+    from biodance.report.files import refuse_missing_folder
+    from biodance.report.laboratory import lab_file_text, learned_document, print_learned
 
-    refuse_existing(out)
+    refuse_present(out)
+    refuse_missing_folder(out)
     with progress() as tell:
         found = learn_laboratory(archive, tell=tell)
-        write_lab_file(found, out)
+        write_whole(out, lab_file_text(found).encode())
     show(learned_document(found), print_learned, json=json, path=out)
     return NEEDS_A_PERSON if found.left_out else DONE
 

@@ -1,6 +1,5 @@
 """The command dance."""
 
-import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -97,6 +96,7 @@ def dance_command(
     cues, dance.c3d) is not written of a dance that is NOT SAFE when imprecise, unless --despite is given.
     """
     from biodance.dance.problem.person import HEALTHY, read_person
+    from biodance.lab.session.results_folder import whole_folder
     from biodance.pipeline.dance import (
         UNFINISHED,
         dance_folder,
@@ -125,8 +125,8 @@ def dance_command(
             return STOPPED
         tell("writing", 0, 0)
         result = result if isinstance(who, RobotFile) else designed_for(result, who)
-        found = write_dance(result, folder, despite=despite)
-    shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
+        with whole_folder(folder, over=True) as part:
+            found = write_dance(result, part, despite=despite)
     show(found, print_dance, json=json, path=folder)
     if result.dance is not None and result.dance.unsafe and not despite:
         say("No cards, cues and dance.c3d: the dance is NOT SAFE when imprecise. --despite writes them all the same.")
@@ -145,6 +145,7 @@ def limits_command(
     force: ForceOption = False,
 ) -> int:
     """Write a commented file of one person's limits, to be changed and given to `biodance dance --limits`."""
+    from biodance.lab.plain_text import write_whole
     from biodance.library import folder, names
     from biodance.report.files import refuse_file
 
@@ -152,7 +153,7 @@ def limits_command(
     if template not in legal:
         raise UnknownName.of("template of limits", template, legal)
     refuse_file(out, force=force)
-    shutil.copyfile(folder("protocols") / "limits" / f"{template}.toml", out)
+    write_whole(out, (folder("protocols") / "limits" / f"{template}.toml").read_bytes(), over=force)
     show_place(out)
     return DONE
 

@@ -184,13 +184,15 @@ def export_command(
     source
         Session folder; results folder of `biodance identify`; or hoap3, the built-in robot model.
     """
-    from biodance.pipeline.export import FOLDERS, replaceable
+    from biodance.lab.plain_text import whole_file
+    from biodance.pipeline.export import FOLDERS
     from biodance.pipeline.export import export as write
     from biodance.report.files import refuse_file
 
     if format not in FOLDERS:
         refuse_file(out, force=force)
-    with progress() as tell, replaceable(out, force=force) as place:
+    replaced = whole_file(out, over=True) if force and out.is_file() else nullcontext(out)
+    with progress() as tell, replaced as place:
         _, sentence = write(
             source, place, format=format, trial=trial, subject=subject, markers=markers, meshes=meshes, tell=tell
         )

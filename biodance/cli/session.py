@@ -75,12 +75,14 @@ def tabled(
     *,
     movement: "SessionMovement | None" = None,
 ) -> None:
-    """Write the tables of a result into a folder that is ready for them; nothing without one."""
+    """Write the tables of a result in the place of those that its folder holds; nothing without one."""
+    from biodance.lab.session.results_folder import whole_folder
     from biodance.report.files import write_tables
     from biodance.report.tables.frames import session_tables
 
     if folder is not None:
-        write_tables(session_tables(result, diagnosis, movement), folder)
+        with whole_folder(folder, over=True) as part:
+            write_tables(session_tables(result, diagnosis, movement), part)
 
 
 def print_reported(result: "SessionResult", folder: Path, found: "dict[str, Any]", json: bool) -> int:

@@ -22,6 +22,7 @@ from biodance.dance.problem.splines import Phase, path_in, phase_at
 from biodance.dance.problem.stance import Stance, stance_fields
 from biodance.dance.problem.state import State, close_legs
 from biodance.errors import BiodanceError, FileRefused
+from biodance.lab.plain_text import whole_file
 from biodance.library import parse_json, refuse_large, refuse_special
 from biodance.records import SIDES, Array, Motion, Subject, freeze
 from biodance.threads import Sendable
@@ -335,9 +336,9 @@ class Dance(Sendable):
         words["unsafe"] = [asdict(margin) for margin in self.unsafe]
         words |= {"stances": [stance_fields(s) for s in self.stances], "under": [stance_fields(s) for s in self.under]}
         arrays = {name: getattr(self, name) for name in ("postures", "hold", "via", "move")}
-        np.savez_compressed(
-            path, allow_pickle=False, words=json.dumps(words), body=body_text(self.body, self.protocol), **arrays
-        )
+        arrays |= {"words": json.dumps(words), "body": body_text(self.body, self.protocol)}
+        with whole_file(Path(path), over=True) as part, part.open("wb") as stream:
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> "Dance":

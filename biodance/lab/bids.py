@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from biodance.errors import BiodanceError
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import write_whole
 from biodance.records import Array, freeze
 from biodance.records.arrays import rate_of
 
@@ -58,7 +58,7 @@ def write_description(folder: Path, name: str, *, derived_by: Mapping[str, str] 
 def write_participants(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write ``participants.tsv`` with one row a participant; None and NaN are n/a."""
     lines = ["\t".join(rows[0]), *("\t".join(_cell(value) for value in row.values()) for row in rows)]
-    return write_new(folder / "participants.tsv", ("\n".join(lines) + "\n").encode())
+    return write_whole(folder / "participants.tsv", ("\n".join(lines) + "\n").encode())
 
 
 def _cell(value: object) -> str:
@@ -76,10 +76,10 @@ def write_motion(folder: Path, stem: str, channels: BidsChannels, *, task: str, 
         A file exists or cannot be written.
     """
     lines = ("\t".join("n/a" if np.isnan(v) else f"{v:.7g}" for v in row) for row in channels.values)
-    write_new(folder / f"{stem}_motion.tsv", ("\n".join(lines) + "\n").encode())
+    write_whole(folder / f"{stem}_motion.tsv", ("\n".join(lines) + "\n").encode())
     titles = ("name", "component", "type", "tracked_point", "units", "reference_frame")
     table = "\n".join("\t".join(row) for row in (titles, *channels.rows))
-    write_new(folder / f"{stem}_channels.tsv", (table + "\n").encode())
+    write_whole(folder / f"{stem}_channels.tsv", (table + "\n").encode())
     _json(folder / f"{stem}_channels.json", {"reference_frame": {"Levels": _LAB_FRAME}})
     types = [row[2] for row in channels.rows]
     counts = {f"{kind}ChannelCount": types.count(kind) for kind in dict.fromkeys(types)}
@@ -100,8 +100,8 @@ def write_motion(folder: Path, stem: str, channels: BidsChannels, *, task: str, 
 def write_events(folder: Path, stem: str, events: Sequence[tuple[float, str]]) -> Path:
     """Write ``stem_events.tsv``: onset s from the first frame, duration 0, trial type."""
     lines = ["onset\tduration\ttrial_type", *(f"{onset:.6g}\t0\t{kind}" for onset, kind in events)]
-    return write_new(folder / f"{stem}_events.tsv", ("\n".join(lines) + "\n").encode())
+    return write_whole(folder / f"{stem}_events.tsv", ("\n".join(lines) + "\n").encode())
 
 
 def _json(path: Path, content: Mapping[str, Any]) -> Path:
-    return write_new(path, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
+    return write_whole(path, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownName
-from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text, with_points, write_new
+from biodance.lab.plain_text import COMMAS_READ, cells, parse_number, read_text, with_points, write_whole
 from biodance.records import Array, Wrench, assign, frozen_array
 from biodance.settings import COP_FORCE
 from biodance.spatial import wrench_about_point
@@ -111,7 +111,7 @@ def write_mot(path: str | Path, table: TimeTable, *, notes: tuple[str, ...] = ()
     labels = "\t".join(["time", *table.columns])
     header = [table.name or path.stem, "version=1", *counts, degrees, *notes, "endheader", labels]
     rows = ("\t".join(f"{v:.10g}" for v in (t, *values)) for t, values in zip(table.time, table.values, strict=True))
-    return write_new(path, ("\n".join([*header, *rows]) + "\n").encode())
+    return write_whole(path, ("\n".join([*header, *rows]) + "\n").encode())
 
 
 @dataclass(frozen=True)

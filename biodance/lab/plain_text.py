@@ -8,6 +8,8 @@ import math
 import os
 import re
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from biodance.errors import FileRefused
@@ -17,6 +19,7 @@ _LARGEST = 2**31  # Bytes: an hour of 100 markers at 200 Hz and 32 channels at 2
 LARGEST_NUMBER = 1e12
 """In any unit: of what cameras and plates record nothing comes near, and squares of it can still be computed with."""
 _TEXT_LOOKS_BINARY = b"\x00"
+_PRESENT = "{}: exists already and is not overwritten. Choose another name or remove it."
 
 
 def read_bytes(path: Path) -> bytes:
@@ -40,37 +43,58 @@ def read_bytes(path: Path) -> bytes:
     return content
 
 
-def write_new(path: Path, content: bytes) -> Path:
-    """Write a file that does not exist yet, whole or not at all, and return its path.
+@contextmanager
+def whole_file(path: Path, *, over: bool = False) -> Iterator[Path]:
+    """Yield a path beside ``path``, of the same ending, to write to; what was written is flushed to the disk and takes
+    its name in one step. What fails or is stopped leaves ``path`` as it was; a file there is replaced only ``over`` it.
 
     Raises
     ------
     FileRefused
-        The file exists (nothing is overwritten), or cannot be written.
+        The file exists and not ``over``, or cannot be written.
     """
-    part = path.with_name(f".part-{uuid.uuid4().hex}")
-    refuse_present(path)
+    part = path.with_name(f".part-{uuid.uuid4().hex}{path.suffix}")
     try:
-        with open(part, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        _take_name(part, path)
+        if not over:
+            refuse_present(path)
+        yield part
+        flush(part)
+        if over:
+            part.replace(path)
+        else:
+            _take_name(part, path)
+        flush(path.parent)
     except FileExistsError:
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.") from None
+        raise FileRefused(_PRESENT.format(path)) from None
     except OSError as error:
         raise FileRefused(
-            f"{path}: cannot be written ({error.strerror or error}). Choose a place where you may write."
+            f"{path}: cannot be written ({error.strerror or error}). Make room, or choose a place where you may write, "
+            f"and run again."
         ) from error
     finally:
         part.unlink(missing_ok=True)
-    return path
 
 
 def refuse_present(path: Path) -> None:
     """Raise FileRefused where there is anything of this name."""
     if os.path.lexists(path):
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+        raise FileRefused(_PRESENT.format(path))
+
+
+def write_whole(path: Path, content: bytes, *, over: bool = False) -> Path:
+    """Write a file as `whole_file` and return its path."""
+    with whole_file(path, over=over) as part:
+        part.write_bytes(content)
+    return path
+
+
+def flush(path: Path) -> None:
+    """Return when a file or folder is on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _take_name(part: Path, path: Path) -> None:

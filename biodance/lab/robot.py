@@ -18,6 +18,7 @@ from biodance.spatial import wrench_about_point
 _ENCODER_TABLES = (".csv", ".parquet")
 _TIMES = ("time", "t", "time_s", "timestamp")
 _UNITS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180}
+_LATE = 1.6  # of the usual step: from there on a sample is missing
 _LONGEST_GAP = 0.1
 """s without a sample over which angles are not interpolated: a joint moves visibly in it."""
 _TURN = 2 * np.pi  # rad: no joint of a humanoid turns further; larger numbers are degrees or counts
@@ -73,7 +74,18 @@ def read_encoders(path: Path, *, unit: str = "") -> Encoders:
     if twice:
         raise FileRefused(f"{path}: the column {twice[0]} occurs twice. Keep the one that was recorded.")
     notes = ("Angles were converted from degrees.",) if (factors != 1).any() else ()
-    return Encoders(time, joints, values[:, columns] * factors, notes)
+    return Encoders(time, joints, values[:, columns] * factors, (*notes, *_lost(time)))
+
+
+def _lost(time: Array) -> tuple[str, ...]:
+    """Return in words where samples are missing; nothing where the clock runs on."""
+    steps = np.diff(time)
+    late = np.flatnonzero(steps > _LATE * np.median(steps))
+    if not late.size:
+        return ()
+    others = late.size - 1
+    first, places = float(time[late[0]]), f" and at {others} other place{'s' * (others > 1)}" if others else ""
+    return (f"Samples are missing after {first:.3f} s{places}: up to {steps.max():.3g} s without one.",)
 
 
 def _table(path: Path) -> tuple[Array, tuple[str, ...]]:

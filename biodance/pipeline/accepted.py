@@ -50,13 +50,10 @@ def write_corrected(
     makes them a session; return their names, and why others could not be written.
 
     Markers and plates are as read (m turned to mm, z up, plates TYPE 2), other analog channels are left out. What was
-    corrected ``earlier`` is in ``session`` already. What says that all of it is off (`APPLIED`) is written first: a run
-    that is killed leaves trials out, and none is ever corrected twice.
+    corrected ``earlier`` is in ``session`` already; `APPLIED` says that all of it is off, so that none is corrected
+    twice.
     """
-    if folder.is_dir() and (folder / APPLIED).is_file():
-        for path in (*folder.glob("*.c3d"), folder / "session.toml", folder / APPLIED):
-            path.unlink(missing_ok=True)
-    folder.mkdir(exist_ok=True)
+    folder.mkdir()
     text = corrections_text(joined_corrections(earlier, accepted))
     (folder / APPLIED).write_text(text, encoding="utf-8", newline="\n")
     (folder / "session.toml").write_text(_session_toml(session), encoding="utf-8", newline="\n")

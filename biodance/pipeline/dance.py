@@ -141,7 +141,7 @@ def _freer_expectation(dance: Dance, plan: Plan) -> Expectation | None:
 
 
 def dance_folder(out: Path, *, force: bool = False) -> Path:
-    """Return the folder for a dance, made if missing; with ``force`` the files of an earlier dance in it are removed.
+    """Return the folder for a dance, made if missing; with ``force`` it may hold an earlier one.
 
     A folder that holds nothing but a stopped design is gone on with.
 
@@ -161,8 +161,6 @@ def dance_folder(out: Path, *, force: bool = False) -> Path:
         raise BiodanceError(
             f"{out}: holds a dance already and nothing is overwritten. Choose another --out, or --force."
         )
-    for name in found:
-        (out / name).unlink()
     return out
 
 

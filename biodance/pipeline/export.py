@@ -1,7 +1,6 @@
 """Write a session, or what was identified from it, in the formats of other programs."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -235,23 +234,6 @@ def body_of_result(result: SessionResult) -> tuple[Body, str]:
         return result.body, f"Session {name}: nothing identified. {result.body_source}"
     trials = ", ".join(found.identification.trials)
     return found.identification.identified, f"Session {name}: inertial parameters identified from {trials}."
-
-
-@contextmanager
-def replaceable(out: Path, *, force: bool) -> Iterator[Path]:
-    """Yield the path to write to: ``out``, or with ``force`` a path beside it that replaces an existing ``out`` once
-    all is written.
-    """
-    if not (force and out.is_file()):
-        yield out
-        return
-    part = out.with_name(f".{out.name}.part")
-    part.unlink(missing_ok=True)
-    try:
-        yield part
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _chosen(session: Session, name: str | None) -> Trial:

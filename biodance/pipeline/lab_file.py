@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.cycles.curves import NormalCurve, normal_of
+from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.corrections import (
     PlateCorrection,
@@ -19,7 +20,7 @@ from biodance.lab.corrections import (
 )
 from biodance.library import read_toml
 from biodance.records import Session
-from biodance.uncertainty.tolerances import Tolerances, tolerances_of
+from biodance.uncertainty.tolerances import Tolerances, shipped, tolerances_of
 
 LAB = "lab.toml"
 """Name under which it is written."""
@@ -150,4 +151,7 @@ def lab_fault(raw: dict[str, Any]) -> str:
         if one["type"] == "extra_forbidden":
             return f"[{place}] is nothing that biodance learn writes"
         return f"{place} = {repr(one['input'])[:60]}: {one['msg'][0].lower()}{one['msg'][1:]}"
-    return ""
+    known = {*(key.split()[0] for key in shipped().sizes), *FAMILY.members()}
+    sizes = raw.get("tolerances", {}).get("sizes", {})
+    strange = next((key for key in sizes if not {*key.split()[:1]} & known), None)
+    return "" if strange is None else f"tolerances.sizes: {strange[:60]!r} is the size of nothing that is known"

@@ -23,7 +23,7 @@ from biodance.lab.bids import (
     write_participants,
 )
 from biodance.lab.opensim_tables import TimeTable, external_loads, ground_table, inverse_dynamics_setup, write_mot
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import write_whole
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.results_folder import made_folder, whole_folder
 from biodance.motion.contact import Contact, foot_wrenches
@@ -243,7 +243,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
     ground = {foot: Wrench(wrench.time, np.nan_to_num(wrench.value)) for foot, wrench in feet.items()}
     files.append(write_mot(folder / f"{name}_forces.mot", ground_table(ground, name=name)).name)
     loads = external_loads(tuple(ground), data_file=f"{name}_forces.mot")
-    files.append(write_new(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
+    files.append(write_whole(folder / f"{name}_ExternalLoads.xml", loads.encode()).name)
     span = _span(contact, motion)
     if span is None:
         return OpensimTrial(name, tuple(files), None, f"The plates do not measure all the ground does. {one.reason}")
@@ -256,7 +256,7 @@ def _trial(one: TrialResult, body: Body, folder: Path) -> OpensimTrial:
         between=between,
         out=f"{name}_opensim_torques.sto",
     )
-    files.append(write_new(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
+    files.append(write_whole(folder / f"{name}_InverseDynamics.xml", setup.encode()).name)
     files.append(write_mot(folder / f"{name}_torques.sto", _torques(body, motion, ground, span, name)).name)
     return OpensimTrial(name, tuple(files), between)
 

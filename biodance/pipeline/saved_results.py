@@ -13,9 +13,10 @@ import numpy as np
 
 from biodance.body.body import Body, read_body
 from biodance.errors import FileRefused, SessionRefused, TrialRefused
+from biodance.lab.plain_text import whole_file
 from biodance.lab.prepare import motion_filter
 from biodance.lab.session.read import read_session
-from biodance.lab.session.results_folder import refuse_mixture
+from biodance.lab.session.results_folder import read_manifest, refuse_mixture
 from biodance.library import refuse_large
 from biodance.motion.contact import ground_contact
 from biodance.motion.soles import soles_from_body
@@ -68,13 +69,8 @@ def keep_motions(result: SessionResult, folder: Path) -> Path | None:
     for k, one in enumerate(moved):
         held |= {f"{k}.{name}": np.asarray(getattr(one.motion, name)) for name in BY_FRAME}
         held |= {f"{k}.{name}": np.array(getattr(one.motion, name), dtype=str) for name in _TEXTS}
-    part = folder / f".{MOTIONS}.part"
-    try:
-        with open(part, "wb") as stream:
-            np.savez(stream, **held)  # type: ignore[arg-type]
-        part.replace(folder / MOTIONS)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(folder / MOTIONS, over=True) as part:
+        np.savez(part, **held)  # type: ignore[arg-type]
     return folder / MOTIONS
 
 
@@ -145,6 +141,9 @@ def read_kept(folder: Path) -> KeptResults:
         raise
     except (BadZipFile, EOFError, OSError, ValueError, KeyError, MemoryError, zlib.error) as error:
         raise FileRefused(f"{folder / MOTIONS}: is no file of motions ({error}). Run the session again.") from error
+    manifest = read_manifest(folder)
+    if manifest and not session.is_dir():  # the results were moved, the recordings were not
+        session = Path(manifest.session)
     return KeptResults(body, source, motions, hashes, loads, cutoffs, session, settings)
 
 

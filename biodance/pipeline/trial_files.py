@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from biodance.body.body import Body
 from biodance.body.solids import SegmentSolids, segment_solids
-from biodance.errors import FileRefused, MissingLibrary, TrialRefused
+from biodance.errors import MissingLibrary, TrialRefused
 from biodance.lab.c3d.results import Event, Output, write_results_c3d
 from biodance.lab.c3d.write import FileValue
+from biodance.lab.plain_text import refuse_present, whole_file
 from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.dynamics import joint_torques, predict_wrench
 from biodance.motion.kinematics import centre_of_mass, poses
@@ -46,25 +47,30 @@ def write_rerun(one: TrialResult, body: Body, path: Path, *, solids: SegmentSoli
     """
     if one.motion is None:
         raise TrialRefused(f"Trial {one.name}: it gives no motion. {one.reason}".strip())
-    if path.exists():
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+    refuse_present(path)
     try:
         import rerun
     except ImportError as error:
         raise MissingLibrary(
             f"{path}: the format rerun needs the library rerun-sdk ({error}). Install it with pip install rerun-sdk."
         ) from error
+    with whole_file(path) as part:
+        _write(rerun, one, body, part, segment_solids(body) if solids is None else solids)
+    return path
+
+
+def _write(rerun: Any, one: TrialResult, body: Body, path: Path, solids: SegmentSolids) -> None:
+    assert one.motion is not None
     stream = rerun.RecordingStream("biodance", recording_id=f"{body.name} {one.name}")
     stream.save(path)
     stream.log("lab", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    _body(rerun, stream, one, body, segment_solids(body) if solids is None else solids)
+    _body(rerun, stream, one, body, solids)
     _markers(rerun, stream, one)
     _forces(rerun, stream, one, body)
     for j, joint in enumerate(body.joints):
         angle = one.motion.known_angles[:, j]
         _send(rerun, stream, f"angles/{joint.name}", one.motion.time, rerun.Scalars.columns(scalars=angle))
     stream.flush()
-    return path
 
 
 def _send(rerun: Any, stream: "RecordingStream", place: str, time: Array, columns: Any) -> None:

@@ -229,7 +229,6 @@ def _leading(result: DanceResult, dance: Dance, folder: Path) -> dict[str, str]:
     if not dance.body.markers.names:
         return {"cues.md": angle_sheet(dance), "dance.csv": angle_table(dance)}
     path = folder / "dance.c3d"
-    path.unlink(missing_ok=True)
     write_c3d(path, markers=preview_markers(dance), parameters=preview_parameters(dance))
     cues = cue_sheet(
         dance_instructions(dance),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance.errors import BiodanceError, SessionRefused
-from biodance.lab.plain_text import for_spreadsheet
+from biodance.lab.plain_text import for_spreadsheet, write_whole
 from biodance.lab.session.results_folder import made_folder
 
 if TYPE_CHECKING:
@@ -37,18 +37,9 @@ def refuse_missing_folder(path: Path) -> None:
 
 
 def write_files(folder: Path, files: Mapping[str, str]) -> None:
-    """Write every file under another name first and then rename it, so that a stopped run leaves no half file."""
+    """Write every file whole, over an earlier one."""
     for name, text in files.items():
-        part = folder / f".{name}.part"
-        try:
-            part.write_text(text, encoding="utf-8", newline="\n")
-            part.replace(folder / name)
-        except OSError as error:
-            part.unlink(missing_ok=True)
-            raise BiodanceError(
-                f"{folder / name}: cannot be written ({error.strerror or error}). Make room or choose another --out, "
-                f"and run again."
-            ) from error
+        write_whole(folder / name, text.encode(), over=True)
 
 
 ENDINGS = (".csv", ".parquet")
@@ -99,11 +90,10 @@ def write_tables(tables: Mapping[str, "DataFrame"], folder: Path) -> tuple[Path,
         for ending in ENDINGS:
             shown = for_spreadsheets(frame) if ending == ".csv" else frame
             table = Table.from_pandas(shown, preserve_index=False)
-            part, path = folder / f".{name}{ending}.part", folder / f"{name}{ending}"
+            path = folder / f"{name}{ending}"
             if ending == ".csv":
-                csv.write_csv(table, part, plain)
+                csv.write_csv(table, path, plain)
             else:
-                parquet.write_table(table, part)
-            part.replace(path)
+                parquet.write_table(table, path)
             written.append(path)
     return tuple(written)

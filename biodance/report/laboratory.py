@@ -9,14 +9,11 @@ every size with what it rests on; ``[norms."..."]`` is what is usual of instrume
 
 import json
 import re
-from pathlib import Path
 
 from rich.console import Console
 
 from biodance.cycles.curves import normal_toml
-from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
-from biodance.report.files import refuse_missing_folder
 from biodance.report.plates import print_left_out
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_line, print_table
@@ -104,32 +101,6 @@ def _norms(found: LearnedLaboratory) -> list[str]:
             "",
         ]
     return lines
-
-
-def write_lab_file(found: LearnedLaboratory, path: Path) -> None:
-    """Write lab.toml; refuse where there is a file already.
-
-    Raises
-    ------
-    SessionRefused
-        The file exists, or cannot be written.
-    """
-    try:
-        with open(path, "x", encoding="utf-8", newline="\n") as stream:
-            stream.write(lab_file_text(found))
-    except FileExistsError:
-        refuse_existing(path)
-    except OSError as why:
-        raise SessionRefused(f"{path}: cannot be written ({why.strerror or why}). Choose another place.") from why
-
-
-def refuse_existing(path: Path) -> None:
-    """Raise SessionRefused where ``path`` exists, BiodanceError where it has no folder: before long work starts, and
-    never over an existing file.
-    """
-    if path.exists():
-        raise SessionRefused(f"{path}: exists already and is never overwritten. Choose another name, or move it away.")
-    refuse_missing_folder(path)
 
 
 def print_learned(document: Row, console: Console) -> None:

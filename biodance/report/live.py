@@ -59,7 +59,7 @@ def state_line(state: LiveState) -> str:
     """Return what an operator must see now, in one line."""
     sure = [spaced(name) for name, verdict in state.verdicts.items() if verdict == "known"]
     known = f"known: {', '.join(sure)}" if sure else "no mass is known yet"
-    suspect = f"; SUSPECT_ROW: {' '.join(state.suspect)}" if state.suspect else ""
+    suspect = f"; suspect: {' '.join(state.suspect)}" if state.suspect else ""
     return f"{state.time:.0f} s, {known}{suspect}; next: {state.advice}"
 
 

@@ -18,7 +18,7 @@ from biodance.body.inertia import pseudo_inertia
 from biodance.body.solids import SegmentSolids
 from biodance.discovery import Family, missing_of
 from biodance.errors import BiodanceError
-from biodance.lab.plain_text import refuse_present, write_new
+from biodance.lab.plain_text import refuse_present, write_whole
 
 _OF_SEGMENTS = ("csv",)
 """Formats that say what is known of the segments as wholes; all others show the parts as bodies of their own."""
@@ -108,8 +108,8 @@ def write_model(
         refuse_present(file)
     for file, data in new.items():
         file.parent.mkdir(exist_ok=True)
-        write_new(file, data)
-    return write_new(path, content)  # last: a model that is there has all that it names
+        write_whole(file, data)
+    return write_whole(path, content)  # last: a model that is there has all that it names
 
 
 def _content(member: ModelFormat, body: Body, source: str, solids: SegmentSolids | None) -> bytes:

@@ -17,7 +17,7 @@ from biodance.lab.c3d.layout import Layout, texts
 from biodance.lab.c3d.parameters import label_rows, read_header
 from biodance.lab.c3d.raw import RawC3d, open_c3d, point_labels, read_raw, split_label
 from biodance.lab.c3d.write import FileValue
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import refuse_present, write_whole
 from biodance.lab.readers.c3d import file_frame
 from biodance.records import Array, assign, frozen_array
 
@@ -83,8 +83,7 @@ def write_results_c3d(
         exists.
     """
     path, original = Path(path), Path(original)
-    if path.exists():
-        raise FileRefused(f"{path}: exists already and is not overwritten. Choose another name or remove it.")
+    refuse_present(path)
     raw = read_raw(original)
     _refuse_unfitting(raw, outputs)
     metres, turn = file_frame(raw, subject=subject)
@@ -109,7 +108,7 @@ def write_results_c3d(
         np.save(Path(folder) / "values.npy", np.stack(scaled, axis=1) if scaled else np.empty((len(raw.points), 0, 3)))
         _run(original, made, question)
         _refuse_changed(raw, made)
-        return write_new(path, made.read_bytes())
+        return write_whole(path, made.read_bytes())
 
 
 def _refuse_unfitting(raw: RawC3d, outputs: Sequence[Output]) -> None:
@@ -250,14 +249,8 @@ def write_exchanged(source: Path, target: Path, exchanged: Mapping[tuple[str, st
         else:
             _exchange_points(changed, layout, [columns[label] for label in pair], spans)
     _rename(changed, source, names)
-    if target.exists():
-        raise FileRefused(f"{target}: is there already and nothing is overwritten. Give another folder.")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(changed)
-    except OSError as error:
-        raise FileRefused(f"{target}: cannot be written ({error.strerror or error}).") from error
-    return target
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return write_whole(target, bytes(changed))
 
 
 def _exchange_points(

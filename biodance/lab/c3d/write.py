@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.parameters import C3D_BLOCK, INTEL
 from biodance.lab.c3d.subject import as_written
-from biodance.lab.plain_text import write_new
+from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.corners import plate_axes
 from biodance.records import Array, Markers, Plate, Trial, assign, freeze, frozen_array
 from biodance.spatial import wrench_about_point
@@ -118,7 +118,7 @@ def write_c3d(
     header = _header(points, analog, samples, first_frame, rate, 2 + len(section) // C3D_BLOCK)
     rows = np.concatenate([points.reshape(len(points), -1), analog.reshape(len(points), -1)], axis=1)
     data = rows.astype("<f4").tobytes()
-    write_new(path, header + section + data + bytes(-len(data) % C3D_BLOCK))
+    write_whole(path, header + section + data + bytes(-len(data) % C3D_BLOCK))
 
 
 def _samples(path: Path, markers: Markers | None, plates: Sequence[PlateRecording], analog_rate: float) -> int:

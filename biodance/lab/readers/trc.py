@@ -14,7 +14,16 @@ from biodance.lab.markers.signals import unseen_at_origin
 from biodance.lab.markers.time_axis import resampled, time_axis
 from biodance.lab.markers.upright import axis_to_head, body_is_tall_along_z
 from biodance.lab.opensim_tables import Y_UP_TO_Z_UP, TimeTable, columns_of, read_mot
-from biodance.lab.plain_text import COMMAS_READ, cells, decode, parse_number, read_bytes, sha256, with_points, write_new
+from biodance.lab.plain_text import (
+    COMMAS_READ,
+    cells,
+    decode,
+    parse_number,
+    read_bytes,
+    sha256,
+    with_points,
+    write_whole,
+)
 from biodance.lab.readers import head_text
 from biodance.lab.readers.mot import has_plates, plates_of, plates_rate
 from biodance.records import Array, Markers, Role, Source, Trial
@@ -196,7 +205,7 @@ def write_trc(path: str | Path, markers: Markers) -> Path:
         "\t".join([str(i), f"{t:.9g}", *("" if np.isnan(v) else f"{v:.6f}" for v in frame.ravel())])
         for i, (t, frame) in enumerate(zip(markers.time, xyz, strict=True), start=1)
     )
-    return write_new(path, ("\n".join([*header, *lines]) + "\n").encode())
+    return write_whole(path, ("\n".join([*header, *lines]) + "\n").encode())
 
 
 def _header(rows: list[str], path: Path) -> dict[str, str]:

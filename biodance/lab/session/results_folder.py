@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from biodance.errors import FileRefused, SessionRefused
+from biodance.lab.plain_text import flush
 from biodance.lab.readers import extensions
 from biodance.lab.session.recordings import RESULTS, TEXT
 from biodance.library import parse_json
@@ -26,8 +27,8 @@ _MANIFEST = "manifest.json"  # Written last into a results folder
 
 @dataclass(frozen=True)
 class _Manifest:
-    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` folder of the recordings as it was
-    given; SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
+    """What a run left: ``run`` its number, ``version`` of biodance, ``session`` absolute folder of the
+    recordings; SHA-256 by name of the recordings read (``inputs``) and of the files written (``outputs``).
     """
 
     run: str
@@ -55,10 +56,10 @@ class _Verified:
         return not (self.missing or self.changed)
 
 
-def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str], *, growing: str = "") -> None:
-    """Bind the files in a ``folder`` to a ``session``'s ``inputs`` (name -> SHA-256), but for a ``growing`` log."""
-    outputs = {name: file_hash(folder / name) for name in _files_in(folder) if name != growing}
-    one = _Manifest(uuid.uuid4().hex, __version__, str(session), dict(inputs), outputs)
+def write_manifest(folder: Path, session: Path, inputs: Mapping[str, str]) -> None:
+    """Bind the files in a ``folder`` to a ``session``'s ``inputs`` (name -> SHA-256)."""
+    outputs = {name: file_hash(folder / name) for name in _files_in(folder)}
+    one = _Manifest(uuid.uuid4().hex, __version__, str(session.absolute()), dict(inputs), outputs)
     text = json.dumps(asdict(one), indent=1, sort_keys=True)
     (folder / _MANIFEST).write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
 
@@ -152,16 +153,12 @@ class ResultsFolder:
         SessionRefused
             The disk is full, or the place cannot be written to; what was there is as before.
         """
-        try:
+        with _as_before(self.place):
             write_manifest(self.part, session, inputs)
             (self.part / _LOCK).unlink(missing_ok=True)
             put_in_place(self.part, self.place)
             return _cleared(self.part, ours=_files_in(self.place)) if self.part.is_dir() else None
-        except OSError as error:
-            raise SessionRefused(
-                f"{self.place}: cannot be written ({error.strerror or error}). What was there is as before. Make room, "
-                f"or choose another --out, and run again."
-            ) from error
+        return None
 
 
 def inputs_of(paths: Mapping[Path, str], session: Path) -> dict[str, str]:
@@ -169,16 +166,19 @@ def inputs_of(paths: Mapping[Path, str], session: Path) -> dict[str, str]:
     return {os.path.relpath(path, session): sha for path, sha in paths.items() if sha}
 
 
-def put_in_place(part: Path, place: Path) -> None:
-    """Flush a finished folder to disk and exchange it with ``place`` in one step; ``part`` has what lay there."""
+def put_in_place(part: Path, place: Path, *, alone: bool = False) -> None:
+    """Flush a finished folder to the disk and let it change places with what lies at ``place``, in one step; what lay
+    there is ``part`` then. ``alone``: no file of others is there.
+    """
     for path in (*part.rglob("*"), part):
         flush(path)
     if part.parent == place:  # a disk of its own: its folder cannot change its name
-        earlier, new = read_manifest(place), (*_files_in(part), _MANIFEST)
-        for name in new:
+        earlier, new = read_manifest(place), _files_in(part)
+        known = _files_in(place) if alone else earlier.outputs if earlier else RESULTS
+        for name in (*new, *(one.name for one in part.glob(_MANIFEST))):
             (place / name).parent.mkdir(parents=True, exist_ok=True)
             (part / name).replace(place / name)
-        for name in set(earlier.outputs if earlier else RESULTS) - set(new):
+        for name in set(known) - {*new, _MANIFEST}:
             (place / name).unlink(missing_ok=True)
         shutil.rmtree(part)
     elif place.exists() and any(place.iterdir()):
@@ -186,15 +186,6 @@ def put_in_place(part: Path, place: Path) -> None:
     else:
         part.replace(place)
     flush(place.parent)
-
-
-def flush(path: Path) -> None:
-    """Return when a file or folder is on the disk."""
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _exchange(one: Path, other: Path) -> None:
@@ -294,16 +285,24 @@ def whole_folder(folder: Path, *, over: bool = False) -> Iterator[Path]:
     part = place / ".part" if os.path.ismount(place) else place.with_name(f".{place.name}.part")
     _taken(part, place)
     try:
-        yield part
-        (part / _LOCK).unlink(missing_ok=True)
-        put_in_place(part, place)
-    except OSError as error:
-        raise SessionRefused(
-            f"{folder}: cannot be written ({error.strerror or error}). What was there is as before. Make room, or "
-            f"choose another place, and run again."
-        ) from error
+        with _as_before(folder):
+            yield part
+            (part / _LOCK).unlink(missing_ok=True)
+            put_in_place(part, place, alone=True)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _as_before(place: Path) -> Iterator[None]:
+    """Say of what the disk refuses that ``place`` is as it was."""
+    try:
+        yield
+    except OSError as error:
+        raise SessionRefused(
+            f"{place}: cannot be written ({error.strerror or error}). What was there is as before. Make room, or "
+            f"choose another place, and run again."
+        ) from error
 
 
 def _taken(part: Path, place: Path) -> None:

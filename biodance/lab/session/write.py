@@ -19,6 +19,7 @@ from biodance.lab.c3d.write import PlateRecording, plate_recording, write_c3d
 from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.names import plain_labels
 from biodance.lab.markers.sets import GUESSED
+from biodance.lab.plain_text import write_whole
 from biodance.lab.plates.corners import plate_axes
 from biodance.lab.session.file import FILES, plate_lines
 from biodance.lab.session.read import read_session
@@ -63,10 +64,8 @@ def init_session(folder: str | Path, *, subject_name: str | None = None) -> dict
     _refuse_existing(target)
     session = read_session(folder, subject_name=subject_name)
     found = _found(session, target)
-    _refuse_existing(target)
     lines = [" ".join(line.split()) for line in (*_lines(found), *plate_lines(session), *_begun_map(session, found))]
-    with open(target, "x", encoding="utf-8") as stream:
-        stream.write("\n".join(lines) + "\n")
+    write_whole(target, ("\n".join(lines) + "\n").encode())
     return found
 
 

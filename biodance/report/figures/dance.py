@@ -28,6 +28,8 @@ from typing import TYPE_CHECKING
 
 from biodance.dance.playback import Rehearsal
 from biodance.errors import BiodanceError, MissingLibrary
+from biodance.lab.plain_text import whole_file
+from biodance.report.files import refuse_file
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -173,8 +175,7 @@ def film_path(out: Path, *, force: bool = False) -> Path:
         raise BiodanceError(f"{out}: a film ends in {' or '.join(_FORMATS)}. Choose another --out.")
     if out.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise MissingLibrary(f"{out}: an .mp4 needs the program ffmpeg, which is not installed. Choose a .gif.")
-    if out.exists() and not force:
-        raise BiodanceError(f"{out}: exists already and is not overwritten. Choose another --out, or --force.")
+    refuse_file(out, force=force)
     return out
 
 
@@ -188,16 +189,22 @@ def write_film(found: Rehearsal, out: Path) -> Path:
         _picture(body, planned, real, point, float(t))
         for planned, real, point, t in zip(plan, played.q[rows], cop, played.time[rows], strict=True)
     ]
+    with whole_file(out, over=True) as part:
+        _write(frames, part, out)
+    return out
+
+
+def _write(frames: "list[Image]", part: Path, out: Path) -> None:
+    """Write pictures as the film ``out`` under the name ``part``."""
     if out.suffix.lower() == ".gif":
         small = [frame.quantize(16) for frame in frames]
-        small[0].save(out, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
-        return out
+        small[0].save(part, save_all=True, append_images=small[1:], duration=round(1000 / _RATE), loop=0)
+        return
     words = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    words += ["-s", f"{2 * _SIZE[0]}x{_SIZE[1]}", "-r", str(_RATE), "-i", "-", "-pix_fmt", "yuv420p", str(out)]
+    words += ["-s", f"{2 * _SIZE[0]}x{_SIZE[1]}", "-r", str(_RATE), "-i", "-", "-pix_fmt", "yuv420p", str(part)]
     done = subprocess.run(words, input=b"".join(frame.tobytes() for frame in frames), capture_output=True, check=False)
     if done.returncode:
         raise BiodanceError(f"{out}: ffmpeg could not write it ({done.stderr.decode(errors='replace').strip()[:200]}).")
-    return out
 
 
 def _picture(body: Body, planned: Array, played: Array, cop: Array, time: float) -> "Image":
