@@ -96,6 +96,7 @@ def write_visit(
         loads=loads,
         session=visit.number,
         joint_shifts=visit.joint_shifts,
+        lighter_limbs=visit.lighter_limbs,
         population=visit.laboratory.population,
     )
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))

@@ -10,7 +10,13 @@ from biodance.body.body import Body
 from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Array, Sip, Subject, freeze
-from biodance.virtual_lab.person.flesh import draw_sip, of_parameters, parameters_of_inertia, true_pseudo_inertia
+from biodance.virtual_lab.person.flesh import (
+    draw_sip,
+    fit_prosthesis,
+    of_parameters,
+    parameters_of_inertia,
+    true_pseudo_inertia,
+)
 from biodance.virtual_lab.person.skeleton import (
     TRUE_SEGMENTS,
     Proportions,
@@ -96,6 +102,7 @@ class Person:
 
 
 NO_SHIFTS: Mapping[str, Array] = MappingProxyType({})
+NO_LIMBS: Mapping[str, float] = MappingProxyType({})
 _BEYOND = {"hip": "thigh", "knee": "shank", "ankle": "foot", "shoulder": "upper_arm"}
 MOVABLE = (*(f"{side}_{joint}" for side in SIDES for joint in _BEYOND), "lumbar", "neck")
 """Joints whose true centre can be moved."""
@@ -110,17 +117,21 @@ def make_person(
     session: int = 0,
     joint_shifts: Mapping[str, Array] = NO_SHIFTS,
     population: int | None = None,
+    lighter_limbs: Mapping[str, float] = NO_LIMBS,
 ) -> Person:
     """Return the virtual person number ``seed`` of the given mass (kg), stature (m) and sex.
 
     The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come
     on top of the subject's mass. ``joint_shifts`` (3,) m by joint (one of ``MOVABLE``) move true joint centres in the
     frame of the segment before them. People of one ``population`` have something in common (`draw_sip`).
+    ``lighter_limbs`` kg by segment: from there on a prosthesis, so much lighter (`fit_prosthesis`).
     """
     t = tolerances
     size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
     size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(size, subject, seed, tolerances=t, population=population)
+    for segment, less in lighter_limbs.items():
+        sip = fit_prosthesis(sip, segment, less)
     joints = build_joints(size)
     ranges = virtual_people()["range_deg"]
     lower, upper = np.radians([ranges[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T
