@@ -28,10 +28,9 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import expect
 from biodance.dance.performers import OF_PERFORMERS, for_imprecise
-from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person
-from biodance.dance.problem.person_file import read_person
+from biodance.dance.playback import rehearse
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, read_person
 from biodance.dance.problem.plan import read_plan
-from biodance.dance.rehearsal import rehearse
 from biodance.errors import BiodanceError
 from biodance.library import folder as shipped
 from biodance.records import Subject

@@ -35,8 +35,8 @@ from biodance.pipeline.results import SessionResult
 from biodance.records import Array
 from biodance.virtual_lab.faults.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.family import draw_laboratory, draw_visitor
-from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
+from biodance.virtual_lab.recording.laboratory import draw_laboratory, draw_visitor
+from biodance.virtual_lab.recording.visit import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 COLUMNS = ("real", "foreign", "third", "own", "drawn", "home")

@@ -36,7 +36,7 @@ from biodance.records import Array, Subject
 from biodance.uncertainty.tolerances import Tolerances, shipped, to_toml
 from biodance.virtual_lab.movement.dancing import PERFORMERS
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.laboratory import LabVisit
+from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 TABLES = folder("anthropometry") / "uncertainty"

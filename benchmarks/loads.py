@@ -26,7 +26,7 @@ from biodance.pipeline.session import examine
 from biodance.pipeline.trial_result import trial_fit
 from biodance.virtual_lab.faults.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.laboratory import LabVisit
+from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 SEGMENTS = {

@@ -28,8 +28,7 @@ from biodance.body.inertia import smallest_eigenvalues
 from biodance.body.robot.similarity import SimilarityScale, similar_body, standing_frames
 from biodance.body.robot.urdf import read_urdf
 from biodance.dance.dance import Dance
-from biodance.dance.playback import _STEP, SETTLE, _Driver, _floor_wrench, floor_model, planned_torques
-from biodance.dance.rehearsal import bearing
+from biodance.dance.playback import _STEP, SETTLE, _Driver, _floor_wrench, bearing, floor_model, planned_torques
 from biodance.dance.robot import person_sized, shrunk
 from biodance.motion.regressor import predict_wrench
 from biodance.records import CHANNELS, Array, Sip

@@ -101,9 +101,9 @@ def symmetric_root(covariance):
     return scale[:, None] * (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
 
 
-def delay(wrench, session, moving):
-    """Hide that the forces come 20 ms late."""
-    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - 0.02, 0, None))
+def delay(wrench, session, moving, *, late=0.02):
+    """Hide that the forces come ``late`` s late."""
+    return make_interp_spline(moving.time, wrench, k=5)(np.clip(moving.time - late, 0, None))
 
 
 def pull(wrench, session, moving):

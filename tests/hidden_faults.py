@@ -15,7 +15,7 @@ from biodance.pipeline.session import examine
 from biodance.records import Array, Plate, Subject
 from biodance.virtual_lab.faults.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.laboratory import LabVisit
+from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 SUBJECT = Subject(64.0, 1.72, "F", 30.0)

@@ -14,7 +14,7 @@ from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import Stance, holding, seat, stance
 from biodance.dance.problem.state import State, close_legs
-from biodance.dance.search.posture import initial_guess
+from biodance.dance.search.postures import initial_guess
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F", 33.0))

@@ -1,5 +1,8 @@
-"""Somebody who raises both arms, recorded by a laboratory without any error: made by hand, no files."""
+"""Somebody who raises both arms, recorded by a laboratory without any error: made by hand, no files; and the virtual
+laboratory with perfect instruments.
+"""
 
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +10,14 @@ import numpy as np
 from biodance.motion.kinematics import poses
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Markers, Motion, Plate, Source, Subject, Trial, Wrench
+from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances
 
 SUBJECT = Subject(62.0, 1.70, "F", 30.0, "S01")
 PLATE = np.array([[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0], [-0.5, -0.5, 0.0], [0.5, -0.5, 0.0]])
 RATE = 100.0
+_DRAWN = [field.name for field in fields(LabTolerances)]
+PERFECT_INSTRUMENTS = replace(REALISTIC, **dict.fromkeys(_DRAWN[_DRAWN.index("marker_placement") :], 0.0))
+"""Perfect plates, cameras and bone-fixed markers, but an unchanged person and motion."""
 
 
 def arm_swing(body, *, frames: int, angle: float) -> Motion:

@@ -9,14 +9,14 @@ import numpy as np
 from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import feet_in_move
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.posture import initial_guess
+from biodance.dance.search.postures import initial_guess
 from biodance.records import Subject
 
 SHORT_SEARCH = {"SWEEPS": ((4, 8),), "FRESH": ((8, 8),), "POLISH": ((8, 4),)}
-"""Numbers of `biodance.dance.search.posture_set` that find allowed postures quickly, not the best ones."""
+"""Numbers of `biodance.dance.search.postures` that find allowed postures quickly, not the best ones."""
 BODY = human(Subject(65.0, 1.75, "F", 33.0, "S01"))
 
 

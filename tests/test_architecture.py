@@ -20,8 +20,20 @@ ONE_ALGORITHM = {
     "lab/plates/decode.py": "a plate's channels to its wrench: corners, origin, gaps, units, zero, wrench",
     "inference/decision.py": "what a session ends with: places, sizes, habits, reasons, from one posterior",
     "pipeline/live.py": "a recording as a stream: every frame tracked, the wrench watched, the body identified",
+    "dance/dance.py": "a dance and its file, entry by entry: what is written, and what is believed of a stranger's",
+    "dance/expectation.py": "what a movement tells of a body, planned or danced: one information, added up",
+    "dance/performers.py": "imprecise people: how they err in a dance, and what that leaves of every limit",
+    "dance/problem/person.py": "what a person's file says, entry by entry, to the body and the plan that are left",
+    "dance/search/known_postures.py": "words of limbs, what a person can do of them, and the postures that they make",
+    "dance/search/move.py": "a move within all limits: straight, slower, round about, exciting; each tries the next",
+    "dance/search/postures.py": "the search for exciting postures: one, its image, sweeps over all, exchange",
+    "dance/search/word_course.py": "the search from posture to posture of words: reach, choice, going back, refusal",
     "inference/sets.py": "the search over sets of causes: score, fit, widen, lessen, again beside an unknown",
     "lab/plates/sense.py": "the directions of a plate: every hypothesis is judged by the same load on the same plate",
+    "registration/refinement.py": "a pose pulled by wrench and steps: rows, covariance, change, again from there",
+    "report/figures/vector.py": "a light figure: axis, steps, marks, panel, curves; every mark is read by one script",
+    "virtual_lab/faults/recording_faults.py": "faults of a recording: three builders and what each of them makes",
+    "virtual_lab/movement/gait.py": "one stride on a belt: feet, forces, and the motion that they make, by repetition",
 }
 """Files of up to 500 lines, each one algorithm that nobody can follow once it is cut: cut at 300 lines, the way of a
 plate's samples returned 40 times to a file that it had left.

@@ -24,11 +24,10 @@ from biodance.pipeline.visit_cycles import cycle_quantities
 from biodance.pipeline.visit_quantity import Untested
 from biodance.pipeline.visits import VisitComparison, compare_visits, read_visits
 from biodance.records import Subject
-from biodance.report.pages.visits import write_visits
-from biodance.report.tables.visits import comparison_sentence
+from biodance.report.visits import comparison_sentence, write_visits
 from biodance.uncertainty.visits import KeyKind, beyond_chance, change_of_mean, placement_sd, visit_mean
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.laboratory import LabVisit, perform_in
+from biodance.virtual_lab.recording.visit import LabVisit, perform_in
 from biodance.virtual_lab.simulate import write_visit
 
 SPEED = 0.9

@@ -11,10 +11,9 @@ import pytest
 from biodance.body.inertia import TENSOR
 from biodance.cli import run
 from biodance.dance.dance import Dance
-from biodance.dance.metrics import dance_metrics
 from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import read_plan
-from biodance.dance.verify import broken, verify
+from biodance.dance.verify import broken, dance_metrics, verify
 from biodance.errors import BiodanceError
 from biodance.lab.inspect import inspect_file
 from biodance.lab.read import read_trial

@@ -1,13 +1,11 @@
 """Cue sheet: only what moves, pairs together, planted legs by their knees, in words."""
 
 import numpy as np
-import pytest
 
 from biodance.body.human.human import human
 from biodance.dance.cues import _MOST, _words, calls, cue_sheet, instructions
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
-from biodance.errors import BiodanceError
 from biodance.records import Array, Subject
 
 BODY = human(Subject(65.0, 1.75, "F"))
@@ -100,23 +98,16 @@ def test_the_hips_of_a_dance_are_called_by_their_sides() -> None:
 
 def test_what_is_more_than_a_person_can_begin_at_once_is_said_after() -> None:
     moved = posture(**{joint.name: 20.0 + i for i, joint in enumerate(BODY.joints)})
-    text = cue_sheet(BODY, np.radians([moved]), ("free",), ((),))
+    text = cue_sheet((calls(BODY, REST, moved),), ("free",))
     first, rest = text.split("**1.** ")[1].split(" And also: ")
     assert len(first.split(";")) == _MOST
     assert len(first.split(";")) + len(rest.split(";")) == len(calls(BODY, REST, moved)) >= 13
 
 
 def test_sheet_counts_postures_and_names_each_stance_once() -> None:
-    angles = np.radians([posture(trunk_flexion=30), posture(trunk_flexion=30), posture(right_hip_flexion=45)])
-    both = ("right", "left")
-    text = cue_sheet(
-        BODY, angles, ("feet side by side", "feet side by side", "on the left foot"), (both, both, ("left",))
-    )
+    bowed, lifted = posture(trunk_flexion=30), posture(right_hip_flexion=45)
+    said = calls(BODY, REST, bowed, FEET), calls(BODY, bowed, bowed, FEET), calls(BODY, bowed, lifted, ("left",))
+    text = cue_sheet(said, ("feet side by side", "feet side by side", "on the left foot"))
     assert text.count("## ") == 2
     assert "**2.** Stay as you are." in text
     assert "**3.** Lift the right thigh forward by about 45°; bring the trunk upright." in text
-
-
-def test_unequal_lists_are_refused() -> None:
-    with pytest.raises(BiodanceError, match="Cue sheet"):
-        cue_sheet(BODY, np.zeros((2, 23)), ("a",), ((),))

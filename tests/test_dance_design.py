@@ -13,11 +13,11 @@ from biodance.body.human.human import human
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.limits.balance import Balance
+from biodance.dance.playback import bearing, rehearse
 from biodance.dance.problem.plan import Plan
-from biodance.dance.rehearsal import bearing, rehearse
-from biodance.dance.search import posture_set
+from biodance.dance.search import postures
 from biodance.dance.search.course import Course
-from biodance.dance.search.posture_set import alike
+from biodance.dance.search.postures import alike
 from biodance.dance.verify import broken, verify, verify_with
 from biodance.errors import BiodanceError, FileRefused
 from biodance.motion.kinematics import poses
@@ -32,7 +32,7 @@ PLAN = Plan("small", "", (("parallel", 2), ("single_left", 2)), hold=1.0)
 def quick():
     with pytest.MonkeyPatch.context() as patch:
         for name, sweeps in SHORT_SEARCH.items():
-            patch.setattr(posture_set, name, sweeps)
+            patch.setattr(postures, name, sweeps)
         yield
 
 

@@ -9,26 +9,22 @@ import pytest
 from scipy.spatial.transform import Rotation
 from small_dances import BODY, small_dance
 
+from biodance.dance import design
 from biodance.dance.cues import MIRROR_CALL, dance_instructions
-from biodance.dance.imprecision import Imprecision, PlannedDance
 from biodance.dance.limits._checked import _vector
 from biodance.dance.limits.self_collision import solid_distances, surface_distances
-from biodance.dance.performers import PerformersMargin, PerformersResult, try_performers
+from biodance.dance.performers import Imprecision, PerformersMargin, PerformersResult, PlannedDance, try_performers
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import excitation_blocks
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.person import PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan, read_plan
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search import repair
-from biodance.dance.search.context import Checkpoint, DesignContext
-from biodance.dance.search.no_next_posture import NoNextPosture
-from biodance.dance.search.posture_table import PostureTable
-from biodance.dance.search.reachability import Reachability
-from biodance.dance.search.vocabulary import read_vocabulary, words_for, words_left_out
-from biodance.dance.search.word_course import WordSearch
+from biodance.dance.search.course import Checkpoint, DesignContext
+from biodance.dance.search.known_postures import PostureTable, read_vocabulary, words_for, words_left_out
+from biodance.dance.search.word_course import NoNextPosture, Reachability, WordSearch
 from biodance.dance.verify import broken, verify
 from biodance.motion.kinematics import poses
-from biodance.report.pages.dance import mannequin_svg
+from biodance.report.dance import mannequin_svg
 
 PLAN = Plan("x", "", (("parallel", 5),), hold=1.0, instructions=3.0, simplicity=1.0, wide=1.3, gentle=True)
 CHAIN = Chain(BODY)
@@ -65,8 +61,8 @@ def test_where_a_performer_has_too_little_room_another_posture_is_danced(searche
         room = PerformersMargin("self_collision", "m", 0.02, 0.01 if bad else 0.03, 2, "arm - head", float(bad))
         return PerformersResult(len(who), (room,), ((2, "self_collision"),) if bad else (), (7,) if bad else ())
 
-    monkeypatch.setattr(repair, "try_performers", performed)
-    repaired, found = repair.repaired_course(search, course, search.work.workers)
+    monkeypatch.setattr(design, "try_performers", performed)
+    repaired, found = design.repaired_course(search, course, search.work.workers)
     dance = repaired.dance(search.work)
     assert found.safe
     assert not dance.notes

@@ -9,9 +9,8 @@ from small_dances import small_dance
 
 from biodance.body.body import Body
 from biodance.body.human.human import human
-from biodance.dance.playback import Playback, floor_model, play
+from biodance.dance.playback import Playback, Rehearsal, floor_model, play
 from biodance.dance.problem.splines import rest_to_rest
-from biodance.dance.rehearsal import Rehearsal
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import Motion, Subject

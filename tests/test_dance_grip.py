@@ -9,20 +9,19 @@ import pytest
 
 from biodance.body.human.human import human
 from biodance.dance.dance import Dance
-from biodance.dance.imprecision import PlannedDance
 from biodance.dance.limits import family
 from biodance.dance.limits.grip import Grip
+from biodance.dance.performers import PlannedDance
 from biodance.dance.problem.chain import ROOT, Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
-from biodance.dance.problem.person import fit_to_person
-from biodance.dance.problem.person_file import read_person
+from biodance.dance.problem.person import fit_to_person, read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import feet_in_move, holding, stance
 from biodance.dance.problem.state import State
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.context import DesignContext
-from biodance.dance.search.posture import ATTEMPTS, KEPT, initial_guess, posture_at, solve
+from biodance.dance.search.course import DesignContext
+from biodance.dance.search.postures import ATTEMPTS, KEPT, initial_guess, posture_at, solve
 from biodance.dance.search.word_course import WordSearch
 from biodance.dance.verify import verify
 from biodance.errors import BiodanceError

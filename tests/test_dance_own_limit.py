@@ -21,7 +21,7 @@ from biodance.dance.limits import NOTHING, Limit, family, limits_with, unconcern
 from biodance.dance.limits.friction import Friction
 from biodance.dance.limits.ground_clearance import GroundClearance
 from biodance.dance.problem.plan import Plan, read_plan
-from biodance.dance.search import posture_set
+from biodance.dance.search import postures
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError, UnknownName
 from biodance.pipeline.front_dance import verify_dance
@@ -82,7 +82,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, sweeps in {**SHORT_SEARCH, "ATTEMPTS": 3}.items():
-        monkeypatch.setattr(posture_set, name, sweeps)
+        monkeypatch.setattr(postures, name, sweeps)
 
 
 def danced(tmp_path: Path, height: float) -> tuple[int, dict[str, object], Path]:
@@ -202,7 +202,7 @@ def test_a_limit_of_a_robots_likeness_grows_with_it() -> None:
 
 def test_nobody_but_the_limits_themselves_knows_a_limit_by_name() -> None:
     room = Path(limits.__file__).parents[2]
-    told = (room / "pipeline" / "dance.py", room / "report" / "dance_write.py", room / "report/tables/dance.py")
+    told = (room / "pipeline" / "dance.py", room / "report" / "dance.py")
     files = [*(room / "dance").rglob("*.py"), *told]
     known = {(path.name, limit.name) for path in files for limit in family() if f'"{limit.name}"' in path.read_text()}
     assert {one for one in known if f"{one[1]}.py" != one[0]} == {

@@ -11,15 +11,13 @@ from biodance.cli import run
 from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.limits import Limit
-from biodance.dance.limits._arm_lift import ArmLift
-from biodance.dance.limits._foot_load import FootLoad
-from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints
-from biodance.dance.problem.person_file import read_person
+from biodance.dance.limits._person import ArmLift, FootLoad
+from biodance.dance.problem.feet import support_sequence
+from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, joints, read_person
 from biodance.dance.problem.plan import Plan, read_plan
 from biodance.dance.problem.stance import seat
 from biodance.dance.problem.state import State
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.vocabulary import read_vocabulary, words_for, words_left_out
+from biodance.dance.search.known_postures import read_vocabulary, words_for, words_left_out
 from biodance.errors import BiodanceError, UnknownName
 from biodance.library import folder, names
 from biodance.motion.kinematics import poses

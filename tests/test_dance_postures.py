@@ -10,13 +10,27 @@ import pytest
 
 from biodance.body.human.human import human
 from biodance.dance.limits import family
-from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.excitation import condition, excitation_blocks, smooth_condition
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
-from biodance.dance.problem.stance import seat, stance
-from biodance.dance.search import posture_set
-from biodance.dance.search.posture import KEPT, Posture, initial_guess, posture_at, solve
-from biodance.dance.search.posture_set import exchange, extremes
+from biodance.dance.problem.person import PersonLimits, limit_body
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.stance import holding, seat, stance
+from biodance.dance.search import postures
+from biodance.dance.search.postures import (
+    KEPT,
+    Posture,
+    exchange,
+    extremes,
+    image_feet,
+    initial_guess,
+    mirror_posture,
+    mirror_vectors,
+    posture_at,
+    solve,
+    symmetric,
+)
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
@@ -82,11 +96,11 @@ def criterion(postures):
 
 def test_a_search_lowers_the_criterion_and_the_same_seed_gives_the_same_postures(monkeypatch):
     for name, sweeps in (("SWEEPS", ((4, 8),)), ("FRESH", ((8, 8),)), ("POLISH", ((8, 4),))):
-        monkeypatch.setattr(posture_set, name, sweeps)
+        monkeypatch.setattr(postures, name, sweeps)
     stances = (FEET, FEET.on(0), FEET.on(1))
     with ThreadPoolExecutor(1) as workers:
-        found = posture_set.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
-        twice = posture_set.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
+        found = postures.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
+        twice = postures.find_postures(CHAIN, BLOCKS, stances, family(), seed=3, workers=workers)
     np.testing.assert_array_equal(found, twice)
     rng = np.random.default_rng(0)
     anywhere = [posture_at(CHAIN, s, initial_guess(CHAIN, s, rng)) for s in stances]
@@ -105,13 +119,13 @@ def test_a_seated_person_keeps_the_pelvis_still_and_the_knees_up():
 
 
 def test_a_person_too_weak_to_stand_is_refused_by_the_name_of_the_limit(monkeypatch):
-    monkeypatch.setattr(posture_set, "ATTEMPTS", 2)
+    monkeypatch.setattr(postures, "ATTEMPTS", 2)
     limits = BODY.limits
     weak = replace(
         BODY, limits=replace(limits, torque_lower=0.02 * limits.torque_lower, torque_upper=0.02 * limits.torque_upper)
     )
     with ThreadPoolExecutor(1) as workers, pytest.raises(BiodanceError, match="joint torque"):
-        posture_set.find_postures(Chain(weak), BLOCKS, (FEET,), family(), seed=0, workers=workers)
+        postures.find_postures(Chain(weak), BLOCKS, (FEET,), family(), seed=0, workers=workers)
 
 
 def test_extreme_eigenvalues_in_closed_form():
@@ -123,3 +137,41 @@ def test_extreme_eigenvalues_in_closed_form():
     least, most = extremes(some)
     np.testing.assert_allclose(least, values[:, 0], atol=1e-6)
     np.testing.assert_allclose(most, values[:, -1], rtol=1e-9)
+
+
+# ---- Mirror images of postures
+
+STANCES = ("parallel", "right_forward", "single_right", "single_left")
+ALL_FEET = tuple(
+    s for s in support_sequence(BODY, Plan("all", "", tuple((name, 1) for name in STANCES))) if s.over is None
+)
+
+
+@pytest.mark.parametrize("place", [0, 2, 3])
+def test_an_image_keeps_every_limit_as_well_as_its_posture(place):
+    here, there = ALL_FEET[place], ALL_FEET[image_feet(ALL_FEET[place], ALL_FEET)]
+    posture = solve(
+        CHAIN, here, initial_guess(CHAIN, here, np.random.default_rng(place)), no_objective, family(), iterations=8
+    )
+    image = solve(CHAIN, there, mirror_posture(CHAIN, posture.x, here, there), no_objective, family(), iterations=0)
+    assert image.violation == pytest.approx(posture.violation, abs=1e-9)
+    np.testing.assert_allclose(image.up, mirror_vectors(BODY, posture.up), atol=1e-12)
+    assert np.abs(image.x[ROOT:] - posture.x[ROOT:]).max() > 0.1
+    np.testing.assert_allclose(mirror_posture(CHAIN, image.x, there, here), posture.x, atol=1e-12)
+
+
+def test_images_stand_on_their_own_feet():
+    assert [image_feet(feet, ALL_FEET) for feet in ALL_FEET] == [0, None, 3, 2]
+    assert image_feet(ALL_FEET[2], ALL_FEET[:3]) is None
+    held = tuple(holding(feet, BODY, ("right",)) for feet in ALL_FEET)
+    assert image_feet(held[0], held) is None
+
+
+@pytest.mark.parametrize(
+    "person",
+    [PersonLimits(strengths=(("left_knee", 0.5),)), PersonLimits(range_shares=(("left_shoulder", 0.5),))],
+    ids=["strength", "range"],
+)
+def test_whoever_differs_from_side_to_side_has_no_images(person):
+    assert symmetric(BODY)
+    assert not symmetric(replace(BODY, limits=limit_body(BODY, person)))

@@ -10,20 +10,19 @@ import pytest
 from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.human.limits import joint_limits
+from biodance.dance.design import safe_stretch
 from biodance.dance.limits import family
 from biodance.dance.performers import PerformersResult
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.nlp import no_objective
 from biodance.dance.problem.person import HEALTHY, PersonLimits, fit_to_person, limit_body
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.context import DesignContext
-from biodance.dance.search.course import Course, PlainStep
-from biodance.dance.search.no_next_posture import NoNextPosture
-from biodance.dance.search.posture import KEPT, initial_guess, refuse, solve
-from biodance.dance.search.repair import safe_stretch
-from biodance.dance.search.word_course import WordSearch, word_course
+from biodance.dance.search import word_course as word_search
+from biodance.dance.search.course import Course, DesignContext, PlainStep
+from biodance.dance.search.postures import KEPT, initial_guess, refuse, solve
+from biodance.dance.search.word_course import NoNextPosture, WordSearch, word_course
 from biodance.errors import BiodanceError
 from biodance.records import Subject
 
@@ -90,7 +89,8 @@ def test_what_is_not_possible_is_left_out_and_the_rest_is_kept() -> None:
     assert NoNextPosture("", stances, 0).possible(PLAN.blocks) == (("single_right", 2),)
 
 
-def test_a_dance_of_more_postures_than_there_are_is_shorter_and_not_refused() -> None:
+def test_a_dance_of_more_postures_than_there_are_is_shorter_and_not_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(word_search, "_TRIES", 40)
     body, plan, _ = fit_to_person(BODY, replace(PLAN, blocks=(("parallel", 30),)), STIFF)
     course = word_course(WordSearch(DesignContext.alone(body, plan, 0)))
     assert 2 <= len(course.steps) < 30

@@ -1,17 +1,25 @@
 """The judge of a finished dance: what it samples, which limits it asks when, and what it calls broken, by hand."""
 
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from small_dances import BODY, small_dance
 
+from biodance.cli import run
 from biodance.dance.dance import Dance
+from biodance.dance.expectation import expect
 from biodance.dance.limits import CheckedMotion, Limit, Margins, Remaining, unconcerned
 from biodance.dance.limits.joint_range import JointRange
-from biodance.dance.problem.stance import Phase
+from biodance.dance.performers import PerformersMargin, PerformersResult
+from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.splines import Phase, basis_at, rest_to_rest
 from biodance.dance.problem.state import State
-from biodance.dance.verify import Margin, _least, broken, verify
+from biodance.dance.verify import Margin, _least, broken, dance_metrics, verify
+from biodance.errors import BiodanceError
+from biodance.pipeline.dance_result import DanceResult, not_safe
+from biodance.report.dance import write_dance
 
 
 @dataclass(frozen=True)
@@ -115,3 +123,112 @@ def test_what_happens_just_after_a_move_begins_or_before_it_ends_is_seen(at_star
     (found,) = broken(verify(BODY, Twitching(**own, at_start=at_start), (limit,)))
     assert found.what == "left_elbow_flexion"
     assert where[0] < found.where_s < where[1]
+
+
+# ---- Rest-to-rest splines
+
+
+@pytest.mark.parametrize("via", [0, 1, 2, 4])
+def test_passes_through_its_points_and_rests_at_the_ends(via: int) -> None:
+    points = np.random.default_rng(via).normal(size=via + 2)
+    at = basis_at(np.linspace(0, 2.0, via + 2), 2.0, via=via)
+    np.testing.assert_allclose(at.position @ points, points, atol=1e-10)
+    ends = basis_at(np.array([0.0, 2.0]), 2.0, via=via)
+    np.testing.assert_allclose(ends.velocity @ points, 0, atol=1e-9)
+    np.testing.assert_allclose(ends.acceleration @ points, 0, atol=1e-8)
+
+
+def test_derivatives_agree_with_finite_differences() -> None:
+    points, h = np.array([0.2, 1.0, -0.5, 0.3]), 1e-4
+    t = np.linspace(0.1, 1.9, 40)
+    here = basis_at(t, 2.0)
+    before, after = basis_at(t - h, 2.0), basis_at(t + h, 2.0)
+    np.testing.assert_allclose(here.velocity @ points, (after.position - before.position) @ points / (2 * h), atol=1e-5)
+    np.testing.assert_allclose(
+        here.acceleration @ points, (after.velocity - before.velocity) @ points / (2 * h), atol=1e-4
+    )
+
+
+def test_equal_points_do_not_move() -> None:
+    basis = rest_to_rest(2.0)
+    assert basis.time.size == 101
+    np.testing.assert_allclose(basis.position @ np.full(4, 0.7), 0.7)
+    np.testing.assert_allclose(basis.velocity @ np.full(4, 0.7), 0, atol=1e-12)
+
+
+def test_no_samples_is_refused() -> None:
+    with pytest.raises(BiodanceError, match="no samples"):
+        rest_to_rest(0.0)
+
+
+# ---- A dance that imprecise people cannot dance safely
+
+LEADING = {"cues.md", "cues.html", "dance.c3d"}
+SHORT = Margin("self_collision_of_performers", -0.04, 1.0, "m", "left_forearm_hand - left_thigh")
+PLAN = Plan("one_segment", "", (("parallel", 2),), hold=1.0, instructions=4.0)
+WHERE = "4.0 cm of the room between arms, legs and trunk that is needed are missing at 1 s"
+
+
+@pytest.fixture(scope="module")
+def result() -> DanceResult:
+    dance = replace(small_dance(), unsafe=(SHORT,))
+    return DanceResult(BODY, PLAN, dance, (SHORT,), dance_metrics(dance, PLAN), expect(dance), "", (), 1.0)
+
+
+def test_the_dance_on_disk_knows_that_it_is_not_safe(result: DanceResult, tmp_path: Path) -> None:
+    assert result.dance is not None
+    result.dance.save(tmp_path / "dance.npz")
+    assert Dance.load(tmp_path / "dance.npz").unsafe == (SHORT,)
+
+
+def test_nothing_that_leads_is_written_of_it(result: DanceResult, tmp_path: Path) -> None:
+    found = write_dance(result, tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert not LEADING & names
+    assert {"dance.npz", "results.json", "margins.md"} <= names
+    assert WHERE in found["warnings"][0]
+
+
+def test_despite_that_it_heads_the_cards_and_each_of_them(result: DanceResult, tmp_path: Path) -> None:
+    write_dance(result, tmp_path, despite=True)
+    assert {path.name for path in tmp_path.iterdir()} >= LEADING
+    cards = (tmp_path / "cues.html").read_text()
+    body = cards[cards.index("<h1>") :]
+    assert body.index("NOT SAFE when imprecise: " + WHERE) < body.index("postures")
+    assert body.count("NOT SAFE when imprecise</p>") == len(small_dance().stances)
+    text = (tmp_path / "cues.md").read_text()
+    assert text.index("NOT SAFE") < text.index("**1.**")
+
+
+def test_no_page_leads_through_it_unless_somebody_says_so(
+    result: DanceResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert result.dance is not None
+    result.dance.save(tmp_path / "dance.npz")
+    words = ["feedback", str(tmp_path / "dance.npz"), "--out", str(tmp_path / "page.html")]
+    assert run(words) == 2
+    said = capsys.readouterr().err
+    assert "NOT SAFE" in said
+    assert "--despite" in said
+    assert not (tmp_path / "page.html").exists()
+    assert run([*words, "--despite"]) == 0
+    page = (tmp_path / "page.html").read_text()
+    assert page.index(WHERE) < page.index("Press Start")
+
+
+def test_a_safe_dance_says_nothing(result: DanceResult, tmp_path: Path) -> None:
+    assert not_safe(small_dance()) == ()
+    safe = replace(result, dance=small_dance(), margins=())
+    write_dance(safe, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} >= LEADING
+    assert all("NOT SAFE" not in (tmp_path / name).read_text() for name in ("cues.md", "cues.html"))
+
+
+def test_what_performers_lack_becomes_what_is_not_safe() -> None:
+    """3 mm of support of the 15 that are asked, and segments that keep 21 mm of 20."""
+    rooms = (
+        PerformersMargin("balance", "m", 0.015, 0.003, 1, "parallel", 0.01),
+        PerformersMargin("self_collision", "m", 0.02, 0.021, 1, "arm - head", 0.0),
+    )
+    margins = PerformersResult(200, rooms, ((1, "balance"),)).margins(small_dance())
+    assert [round(margin.worst, 6) for margin in margins] == [-0.012, 0.001]

@@ -9,7 +9,7 @@ from walking import MASS, STANCE, Wrong, session, standing, walk
 
 from biodance.diagnosis.witness_evidence import cause_visibilities, collect_evidence
 from biodance.effects import NamedCause, effects
-from biodance.inference.rows import observed_causes, rows_of
+from biodance.inference.rows import rows_of, with_observed
 from biodance.inference.sets import Search, hypothesis
 from biodance.observations import observe, recording
 from biodance.uncertainty.tolerances import shipped
@@ -18,7 +18,7 @@ from biodance.uncertainty.tolerances import shipped
 def size_of(evidence, names):
     """Return what observations alone say of the size of a cause, with its standard deviation."""
     asked = effects()
-    every = observed_causes(evidence, asked)
+    every = with_observed((), evidence, asked)
     search = Search.of(rows_of(None, every, shipped(), evidence), every)
     one = next(cause.effect for cause in every if cause.names == names)
     (fitted,) = hypothesis(search, (NamedCause(one, np.zeros(one.typical.size), np.empty((0, 0))),)).causes

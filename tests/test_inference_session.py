@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from diagnosed_sessions import body, delay, gain, known, nothing, offset, pull, windows
 from inferred_sessions import inferred
+from walking import session, standing, walk
 
 from biodance.diagnosis.accept import accept, case_fit, gain_by_naming, residuals_of
+from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.effects import Case, Effect, Parameter
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
 from biodance.identification.statistics import standing_point
 from biodance.motion.regressor import predict_wrench
-from biodance.records import Sip
+from biodance.records import Sip, Wrench
 
 FAST = (
     "plate_gain",
@@ -26,6 +28,8 @@ FAST = (
     "added_mass",
     "plate_drift",
 )
+ZERO = np.array([15.0, 0.0, 0.0])
+"""N that an empty plate reads."""
 
 
 def found(hidden, *, seed: int = 1, chosen=FAST):
@@ -182,9 +186,51 @@ def test_a_gain_needs_three_blocks() -> None:
 
 def test_too_short_trials_are_refused() -> None:
     (window,) = windows(1, trials=1)
-    short = replace(window, use=window.motion.time < 0.5)
-    with pytest.raises(TrialRefused, match="1 s of fully measured"):
+    short = replace(window, use=window.motion.time < 0.35)
+    with pytest.raises(TrialRefused, match=r"0\.4 s of fully measured"):
         inferred(body(), (short,), tolerances=known())
+
+
+@pytest.mark.parametrize(("hidden", "size"), [(nothing, 0.0), (offset(12.0), 12.0)])
+def test_steps_over_one_plate_are_compared(hidden, size: float) -> None:
+    """In walking the plates measure all of the ground for half a second at a time."""
+    whole = windows(1, hidden=hidden)
+    steps = tuple(replace(one, use=np.mod(one.motion.time, 1.2) < 0.5) for one in whole)
+    named = inferred(body(), steps, tolerances=known(), effects=FAST).diagnosis.findings
+    assert [(one.effect, one.target) for one in named] == [("plate_offset", "Fx")] * bool(size)
+    for low, high in (one.parameters[0].interval for one in named):
+        assert low <= size <= high
+
+
+def test_a_zero_that_only_an_empty_plate_shows_is_named_beside_the_simulation() -> None:
+    """It is taken off, so that the forces that are compared do not show it."""
+    evidence = collect_evidence(session(standing(), walk(), walk(name="again")), FAST)
+    seen = tuple(
+        replace(one, value=one.value + 15.0) if one.what == "plate2 Fx, taken off" else one
+        for one in evidence.observations
+    )
+    found = inferred(
+        body(), tuple(map(two_plates, windows(1))), tolerances=known(), effects=FAST,
+        evidence=replace(evidence, observations=seen),
+    )  # fmt: skip
+    assert ("plate_offset", "plate2:Fx") in {(one.effect, one.target) for one in found.diagnosis.findings}
+
+
+def test_what_laboratories_have_is_known_without_a_name() -> None:
+    """Eight milliseconds are no fault where laboratories differ by six, and may be taken off all the same."""
+    usual = replace(known(), sizes={**known().sizes, "time_delay": 0.006})
+    found = inferred(body(), windows(1, hidden=lambda *some: delay(*some, late=0.008)), tolerances=usual, effects=FAST)
+    assert found.diagnosis.findings == ()
+    (one,) = found.tolerated()
+    assert (one.effect, one.parameters[0].value) == ("time_delay", pytest.approx(0.008, rel=0.05))
+    assert inferred(body(), windows(1), tolerances=usual, effects=FAST).tolerated() == ()
+
+
+def two_plates(window):
+    """Return the window with a second plate, on which nobody stands, and the zeros of both taken off."""
+    (one,) = window.trial.plates
+    empty = replace(one, name="plate2", zero=ZERO, wrench=Wrench(one.wrench.time, np.zeros_like(one.wrench.value)))
+    return replace(window, trial=replace(window.trial, plates=(replace(one, zero=ZERO), empty)))
 
 
 def test_a_cause_that_is_not_in_the_family_is_refused() -> None:

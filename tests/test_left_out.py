@@ -15,7 +15,7 @@ from biodance.records.left_out import seconds_left_out
 from biodance.report.tables.diagnosis import JUDGED_ROW
 from biodance.virtual_lab.faults.causes import hide, parse_cause
 from biodance.virtual_lab.movement.protocol import read_protocol
-from biodance.virtual_lab.recording.laboratory import LabVisit
+from biodance.virtual_lab.recording.visit import LabVisit
 from biodance.virtual_lab.simulate import simulate_session
 
 

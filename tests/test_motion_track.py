@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from marker_trials import noisy_dance, points
+from perfect_recordings import PERFECT_INSTRUMENTS
 from standing_markers import PERSON
 
 from biodance.body.human.human import human
@@ -18,9 +19,9 @@ from biodance.records import Markers, Source, Subject, Trial
 from biodance.settings import Settings
 from biodance.virtual_lab.movement.protocol import read_protocol
 from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.recording.laboratory import Laboratory, LabVisit, perform_in, set_up
+from biodance.virtual_lab.recording.laboratory import Laboratory
+from biodance.virtual_lab.recording.visit import LabVisit, perform_in, set_up
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.tolerances import instruments_perfect
 
 WOMAN = human(Subject(58.3, 1.64, "F", 31.0))
 LEFT_LEG = ("LTHI", "LKNE", "LTIB", "LANK", "LHEE", "LTOE")
@@ -36,7 +37,7 @@ def markers() -> Markers:
 
 
 def test_a_simulated_squat_is_followed(tmp_path):
-    subject, visit = Subject(58.0, 1.66, "F", 28.0, "S07"), LabVisit(0, Laboratory(bits=32), instruments_perfect())
+    subject, visit = Subject(58.0, 1.66, "F", 28.0, "S07"), LabVisit(0, Laboratory(bits=32), PERFECT_INSTRUMENTS)
     protocol = read_protocol("short")
     squat = next(plan for plan in protocol.trials if plan.role == "validate")
     static = next(plan for plan in protocol.trials if plan.role == "static")

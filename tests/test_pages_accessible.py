@@ -28,11 +28,10 @@ from biodance.pipeline.dance_result import DanceResult
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.session import examine
-from biodance.report.feedback.write import write_feedback
-from biodance.report.pages.dance import cards_page
-from biodance.report.pages.plates import plates_page
+from biodance.report.dance import cards_page
+from biodance.report.pages.feedback import write_feedback
 from biodance.report.pages.subject import subject_page
-from biodance.report.tables.laboratory import plates_document
+from biodance.report.plates import plates_document, plates_page
 from biodance.report.write import write_diagnosis, write_report
 
 pytestmark = ASKED

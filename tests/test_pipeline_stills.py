@@ -22,9 +22,9 @@ from biodance.pipeline.still import load_still, posture_still, worst_still
 from biodance.records import Markers
 from biodance.records.motion import BY_FRAME
 from biodance.report.figures import solid
+from biodance.report.figures.session import RESIDUAL_SCALE, VIEWS, still_figure
 from biodance.report.figures.solid import sheet_png
-from biodance.report.figures.still import RESIDUAL_SCALE, VIEWS, still_figure
-from biodance.report.pages.replay import replay_data
+from biodance.report.pages.session import replay_data
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,7 @@ import pytest
 from browser import BROWSER, Page
 
 from biodance.display import BLUE
-from biodance.report.figures.curves import Curve, CurveFigure, Strip
-from biodance.report.figures.vector import Stroke
+from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.pages.template import template_text
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")

@@ -4,8 +4,8 @@ import numpy as np
 
 from biodance.body.human.human import human
 from biodance.dance.expectation import Expectation
-from biodance.dance.metrics import ZmpPath
 from biodance.dance.problem.stance import stance
+from biodance.dance.verify import ZmpPath
 from biodance.motion.kinematics import poses
 from biodance.pipeline.still import bone_lines
 from biodance.records import Subject

@@ -56,12 +56,12 @@ def result(window: TrialWindow, role: Role, use: Array | None = None) -> TrialRe
 def test_standing_is_looked_at_where_movement_is_short() -> None:
     moving, quiet = windows(1, trials=1)[0], standing(np.zeros((150, 6)))
     short = np.zeros(moving.use.size, dtype=bool)
-    short[100:140] = True
+    short[100:115] = True
     assert [window.trial.name for window in chosen_windows((result(quiet, "static"), result(moving, "fit")))] == ["t0"]
     some = (result(quiet, "static"), result(moving, "fit", short))
     assert [window.trial.name for window in chosen_windows(some)] == ["static", "t0"]
     assert left_out(some) == (
-        "t0 was left out: no 1 s in which the plates measure all ground contact without a break.",
+        "t0 was left out: no 0.4 s in which the plates measure all ground contact without a break.",
     )
     assert chosen_windows(some)[0].start == 0.0
     assert chosen_windows(some)[1].end == 1.0

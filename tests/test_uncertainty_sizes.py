@@ -30,7 +30,7 @@ CAUSES = ("plate_gain", "time_delay", "body_mass", "lab_tilt", "plate_position",
 ELSEWHERE = {
     "body/human/scaling.py:TILT": "deg, a warning's threshold",
     "body/human/limits.py:HAND_TURN": "a joint's range",
-    "virtual_lab/recording/laboratory.py:tilt": "a fault that a visit is given, 0 by default",
+    "virtual_lab/recording/visit.py:tilt": "a fault that a visit is given, 0 by default",
     "body/robot/prior.py:RELATIVE_MASS_SD": "robots: what a data sheet is worth",
     "body/robot/prior.py:RELATIVE_INERTIA_SD": "robots",
     "body/robot/prior.py:_COM_SD": "robots",

@@ -7,23 +7,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_faults import about_centre, standing_recording
+from inject import inject
+from perfect_recordings import PERFECT_INSTRUMENTS
 from scipy.integrate import solve_ivp
 
 from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, UnknownName
+from biodance.lab.c3d.raw import read_raw
 from biodance.lab.read import read_trial
 from biodance.records import Subject, Trial
-from biodance.virtual_lab.faults.causes import CAUSES, hide, parse_cause
+from biodance.virtual_lab.faults.causes import CAUSES, Hidden, fault_of, hide, parse_cause
 from biodance.virtual_lab.faults.forces import Spring, swing
 from biodance.virtual_lab.movement.performance import perform
 from biodance.virtual_lab.movement.protocol import Protocol, read_protocol
 from biodance.virtual_lab.person.person import make_person
-from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
+from biodance.virtual_lab.recording.laboratory import Laboratory
+from biodance.virtual_lab.recording.visit import FIRST_VISIT, LabVisit
 from biodance.virtual_lab.simulate import simulate_session
-from biodance.virtual_lab.tolerances import instruments_perfect
 
 SUBJECT = Subject(60.0, 1.70, "F", 30.0)
-PERFECT = LabVisit(tolerances=instruments_perfect())
+PERFECT = LabVisit(tolerances=PERFECT_INSTRUMENTS)
 EXAMPLES = (
     "plate_offset:target=Fz,offset=20", "plate_gain:target=Fz,gain=0.04", "plate_crosstalk:target=Fz->My,ratio=0.02",
     "plate_drift:target=Mx,drift=8", "time_delay:delay=0.02", "clock_drift:stretch=0.03",
@@ -218,3 +222,187 @@ def test_without_a_fault_nothing_hums() -> None:
     )
     frequency = np.fft.rfftfreq(len(wrench), 0.002)
     assert spectrum[np.abs(frequency - 50) < 1].max() < 0.2
+
+
+# ---- Faults written into copies of recordings
+
+CLOCK = (0.1, 0.9)
+FAULTS = (
+    "plate_gain:target=Fz,gain=0.04", "plate_offset:target=Mx,offset=8", "plate_position:target=plate1:x,shift=0.02",
+    "plate_rotation:target=plate1:z,angle=0.07", "time_delay:delay=0.02", "labels_swapped:target=LKNE/RKNE",
+)  # fmt: skip
+
+
+def written(path: Path, out: Path, text: str) -> Trial:
+    return read_trial(inject(path, out, fault_of(parse_cause(text), {path.stem: CLOCK})))
+
+
+def simulated(folder: Path, plate_type: int, *texts: str) -> Path:
+    return standing_recording(folder, *texts, visit=LabVisit(laboratory=Laboratory(plate_type=plate_type)))
+
+
+@pytest.fixture(scope="module", params=[2, 4])
+def session_clean(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path]:
+    return request.param, simulated(tmp_path_factory.mktemp("session_clean") / "s", request.param)
+
+
+@pytest.mark.parametrize("text", FAULTS, ids=lambda text: text.partition(":")[0])
+def test_a_copy_with_a_fault_is_a_recording_with_that_fault(
+    text: str, session_clean: tuple[int, Path], tmp_path: Path
+) -> None:
+    kind, path = session_clean
+    copy = written(path, tmp_path / path.name, text)
+    again = read_trial(simulated(tmp_path / "s", kind, text))
+    np.testing.assert_allclose(copy.plates[0].wrench.value, again.plates[0].wrench.value, atol=2e-3)
+    np.testing.assert_allclose(copy.plates[0].corners, again.plates[0].corners, atol=1e-6)
+    np.testing.assert_allclose(copy.markers["LKNE"], again.markers["LKNE"], atol=1e-6)
+
+
+def test_a_drift_runs_with_the_clock_given(session_clean: tuple[int, Path], tmp_path: Path) -> None:
+    _, path = session_clean
+    change = (
+        written(path, tmp_path / "c.c3d", "plate_drift:target=Fx,drift=9").wrench.value - read_trial(path).wrench.value
+    )
+    np.testing.assert_allclose(change[:, 0], 9 * (np.linspace(*CLOCK, len(change)) - 0.5), atol=2e-3)
+
+
+def test_all_other_bytes_are_the_originals(session_clean: tuple[int, Path], tmp_path: Path) -> None:
+    _, path = session_clean
+    inject(path, tmp_path / "c.c3d", fault_of(parse_cause("plate_position:target=plate1:x,shift=0.02"), {}))
+    one, two = path.read_bytes(), (tmp_path / "c.c3d").read_bytes()
+    assert len(one) == len(two)
+    assert 4 <= sum(a != b for a, b in zip(one, two, strict=True)) <= 16  # the x of four corners, four bytes each
+    inject(path, tmp_path / "same.c3d", lambda recording: recording)
+    assert one == (tmp_path / "same.c3d").read_bytes()
+
+
+def test_what_does_not_fit_into_a_copy_is_refused(session_clean: tuple[int, Path], tmp_path: Path) -> None:
+    _, path = session_clean
+    with pytest.raises(BiodanceError, match="rates, lengths"):
+        inject(path, tmp_path / "a.c3d", fault_of(parse_cause("frame_rate:ratio=1.2"), {}))
+    inject(path, tmp_path / "b.c3d", lambda recording: recording)
+    with pytest.raises(BiodanceError, match="exists already"):
+        inject(path, tmp_path / "b.c3d", lambda recording: recording)
+
+
+REAL = (
+    "biomechzoo/HC030A/HC030A05.c3d",
+    "biomechzoo/HC032A/HC032A01.c3d",
+    "pycgm/Movement_trial.c3d",
+    "adl_gait/2014001_C1_01.c3d",
+)
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_recordings_of_four_laboratories_take_faults(name: str, data: Path, tmp_path: Path) -> None:
+    path = data / name
+    before = read_trial(path)
+    centre = before.plates[0].centre
+    x = about_centre(before.plates[0], centre)
+    gain = about_centre(written(path, tmp_path / "gain.c3d", "plate_gain:target=plate1:Fz,gain=0.04").plates[0], centre)
+    np.testing.assert_allclose(gain - x, 0.04 * x * np.eye(6)[2], atol=0.05)
+    moved = written(path, tmp_path / "moved.c3d", "plate_position:target=plate1:y,shift=0.02")
+    np.testing.assert_allclose(moved.plates[0].centre - before.plates[0].centre, [0, 0.02, 0], atol=1e-6)
+    np.testing.assert_allclose(about_centre(moved.plates[0], moved.plates[0].centre), x, atol=1e-3)
+    late = about_centre(written(path, tmp_path / "late.c3d", "time_delay:delay=0.02").plates[0], centre)
+    shift = 0.02 * before.plates[0].wrench.rate
+    if shift == round(shift):
+        np.testing.assert_allclose(
+            late[round(shift) :], x[: -round(shift)], atol=0.6
+        )  # the empty plate's mean moves a little
+    raw = read_raw(path), read_raw(tmp_path / "late.c3d")
+    np.testing.assert_array_equal(raw[0].points, raw[1].points)
+
+
+def test_a_wrong_sign_of_fz_on_a_belt_is_turned_back_by_the_reader(data: Path, tmp_path: Path) -> None:
+    path = data / "gaitalytics" / "treadmill_no_events.c3d"
+    copy, before = written(path, tmp_path / "c.c3d", "axis_error:target=plate2:Fz"), read_trial(path)
+    assert any("Fz alone was turned round" in one for one in copy.plates[1].decisions)
+    assert not any("Two signs" in one for one in copy.warnings)
+    for one, other in zip(copy.plates, before.plates, strict=True):
+        np.testing.assert_allclose(one.wrench.value, other.wrench.value, atol=0.1)
+
+
+# ---- Hidden faults arrive in the files as they were asked for
+
+TRIAL = "standing_1"
+
+
+def recorded(folder: Path, texts: tuple[str, ...], *, plate_type: int = 2) -> Trial:
+    visit = LabVisit(laboratory=Laboratory(plate_type=plate_type), tolerances=PERFECT_INSTRUMENTS)
+    return read_trial(standing_recording(folder, *texts, visit=visit))
+
+
+@pytest.fixture(scope="module", params=[2, 4])
+def both_types(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Trial]:
+    return request.param, recorded(tmp_path_factory.mktemp("both_types") / "s", (), plate_type=request.param)
+
+
+def test_channel_faults_have_the_size_asked_for(both_types: tuple[int, Trial], tmp_path: Path) -> None:
+    kind, before = both_types
+    centre = before.plates[0].centre
+    texts = (
+        "plate_gain:target=Fz,gain=0.04",
+        "plate_crosstalk:target=Fz->My,ratio=0.01",
+        "plate_offset:target=Mx,offset=8",
+    )
+    after = recorded(tmp_path / "s", texts, plate_type=kind)
+    x, y = (about_centre(one.plates[0], centre) for one in (before, after))
+    tolerance = 0.2 if kind == 2 else 2.0  # TYPE 4 is stored in coarse volts
+    np.testing.assert_allclose(y[:, 2], 1.04 * x[:, 2], atol=tolerance)
+    np.testing.assert_allclose(y[:, 4], x[:, 4] + 0.01 * 1.04 * x[:, 2], atol=tolerance)
+    np.testing.assert_allclose(y[:, 3], x[:, 3] + 8, atol=tolerance)
+
+
+def test_forces_come_late(both_types: tuple[int, Trial], tmp_path: Path) -> None:
+    kind, before = both_types
+    after = recorded(tmp_path / "s", ("time_delay:delay=0.02",), plate_type=kind)
+    shift = round(0.02 * before.plates[0].wrench.rate)
+    np.testing.assert_allclose(after.plates[0].wrench.value[shift:], before.plates[0].wrench.value[:-shift], atol=2.0)
+
+
+def test_a_shifted_plate_shifts_the_centre_of_pressure(both_types: tuple[int, Trial], tmp_path: Path) -> None:
+    kind, before = both_types
+    after = recorded(tmp_path / "s", ("plate_position:target=plate1:x,shift=0.02",), plate_type=kind)
+    np.testing.assert_allclose(after.plates[0].centre - before.plates[0].centre, [0.02, 0, 0], atol=1e-6)
+    moved = np.nanmedian(after.plates[0].wrench.cop() - before.plates[0].wrench.cop(), axis=0)
+    np.testing.assert_allclose(moved[:2], [0.02, 0.0], atol=5e-4)
+
+
+def test_a_turned_plate_turns_the_forces(both_types: tuple[int, Trial], tmp_path: Path) -> None:
+    kind, before = both_types
+    after = recorded(tmp_path / "s", ("plate_rotation:target=plate1:z,angle=0.1",), plate_type=kind)
+    c, s = np.cos(0.1), np.sin(0.1)
+    turned = before.plates[0].wrench.force @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T
+    np.testing.assert_allclose(after.plates[0].wrench.force, turned, atol=0.3)
+
+
+def test_a_load_is_weighed_but_not_declared(both_types: tuple[int, Trial], tmp_path: Path) -> None:
+    kind, before = both_types
+    after = recorded(tmp_path / "s", ("added_mass:target=left_forearm_hand,mass=2.4",), plate_type=kind)
+    more = (after.plates[0].wrench.force[:, 2].mean() - before.plates[0].wrench.force[:, 2].mean()) / 9.80665
+    assert more == pytest.approx(2.4, abs=0.02)
+    assert after.measurements["Bodymass"] == before.measurements["Bodymass"]
+
+
+def test_labels_are_exchanged_and_mass_is_underdeclared(both_types: tuple[int, Trial], tmp_path: Path) -> None:
+    kind, before = both_types
+    after = recorded(tmp_path / "s", ("labels_swapped:target=LKNE/RKNE", "body_mass:error=3"), plate_type=kind)
+    np.testing.assert_allclose(np.nanmean(after.markers["LKNE"] - before.markers["RKNE"], axis=0), 0, atol=1e-4)
+    assert after.measurements["Bodymass"] == pytest.approx(before.measurements["Bodymass"] - 3)
+
+
+def test_words_are_read_and_wrong_ones_refused() -> None:
+    assert parse_cause("added_mass:target=left_shank,mass=1,place=0;-0.1;0.05") == Hidden(
+        "added_mass", "left_shank", {"mass": (1.0,), "place": (0.0, -0.1, 0.05)}
+    )
+    plan = read_protocol("standing")
+    for text, match in (
+        ("plate_gain:target=Fz,gian=0.1", "gain"),
+        ("plate_gain:target=Fq,gain=0.1", "channel"),
+        ("nothing", "Legal"),
+    ):
+        with pytest.raises((BiodanceError, UnknownName), match=match):
+            hide((parse_cause(text),), SUBJECT, plan, seed=1)
+    with pytest.raises(BiodanceError, match="not a number"):
+        parse_cause("plate_gain:target=Fz,gain=much")

@@ -16,10 +16,10 @@ from biodance.body.human.limits import joint_limits
 from biodance.dance.dance import Dance
 from biodance.dance.limits import family
 from biodance.dance.problem.chain import Chain
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import feet_in_move, seat
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.posture import KEPT, distance_from, initial_guess, solve
+from biodance.dance.search.postures import KEPT, distance_from, initial_guess, solve
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.motion.kinematics import poses

@@ -8,15 +8,16 @@ import pytest
 from biodance.errors import BiodanceError, UnknownName
 from biodance.motion.kinematics import poses
 from biodance.records import Subject
-from biodance.virtual_lab.person.flesh import (
+from biodance.virtual_lab.person.person import (
+    AddedLoad,
+    make_person,
     of_parameters,
     parameters_of_inertia,
     place_inertia,
     true_pseudo_inertia,
 )
-from biodance.virtual_lab.person.person import AddedLoad, make_person
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS, UPRIGHT_CHAIN, virtual_people
-from biodance.virtual_lab.recording.cameras import reference_angles
+from biodance.virtual_lab.recording.instruments import reference_angles
 from biodance.virtual_lab.tolerances import PERFECT
 from biodance.virtual_lab.truth import MERGED, load_on, merged_sip, place_in_12
 

@@ -82,8 +82,7 @@ def plates_command(archive: Path, *, out: OutOption, json: JsonOption = False, f
     from biodance.lab.session.archive import archive_folder
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.plates import judge_plates
-    from biodance.report.laboratory import print_plates
-    from biodance.report.pages.plates import write_plates
+    from biodance.report.plates import print_plates, write_plates
 
     with progress() as tell:
         place = results_folder(out, archive_folder(archive), force=force)
@@ -110,8 +109,7 @@ def learn_command(
         Folder that contains session folders, at any depth.
     """
     from biodance.pipeline.learn import learn_laboratory
-    from biodance.report.laboratory import print_learned, refuse_existing, write_lab_file
-    from biodance.report.tables.laboratory import learned_document
+    from biodance.report.laboratory import learned_document, print_learned, refuse_existing, write_lab_file
 
     refuse_existing(out)
     with progress() as tell:

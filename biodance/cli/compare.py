@@ -23,8 +23,7 @@ def compare_command(
     """
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.visits import compare_visits, read_visits
-    from biodance.report.pages.visits import COMPARE_PAGE, write_visits
-    from biodance.report.visits import print_compared
+    from biodance.report.visits import COMPARE_PAGE, print_compared, write_visits
 
     with progress() as tell:
         sessions = read_visits(visits, tell=tell)

@@ -96,8 +96,7 @@ def dance_command(
     there. If no dance satisfies all limits, the violated limit is reported (exit code 1). What leads a person (cards,
     cues, dance.c3d) is not written of a dance that is NOT SAFE when imprecise, unless --despite is given.
     """
-    from biodance.dance.problem.person import HEALTHY
-    from biodance.dance.problem.person_file import read_person
+    from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.pipeline.dance import (
         UNFINISHED,
         dance_folder,
@@ -107,8 +106,7 @@ def dance_command(
         make_robot_dance,
         robot_dancer,
     )
-    from biodance.report.dance_write import write_dance
-    from biodance.report.terminal import print_dance
+    from biodance.report.dance import print_dance, write_dance
 
     if robot.given and asked.plate is not None:
         raise BiodanceError("--plate is for people: a robot's feet stand as far apart as its hips. Leave it out.")
@@ -174,7 +172,7 @@ def feedback_command(dance: Path, *, despite: DespiteOption = False, out: FileOu
         The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.dance.dance import Dance
-    from biodance.report.feedback.write import write_feedback
+    from biodance.report.pages.feedback import write_feedback
 
     if not write_feedback(Dance.load(dance), out, force=force, despite=despite):
         say("The page leads but does not follow: this takes the bundle that `make bundle` builds in a checkout (npm).")
@@ -202,9 +200,9 @@ def play_command(
         The dance.npz written by `biodance dance`, or its folder.
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.rehearsal import rehearse
-    from biodance.report.figures.film import film_path, write_film
-    from biodance.report.tables.dance import playback_document
+    from biodance.dance.playback import rehearse
+    from biodance.report.dance import playback_document
+    from biodance.report.figures.dance import film_path, write_film
 
     place, one = film_path(out, force=force), Dance.load(dance)
     with counted_progress() as tell:

@@ -104,7 +104,7 @@ def diagnose_command(
         tables, carried = results.make_tables_folder(session), read_lab(reading.lab)
         result, before, place = examine_with_reference(session, reading, results, tell)
         recorded, folder = result.session, place.part
-        found = front.diagnose(result, reference=before, tolerances=carried.tolerances, accept=accept, tell=tell)
+        found = front.diagnose(result, reference=before, tolerances=carried.tolerances, tell=tell)
         result = found.mended.result if found.mended is not None else result
         result = as_diagnosed(result, found.diagnosis)
         tell("writing the page")
@@ -127,7 +127,7 @@ def examine_robot(
     from biodance.lab.session.results_folder import results_folder
     from biodance.pipeline.dance import named_feet
     from biodance.pipeline.robot import identify_robot
-    from biodance.report.robot_write import write_robot
+    from biodance.report.robot import write_robot
 
     urdf, feet = robot.named()
     if for_people:
@@ -145,7 +145,7 @@ def examine_robot(
 
 def diagnose_robot(recording: Path, results: Results, robot: RobotFile, for_people: tuple[str, ...]) -> int:
     """Say what about a robot or its laboratory is not as drawn, and return the exit code."""
-    from biodance.report.terminal import print_robot_diagnosis
+    from biodance.report.robot import print_robot_diagnosis
 
     result, folder, found = examine_robot(recording, results, robot, for_people)
     show(found, print_robot_diagnosis, json=results.json, path=folder / "report.html")

@@ -13,7 +13,6 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.problem.chain import ROOT
 from biodance.dance.problem.stance import Stance
-from biodance.errors import BiodanceError
 from biodance.library import locate, read_toml
 from biodance.records import SIDES, Array
 
@@ -51,36 +50,18 @@ def _words(group: str) -> dict[str, CueWords]:
 
 
 def cue_sheet(
-    body: Body,
-    angles: Array,
+    said: tuple[tuple[str, ...], ...],
     stances: tuple[str, ...],
-    planted: tuple[tuple[str, ...], ...],
     *,
     tempo: tuple[float, float] = (2.0, 2.0),
-    said: tuple[tuple[str, ...], ...] | None = None,
     names: tuple[str, ...] = (),
     about: tuple[str, ...] = (),
 ) -> str:
-    """Return the cue sheet (Markdown) of postures ``angles`` (P, n) rad of the joints of ``body``.
-
-    ``said`` (P) what is called for each, by default what moves; ``names`` (P) what they are called, if they are known
-    ones; ``about`` sentences that stand before them.
-
-    ``stances`` (P,) say in words where the feet are; ``planted`` (P,) which feet SIDES stand; ``tempo`` s of a
-    move and of a hold.
-
-    Raises
-    ------
-    BiodanceError
-        The postures, stances and planted feet are not equally many, or the joints are not those of the body.
+    """Return the cue sheet (Markdown): what is ``said`` (P) on the way to each posture (`dance_instructions`), and in
+    words where the feet are, ``stances`` (P); ``tempo`` s of a move and of a hold; ``names`` (P) of the postures, if
+    they are known ones; ``about`` sentences that stand before them.
     """
-    if angles.ndim != 2 or angles.shape[1] != len(body.joints) or not len(angles) == len(stances) == len(planted):
-        raise BiodanceError(
-            f"Cue sheet: angles {angles.shape}, {len(stances)} stances, {len(planted)} planted; "
-            f"expected ({len(stances)}, {len(body.joints)}) and as many of each."
-        )
     move, hold = tempo
-    degrees = np.degrees(np.concatenate([np.zeros((1, angles.shape[1])), angles]))
     lines = [
         "# The dance, posture by posture",
         "",
@@ -90,10 +71,9 @@ def cue_sheet(
         "can be repeated.",
         *(line for sentence in about for line in ("", sentence)),
     ]
-    for i, (stance, feet) in enumerate(zip(stances, planted, strict=True)):
+    for i, (called, stance) in enumerate(zip(said, stances, strict=True)):
         if i == 0 or stance != stances[i - 1]:
             lines += ["", f"## {stance[:1].upper()}{stance[1:]}"]
-        called = said[i] if said is not None else calls(body, degrees[i], degrees[i + 1], feet)
         name = f"*{names[i][:1].upper()}{names[i][1:]}.* " if names else ""
         lines += ["", f"**{i + 1}.** {name}{_sentence(called)}"]
     return "\n".join(lines) + "\n"

@@ -1,22 +1,226 @@
-"""What is left of the limits when imprecise people dance a dance (`imprecision`). A step by which a foot changes its
-place is everybody's own and not judged.
+"""How imprecise people copy a dance - degrees off in every joint, late and early, swaying - and what that leaves of the
+limits. A step by which a foot changes its place is everybody's own and not judged. The virtual laboratory performs
+dances by other code.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import groupby, pairwise
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
+from biodance.body.parts import UPRIGHT
 from biodance.dance.dance import Dance
-from biodance.dance.imprecision import USUAL_IMPRECISION, Imprecision, PlannedDance, draw_clock
-from biodance.dance.limits import ForImprecise, Limit
-from biodance.dance.problem.stance import phase_at
+from biodance.dance.limits import ForImprecise, ImpreciseCopy, Limit
+from biodance.dance.problem.chain import ROOT
+from biodance.dance.problem.splines import Phase, path_in, phase_at
+from biodance.dance.problem.stance import Stance
 from biodance.dance.verify import Margin
 from biodance.records import Array
 from biodance.threads import one_thread
+
+_RATE, _PLAN_RATE = 5.0, 25.0
+"""Hz at which performances are judged, and the plan is laid out."""
+_WANDER, _TEMPO, _SWAY = 0.25, 0.2, 0.5
+"""Hz: how fast errors, tempo and sway change."""
+_STRAIGHT, _SOFT = float(np.radians(5.0)), 80.0
+"""rad of a knee that counts as straight; 1/m of the soft minimum over the legs."""
+_PENDULUM = 0.1
+"""s²: height of the centre of mass over gravity."""
+_LIFT = 1.0
+"""Share of a move in which a foot leaves the ground, or comes back."""
+_FELT = 3.0
+"""s beyond which no instant of the plan is felt in the spline through all of them: 75 instants, a fourth each."""
+_ROUNDS = 2
+"""Corrections of the pelvis; what is left is a tenth of a millimetre a degree."""
+_CARRIED = 0.85
+"""m that the centre of mass goes when the pelvis goes 1 m over planted feet."""
+
+
+@dataclass(frozen=True)
+class Imprecision:
+    """How badly people copy: ``tracking`` rad root mean square of every joint's error, ``pelvis`` the share of it that
+    the pelvis' turns have, ``pace`` times the planned duration, ``timing`` root mean square of the tempo's wandering,
+    ``sway`` m root mean square of the centre of pressure. The usual values are those of a restless performer.
+    """
+
+    tracking: float = float(np.radians(7.0))
+    pelvis: float = 0.4
+    pace: float = 1.2
+    timing: float = 0.2
+    sway: float = 0.006
+
+
+USUAL_IMPRECISION = Imprecision()
+
+
+def draw_clock(rng: np.random.Generator, duration: float, how: Imprecision) -> tuple[Array, Array]:
+    """Return instants (T,) s of a performance, and those of the plan (T,) s that belong to them."""
+    time = np.arange(round(duration * how.pace * _RATE) + 1) / _RATE
+    tempo = np.exp(how.timing * _noise(rng, time, 1, _TEMPO)[:, 0])
+    done = np.concatenate([[0.0], np.cumsum((tempo[1:] + tempo[:-1]) / 2)])
+    return time, duration * done / done[-1]
+
+
+def _noise(
+    rng: np.random.Generator, time: Array, columns: int, cutoff: float, *, slow: float = 0.0, part: slice = slice(None)
+) -> Array:
+    """Return smooth random curves (T, columns) of unit standard deviation, whose amplitudes fall with exp(-(f /
+    cutoff)²); ``slow`` s²: divided by 1 + slow (2 pi f)², as the mass of a pendulum moves when its support sways;
+    ``part`` of them.
+    """
+    frequency, ahead, aside = _waves(time.tobytes(), cutoff)
+    weight = np.exp(-((frequency / cutoff) ** 2))
+    weight /= np.sqrt(np.sum(weight**2)) * (1 + slow * (2 * np.pi * frequency) ** 2)
+    cosine, sine = rng.normal(size=(2, frequency.size, columns)) * weight[None, :, None]
+    return np.asarray(ahead[part] @ cosine + aside[part] @ sine)
+
+
+@lru_cache(maxsize=16)
+def _waves(instants: bytes, cutoff: float) -> tuple[Array, Array, Array]:
+    """Return frequencies (F,) Hz up to 2.5 times the ``cutoff``, and their cosines and sines (T, F) at ``instants``
+    (T,) s, which all performers of a dance share.
+    """
+    time = np.frombuffer(instants)
+    duration = 1.3 * (time[-1] - time[0]) + 1.0
+    frequency = np.arange(1, int(np.ceil(2.5 * cutoff * duration)) + 1) / duration
+    phase = 2 * np.pi * np.outer(time, frequency)
+    return frequency, np.cos(phase), np.sin(phase)
+
+
+class PlannedDance:
+    """The dance laid out in time: coordinates, place of the centre of mass and of the pelvis, feet of the phases; with
+    ``between``, two instants s of the dance, no more of it than can be felt there.
+    """
+
+    def __init__(self, dance: Dance, between: tuple[float, float] = (-np.inf, np.inf)) -> None:
+        self.dance, self.chain, phases = dance, dance.chain, dance.phases
+        self.start, self.end = (np.array([getattr(phase, name) for phase in phases]) for name in ("start", "end"))
+        self.posture = np.array([phase.posture for phase in phases])
+        self.stances = tuple(phase.stance for phase in phases)
+        before = [dance.stances[max(0, phase.posture - (phase.kind == "move"))] for phase in phases]
+        after = [dance.stances[phase.posture] for phase in phases]
+        self.down = np.array(
+            [[_planted(s) for s in row] for row in zip(before, (p.stance for p in phases), after, strict=True)]
+        )
+        self.ankles = np.array([[s.ankle for s in row] for row in zip(before, after, strict=True)])
+        self.stepping = np.ptp(self.ankles, axis=1).any(axis=(1, 2))
+        first, last = between[0] - _FELT, between[1] + _FELT
+        near = [phase for phase in phases if phase.end >= first and phase.start <= last]
+        time = np.unique(np.concatenate([_instants(phase) for phase in near]))
+        rows = self.phase_at(time)
+        x = self._coordinates(rows, time)
+        up, ankle = self._feet(rows, time)
+        over = x[:, 2] - self._tops(x, up, ankle)
+        self.spline = CubicSpline(time, np.column_stack([x, self.chain.mass_centre(x)[:, :2], over]))
+
+    def phase_at(self, when: Array) -> NDArray[np.intp]:
+        """Return the phase (T,) at instants of the plan."""
+        return phase_at(self.dance.phases, when)
+
+    def _coordinates(self, rows: NDArray[np.intp], when: Array) -> Array:
+        """Return the coordinates (T, n) of the dance, planted legs holding their feet."""
+        dance, parts = self.dance, list[Array]()
+        for p in np.unique(rows):
+            x = path_in(dance.phases[p], dance.postures, dance.via, when[rows == p])[0]
+            parts.append(self.chain.plant(x, self.stances[p].planted, self.stances[p].ankle))
+        return np.concatenate(parts)
+
+    def _feet(self, rows: NDArray[np.intp], when: Array) -> tuple[Array, Array]:
+        """Return how far each foot is up (T, 2), 0 on the ground to 1, and where its ankle stands (T, 2, 3) m."""
+        way = ((when - self.start[rows]) / np.maximum(self.end[rows] - self.start[rows], 1e-9))[:, None]
+        before, during, after = np.moveaxis(self.down[rows], 1, 0)
+        rise = np.where(before, _eased(way / _LIFT), 1.0) * np.where(after, _eased((1 - way) / _LIFT), 1.0)
+        ankle = np.where(way[..., None] < 0.5, self.ankles[rows, 0], self.ankles[rows, 1])
+        return np.where(during, 0.0, rise), ankle
+
+    def _tops(self, x: Array, up: Array, ankle: Array) -> Array:
+        """Return the height (T,) m of the pelvis at which planted legs are nearly straight; a raised foot yields."""
+        tops = self.chain.root_heights(x, ankle, _STRAIGHT) + up.T
+        return np.asarray(-np.log(np.exp(-_SOFT * tops).sum(axis=0)) / _SOFT)
+
+    def performed_by(
+        self, people: Sequence[tuple[np.random.Generator, Array, Array, slice]], how: Imprecision
+    ) -> ImpreciseCopy:
+        """Return the performances of several people, one behind the other: of each the random numbers, instants s (T,)
+        and those s (T,) of the plan that belong to them, and which of them count. The first and the last two frames of
+        each have differences to somebody else's.
+        """
+        parts = list[tuple[Array, Array, Array, Array]]()
+        for rng, time, when, part in people:
+            error = how.tracking * _noise(rng, time, self.chain.size - 3, _WANDER, part=part)
+            sway = how.sway * _noise(rng, time, 2, _SWAY, slow=_PENDULUM, part=part)
+            parts.append((time[part], when[part], error, sway))
+        times, places, errors, sways = (np.concatenate(some) for some in zip(*parts, strict=True))
+        return self._copied(times, places, errors, sways, how)
+
+    def held_by(self, count: int, when: Array) -> ImpreciseCopy:
+        """Return what ``count`` people of usual imprecision do who stop at each of the instants ``when`` (W,) s of the
+        plan, instant by instant.
+        """
+        how, rng, when = USUAL_IMPRECISION, np.random.default_rng(0), np.repeat(when, count)
+        error = how.tracking * rng.normal(size=(when.size, self.chain.size - 3))
+        sway = how.sway * rng.normal(size=(when.size, 2))
+        return replace(self._copied(np.arange(when.size, dtype=float), when, error, sway, how), still=True)
+
+    def _copied(self, time: Array, when: Array, error: Array, sway: Array, how: Imprecision) -> ImpreciseCopy:
+        """Return the plan at ``when`` with the ``error`` rad (T, n - 3) of the pelvis' turns and of the joints, the
+        centre of mass off by its ``sway`` m (T, 2).
+        """
+        error = error.copy()
+        for side in self.stances[0].quiet:  # the frame holds the hand where it is, or the arm hangs
+            error[:, 3 + np.array(self.chain.arm_columns[side]) - ROOT] = 0.0
+        x, rows = self._off(when, error, sway, how)
+        return ImpreciseCopy(self.chain.body, time, self.chain.positions(x), self.stances, rows)
+
+    def _off(self, when: Array, error: Array, sway: Array, how: Imprecision) -> tuple[Array, NDArray[np.intp]]:
+        chain, rows = self.chain, self.phase_at(when)
+        told = self.spline(when)
+        x, com, over = told[:, : chain.size], told[:, chain.size : chain.size + 2], told[:, -1]
+        if self.dance.stances[0].seat:
+            x[:, ROOT:] += error[:, 3:]
+            return x, rows
+        x[:, 3:ROOT] += how.pelvis * error[:, :3]
+        x[:, ROOT:] += error[:, 3:]
+        com = com + sway
+        (up, ankle), wanted = self._feet(rows, when), x.copy()
+        for k in range(_ROUNDS + 1):
+            x[:, 2] = self._tops(x, up, ankle) + over
+            x = self._standing(x, wanted, up, ankle)
+            if k < _ROUNDS:
+                x[:, :2] += (com - chain.mass_centre(x)[:, :2]) / _CARRIED
+        return x, rows
+
+    def _standing(self, x: Array, wanted: Array, up: Array, ankle: Array) -> Array:
+        """Return x (T, n) with legs that hold their feet, as far as these are not up; then they do as ``wanted``."""
+        out, turn = x.copy(), self.chain.root_rotation(x)
+        for side, columns in enumerate(self.chain.leg_columns):
+            own, meant = np.flatnonzero(up[:, side] < 1), wanted[:, columns]
+            flat = np.broadcast_to(UPRIGHT, (own.size, 3, 3))
+            held = self.chain.legs[side].solve(turn[own], x[own, :3], flat, ankle[own, side])
+            meant[own] = held + up[own, side, None] * (meant[own] - held)
+            out[:, columns] = meant
+        return out
+
+
+def _planted(stance: Stance) -> list[bool]:
+    return [side in stance.planted for side in (0, 1)]
+
+
+def _eased(way: Array) -> Array:
+    s = np.clip(way, 0.0, 1.0)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def _instants(phase: Phase) -> Array:
+    count = max(2, round((phase.end - phase.start) * _PLAN_RATE))
+    return np.round(np.linspace(phase.start, phase.end, count, endpoint=False), 9)
+
 
 OF_PERFORMERS = "of_performers"
 """End of the names of their margins."""

@@ -1,13 +1,8 @@
-"""Play a motion in MuJoCo: the body stands on its own feet and follows the plan by its joints alone.
-
-The simulator knows nothing of the plan's balance: the root is free, the soles are contact points on a plane with
-friction, hands, knees and head stop there, too, joints get the planned torque plus a spring and a damper to the planned
-angle, and nobody holds the body. Does it stay up on its feet alone, where does the centre of pressure go, how far is it
-from the plan? MuJoCo is an optional library (extra
-``peers``).
+"""Play a dance in MuJoCo (extra ``peers``): the root is free, the soles are contact points on a plane with friction,
+and the joints alone follow the plan. Told is whether it stays up, where the pressure goes and how far it is off.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +10,10 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.body.export import mjcf
+from biodance.dance.dance import Dance
 from biodance.dance.limits.floor import LowParts
+from biodance.dance.problem.splines import phase_at
+from biodance.dance.problem.stance import support_depth
 from biodance.errors import BiodanceError, MissingLibrary
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import poses
@@ -94,11 +92,8 @@ def floor_model(body: Body, *, friction: float = 0.5) -> Any:
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     contact: dict[str, Any] = {"solref": [HARD, 1.0], "friction": [friction, 0.0, 0.0], "condim": 3}
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=1, conaffinity=2, **contact)
-    touching = [
-        (foot.segment, corner + np.array([0.0, RADIUS, 0.0]), RADIUS)
-        for foot in body.feet.values()
-        for corner in foot.outline
-    ]
+    feet = body.feet.values()
+    touching = [(foot.segment, corner, RADIUS) for foot in feet for corner in foot.outline + np.array([0, RADIUS, 0])]
     parts = LowParts.of(body)
     for segment, place, radius in (*touching, *zip(parts.segment, parts.place, parts.radius, strict=True)):
         sphere = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": [radius, 0, 0], "pos": place, "mass": 0.0}
@@ -128,11 +123,9 @@ def _both(body: Body) -> tuple[Any, Any]:
 
 
 def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.bool_] | None = None) -> Playback:
-    """Return what becomes of ``motion`` of ``body`` (from rest, feet on the plane z = 0) when only its joints are
-    driven.
+    """Return what becomes of ``motion`` of ``body``, from rest with feet on the plane z = 0, by its joints alone.
 
-    ``down`` (T, 2) True where the right, the left foot is planned to bear; without it, where its sole is near the
-    floor.
+    ``down`` (T, 2) True where the right, the left foot is planned to bear; by default where its sole is near the floor.
 
     Raises
     ------
@@ -162,9 +155,8 @@ def play(body: Body, motion: Motion, *, friction: float = 0.5, down: NDArray[np.
             fell = float(motion.time[frame])
             break
     angle, root, tilt, floor, q = (np.array(column) for column in zip(*rows, strict=True))
-    time = motion.time[: len(rows)]
-    planned = Wrench(time, wrench.value[: len(rows)])
-    return Playback(time, angle, root, tilt, Wrench(time, floor), planned, fell, q, touched)
+    time, planned = motion.time[: len(rows)], wrench.value[: len(rows)]
+    return Playback(time, angle, root, tilt, Wrench(time, floor), Wrench(time, planned), fell, q, touched)
 
 
 def _advance(mujoco: Any, driver: "_Driver", data: Any, motion: Motion, torque: Array, frame: int) -> None:
@@ -231,3 +223,78 @@ def _floor_wrench(mujoco: Any, model: Any, data: Any) -> Array:
         force = contact.frame.reshape(3, 3).T @ local[:3]
         total += wrench_of_force(force, contact.pos)
     return total
+
+
+_RATE = 100.0
+"""Hz at which plan and playback are compared."""
+UNSURE = 0.2
+"""s around the instant at which a foot leaves the ground, or comes back, in which it may still, or already, bear: it
+rises by 10 h (t/T)³ at first, so that what sinks by 1 mm bears 0.2 s longer where h = 0.1 m in T = 2 s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rehearsal:
+    """``playback`` of the ``dance`` (its holds shortened), ``inside`` (T,) m how far the centre of pressure of the
+    simulated floor is inside the whole base of support of the feet that are planned to be down, or may be still or
+    already (`UNSURE`); negative: outside.
+    """
+
+    dance: Dance
+    playback: Playback
+    inside: Array
+
+    @property
+    def broken(self) -> tuple[str, ...]:
+        """What the plan did not foresee, in phrases: a fall, a hand on the floor, pressure outside the soles."""
+        p = self.playback
+        told = [] if p.stays_up else [f"falls at {p.fell:.1f} s of {self.dance.duration:.1f} s"]
+        told += [f"the {part.replace('_', ' ')} comes to the floor at {at:.1f} s" for part, at in p.touched.items()]
+        if (least := float(np.nanmin(self.inside))) < -RADIUS:
+            when = p.time[int(np.nanargmin(self.inside))]
+            told.append(f"the pressure is {-1000 * least:.0f} mm outside the soles at {when:.1f} s")
+        return tuple(told)
+
+    def table(self) -> str:
+        """Return what became of the dance in a few lines of Markdown."""
+        p, fate = self.playback, "; ".join(self.broken) or "stays up to the end, on its feet alone"
+        angle, gap = np.degrees(p.angle_error), 1e3 * p.zmp_error[np.isfinite(p.zmp_error)]
+        inside = 1e3 * self.inside[np.isfinite(self.inside)]
+        angle_rms, gap_rms = (np.sqrt(np.mean(error**2)) for error in (angle, gap))
+        most, least = np.quantile(gap, 0.99), np.quantile(inside, 0.01)
+        rows = (
+            ("fate", fate),
+            ("joint angles, RMS and worst gap to the plan", f"{angle_rms:.2f} and {np.abs(angle).max():.1f} deg"),
+            ("tilt of the pelvis, worst gap", f"{np.degrees(p.tilt_error.max()):.1f} deg"),
+            ("place of the pelvis, worst gap", f"{1e3 * p.root_error.max():.0f} mm"),
+            ("centre of pressure, RMS and 99 % gap", f"{gap_rms:.1f} and {most:.0f} mm"),
+            ("centre of pressure inside the soles, 1 % and least", f"{least:.0f} and {inside.min():.0f} mm"),
+        )
+        return "\n".join(["| what | found |", "|---|---|", *(f"| {what} | {found} |" for what, found in rows)])
+
+
+def rehearse(dance: Dance, *, hold: float = 0.5, friction: float = 0.5) -> Rehearsal:
+    """Return what becomes of a dance whose postures are held for ``hold`` s only, driven by its joints alone.
+
+    Raises
+    ------
+    MissingLibrary
+        MuJoCo is not installed.
+    BiodanceError
+        It is danced on a stool, which is not simulated.
+    """
+    if any(stance.seat for stance in dance.stances):
+        raise BiodanceError(f"Dance {dance.protocol}: is danced on a stool, which is not simulated. Play another one.")
+    short = replace(dance, hold=np.minimum(dance.hold, hold))
+    motion = short.motion(_RATE)
+    played = play(dance.body, motion, friction=friction, down=bearing(short, motion.time))
+    feet, inside = [phase.stance for phase in short.phases], np.full(len(played.time), -np.inf)
+    for late in (0.0, -UNSURE, UNSURE):
+        owner = phase_at(short.phases, np.clip(played.time + late, 0.0, short.duration))
+        inside = np.maximum(inside, support_depth(feet, owner, played.wrench.cop()[:, :2]))
+    return Rehearsal(short, played, inside)
+
+
+def bearing(dance: Dance, time: Array) -> NDArray[np.bool_]:
+    """Return (T, 2) True where the right, the left foot is planned to be down at instants ``time`` s."""
+    planted = np.array([[side in phase.stance.planted for side in (0, 1)] for phase in dance.phases])
+    return planted[phase_at(dance.phases, time)]

@@ -26,7 +26,7 @@ from biodance.dance.problem.excitation import excitation_blocks
 from biodance.dance.problem.plan import FOLLOWABLE_SHARE, Plan
 from biodance.dance.problem.stance import Stance
 from biodance.dance.search.move import Task, exciting_move
-from biodance.dance.search.posture import intermediate_posture
+from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
 from biodance.identification.information import Information, fold

@@ -12,14 +12,12 @@ from biodance.diagnosis.gain import Gain
 from biodance.effects import Case, NamedCause, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
-from biodance.identification.validation import BLOCK_SECONDS
+from biodance.identification.validation import BLOCK_SECONDS, FEWEST, block_interval, removed_share
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
 from biodance.spatial import wrench_about_point
 from biodance.uncertainty.bands import BANDS
 
-DRAWS = 1000
-"""Bootstrap samples of the interval."""
 _TINY = 1e-6
 """N, N·m: least unit of a channel."""
 
@@ -64,7 +62,7 @@ def residuals_of(body: Body, fits: tuple[Fit, ...], about: Array) -> Residuals:
     return Residuals(tuple(f.name for f in fits), left, tuple(f.use for f in fits), tuple(f.motion.rate for f in fits))
 
 
-def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residuals, Residuals], seed: int = 0) -> Gain:
+def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residuals, Residuals]) -> Gain:
     """Return what naming the causes gains on trials that were not used: ``before`` and ``after`` hold the same trials.
 
     ``fitted`` the same two bodies on the trials that were used: what the better one leaves there is the unit in which
@@ -79,15 +77,13 @@ def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residua
         (_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in _aligned(before, after)
     ]
     a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
-    if len(a) < 3:
+    if len(a) < FEWEST:
         raise BiodanceError(
-            f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs 3."
+            f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs {FEWEST}."
         )
-    drawn = np.random.default_rng(seed).integers(0, len(a), (DRAWS, len(a)))
-    first, second = a[drawn].sum(axis=1), b[drawn].sum(axis=1)
-    channels = np.percentile(1 - np.sqrt(second / first), [2.5, 97.5], axis=0).T
-    unit = np.maximum(_rms(fitted[1]), _TINY) ** 2
-    low, high = np.percentile(1 - np.sqrt((second / unit).sum(axis=1) / (first / unit).sum(axis=1)), [2.5, 97.5])
+    blocks, unit = np.stack([a, b], axis=2), np.maximum(_rms(fitted[1]), _TINY) ** 2
+    channels = block_interval(lambda squares: removed_share(squares, 0, 1), blocks).T
+    low, high = block_interval(lambda squares: removed_share(squares, 0, 1), (blocks / unit[:, None]).sum(axis=1))
     score, error = _density_gain(before, after, fitted)
     names = tuple(dict.fromkeys(before.names))
     return Gain(_rms(before), _rms(after), (float(low), float(high)), names, score, error, channels)

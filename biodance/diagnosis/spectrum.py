@@ -20,8 +20,8 @@ from biodance.uncertainty.tolerances import REFERENCE_PERSON
 
 _RATE = 50.0
 """Hz at which trials are looked at: derivatives of columns are still good to 7 % at the upper edge."""
-SHORTEST_RUN = 1.0
-"""s: shorter runs of used frames tell nothing about slow bands and are left out."""
+SHORTEST_RUN = 0.4
+"""s: a walker stands on one plate alone for as long; shorter runs of used frames are left out."""
 
 
 @dataclass(frozen=True, eq=False)

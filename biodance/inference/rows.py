@@ -131,17 +131,31 @@ class Rows:
         return np.asarray(one.columns(effect.name, effect.target, names) * (self.reach / own)[:, None])
 
 
-def observed_causes(evidence: ObservedEvidence, family: Mapping[str, object]) -> tuple[Candidate, ...]:
-    """Return the causes that only observations judge, with no simulated rows."""
+def with_observed(
+    causes: Sequence[Candidate],
+    evidence: ObservedEvidence,
+    family: Mapping[str, object],
+    problem: Problem | None = None,
+) -> tuple[Candidate, ...]:
+    """Return the ``causes`` and those of a ``family`` that only observations judge: they leave no trace in the
+    simulation of a ``problem`` (the zero of a plate is taken off where it is empty).
+    """
     kinds = {name: one for name, one in family.items() if isinstance(one, Effect)}
-    return tuple(
-        Candidate(
-            replace(kinds[name], target=target),
-            np.zeros((0, kinds[name].typical.size), np.float32),
-            (False,) * kinds[name].typical.size,
-        )
-        for name, target in evidence.counting.causes
-        if name in kinds
+    known, cases = {one.names for one in causes}, () if problem is None else problem.cases
+    simulated = 0 if problem is None else len(problem.target)
+    return (
+        *causes,
+        *(
+            Candidate(
+                replace(kinds[name], target=target),
+                np.zeros((simulated, kinds[name].typical.size), np.float32),
+                (False,) * kinds[name].typical.size,
+            )
+            for name, target in evidence.counting.causes
+            if name in kinds
+            and (name, target) not in known
+            and all(target in kinds[name].targets(case) for case in cases)
+        ),
     )
 
 

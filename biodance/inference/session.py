@@ -19,7 +19,7 @@ from biodance.inference.contact import with_contacts
 from biodance.inference.decision import NAMED, Inferred, decide
 from biodance.inference.hypotheses import Hypothesis, Posterior
 from biodance.inference.left import adequacy
-from biodance.inference.rows import Rows, observed_causes, rows_of
+from biodance.inference.rows import Rows, rows_of, with_observed
 from biodance.inference.scales import bare, fit, nominal, prior_sd
 from biodance.inference.sets import Search, hypothesis, infer
 from biodance.inference.unknown import with_unknown
@@ -82,12 +82,13 @@ def judge(
         bare = _with_limits(bare, seen, known, asked)
         bare = replace(bare, why={**bare.why, Reason.ONLY_STANDING: ()}) if seen.standing else bare
     if seen is not None and simulate and not seen.standing:
-        rows = rows_of(seen.problem, seen.causes, known, evidence)
-        causes = tuple(one for one in seen.causes if one.names[0] in asked)
+        every = with_observed(seen.causes, evidence, asked, seen.problem)
+        rows = rows_of(seen.problem, every, known, evidence)
     else:
-        causes = observed_causes(evidence, asked)
-        rows = rows_of(None, causes, known, evidence)
-    search, posterior = _inferred(seen, rows, causes, asked, evidence)
+        every = with_observed((), evidence, asked)
+        rows = rows_of(None, every, known, evidence)
+    search, posterior = _inferred(rows, every, asked, evidence)
+    causes = search.causes
     found = decide(search, posterior, bare)
     sign = _turned(evidence, known, causes, asked) if rows.evidence is not None else ()
     if sign:  # what all other causes do holds only once the sign is mended
@@ -97,32 +98,32 @@ def judge(
 
 
 def _inferred(
-    seen: Seen | None,
-    rows: Rows,
-    causes: tuple[Candidate, ...],
-    asked: Mapping[str, Cause],
-    evidence: ObservedEvidence,
+    rows: Rows, every: tuple[Candidate, ...], asked: Mapping[str, Cause], evidence: ObservedEvidence
 ) -> tuple[Search, Posterior]:
     """Return the search and its posterior: what looks heavier errs more with the markers; and causes are predicted
     again from the body of the most probable set where it moves otherwise than the prior's (a tilted floor pulls at the
     centre of mass that is there).
     """
-    search = Search.of(rows, causes)
-    if seen is None or rows.problem is None:
+    search = Search.of(rows, _of(every, asked))
+    if rows.problem is None:
         return search, infer(search)
-    posed, every, phi = rows.problem, seen.causes, hypothesis(search, ()).phi
+    posed, phi = rows.problem, hypothesis(search, ()).phi
     if _is_heavier(posed, phi):
         posed = posed.with_matter(phi)
-        search = Search.of(rows_of(posed, every, rows.tolerances, evidence), causes)
+        search = Search.of(rows_of(posed, every, rows.tolerances, evidence), search.causes)
     found = infer(search, _contacts)
     if not found.best.causes or not _predicts_otherwise(posed, found.best.phi):
         return search, found
     kinds = {name: one for name, one in asked.items() if isinstance(one, Effect)}
     posed = posed.with_parameters(found.best.phi)
-    every = causes_of(posed, rows.tolerances, kinds)
-    again = rows_of(posed, every, rows.tolerances, evidence)
-    search = Search.of(again, tuple(one for one in every if one.names[0] in asked))
+    every = with_observed(causes_of(posed, rows.tolerances, kinds), evidence, asked, posed)
+    search = Search.of(rows_of(posed, every, rows.tolerances, evidence), _of(every, asked))
     return search, infer(search, _contacts)
+
+
+def _of(every: tuple[Candidate, ...], asked: Mapping[str, Cause]) -> tuple[Candidate, ...]:
+    """Return those of the family that is asked for."""
+    return tuple(one for one in every if one.names[0] in asked)
 
 
 def _is_heavier(posed: Problem, phi: Array) -> bool:

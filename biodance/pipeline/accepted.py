@@ -94,7 +94,9 @@ def _session_toml(session: Session) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> MendedCopy | None:
+def with_right_labels(
+    result: SessionResult, *, reference: SessionIdentification | None = None, tell: Callable[[str], None]
+) -> MendedCopy | None:
     """Return the session examined again with those labels exchanged that carry each other's names; None where none do.
 
     Proven before it is kept: a trial that the body follows clearly worse with other names (`WORSE`) keeps its own.
@@ -103,7 +105,7 @@ def with_right_labels(result: SessionResult, *, tell: Callable[[str], None]) -> 
     while found:
         tell("examining a copy with the labels exchanged")
         trials = tuple(renamed(trial, found.get(trial.name, {})) for trial in result.session.trials)
-        mended = examine(replace(result.session, trials=trials), known=result.known)
+        mended = examine(replace(result.session, trials=trials), reference=reference, known=result.known)
         worse = {
             after.name
             for before, after in zip(result.trials, mended.trials, strict=True)

@@ -19,15 +19,13 @@ from biodance.dance.dance import Dance
 from biodance.dance.design import design
 from biodance.dance.expectation import Expectation, expect
 from biodance.dance.limits import Limit
-from biodance.dance.metrics import dance_metrics
 from biodance.dance.performers import OF_PERFORMERS
 from biodance.dance.problem.person import PersonLimits, fit_to_person
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.shapes import pairs_of
 from biodance.dance.robot import design_robot, expect_robot, robot_plan
-from biodance.dance.search.no_next_posture import NoNextPosture
-from biodance.dance.search.word_course import freer_dance
-from biodance.dance.verify import Margin, broken
+from biodance.dance.search.word_course import NoNextPosture, freer_dance
+from biodance.dance.verify import Margin, broken, dance_metrics
 from biodance.display import cause_in_words
 from biodance.errors import BiodanceError
 from biodance.pipeline.dance_result import DanceResult

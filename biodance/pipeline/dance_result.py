@@ -11,12 +11,11 @@ from biodance.body.body import Body
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import Expectation
 from biodance.dance.limits import ForImprecise, family
-from biodance.dance.metrics import DanceMetrics, longest_alone
 from biodance.dance.performers import OF_PERFORMERS, PERFORMER_COUNT, for_imprecise
-from biodance.dance.problem.footprint import room_in_words, room_on_plates
+from biodance.dance.problem.feet import room_in_words, room_on_plates
 from biodance.dance.problem.plan import Plan
-from biodance.dance.search.mirror import counterpart
-from biodance.dance.verify import Margin, broken
+from biodance.dance.search.postures import counterpart
+from biodance.dance.verify import DanceMetrics, Margin, broken, longest_alone
 from biodance.records import Session
 
 if TYPE_CHECKING:

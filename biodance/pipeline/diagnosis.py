@@ -19,12 +19,13 @@ from biodance.diagnosis.repairs import named_first, with_failed, with_repairs
 from biodance.diagnosis.witness_evidence import collect_evidence
 from biodance.discovery import Chosen
 from biodance.effects import Cause, DiscreteEffect, Effect, causes, check_quality
+from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
-from biodance.pipeline.accepted import with_faults_undone
+from biodance.pipeline.accepted import with_faults_undone, with_right_labels
 from biodance.pipeline.attention import reconcile_with_checks
 from biodance.pipeline.gains import accepted, with_proven_corrections
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
@@ -126,21 +127,21 @@ def diagnose_session(
     reference: SessionIdentification | None = None,
     tolerances: Tolerances | None = None,
     effects: Chosen[Effect | DiscreteEffect] = None,
-    mended: MendedCopy | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionDiagnosis:
     """Return the diagnosis of an examined session, with the gain of every finding on the trials that were kept.
 
     ``reference`` an earlier session of the same person without fault or load: its posterior is then what is known of
     the body; ``tolerances`` as learned by the laboratory; ``effects`` names limit the causes to these, objects
-    (``[MyEffect()]``) join the family; ``mended`` says which labels were put right where ``result`` is of a copy
-    (`with_right_labels`): they are named first. Faults too large for gates and statistics are undone in a copy, too.
+    (``[MyEffect()]``) join the family. Exchanged labels, and faults too large for gates and statistics, are undone in a
+    copy (`with_right_labels`, `with_faults_undone`), named first, and everything else is judged there.
 
     Where nothing can be judged, the verdict is "unexplained", and the first sentence says "Cannot tell".
     """
     tell("looking for faults too large for statistics")
     family = causes(effects)
-    mended = with_faults_undone(result, mended, family, reference=reference, tell=tell)
+    right = with_right_labels(result, reference=reference, tell=tell) if LabelsSwapped.name in family else None
+    mended = with_faults_undone(right.result if right else result, right, family, reference=reference, tell=tell)
     result = result if mended is None else mended.result
     found = _judged(result, family, reference=reference, tolerances=tolerances, tell=tell)
     whole = of_family(found.diagnosis, family)

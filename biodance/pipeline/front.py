@@ -11,7 +11,6 @@ from biodance.discovery import Chosen
 from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
-from biodance.pipeline.accepted import with_right_labels
 from biodance.pipeline.body import refuse_another_reference
 from biodance.pipeline.by_paper import by_paper
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
@@ -162,7 +161,6 @@ def diagnose(
     reference: Earlier | None = None,
     effects: Chosen[Effect | DiscreteEffect | type[Effect | DiscreteEffect]] = None,
     tolerances: Tolerances | None = None,
-    accept: bool = False,
     body: Body | str | Path | None = None,
     lab: str | Path | None = None,
     tell: _Tell = _silent,
@@ -181,8 +179,6 @@ def diagnose(
         The causes to look for, by name or as objects of your own; by default all.
     tolerances : Tolerances, optional
         Of everything that is no fault, as learned by a laboratory.
-    accept : bool
-        Exchange labels that carry each other's names in a copy, and go on with that (`SessionDiagnosis.mended`).
     body : Body, str or pathlib.Path, optional
         The same person's body of an earlier visit (body.json): what is known before, instead of the table.
     lab : str or pathlib.Path, optional
@@ -222,10 +218,8 @@ def diagnose(
     before = None if reference is None else _earlier(reference, tell)
     result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
     known = tolerances or read_lab(lab).tolerances
-    right = with_right_labels(result, tell=tell) if accept else None
-    result = result if right is None else right.result
     result = result if before is None else _beside(result, before)
-    return diagnose_session(result, reference=before, tolerances=known, effects=asked, mended=right, tell=tell)
+    return diagnose_session(result, reference=before, tolerances=known, effects=asked, tell=tell)
 
 
 def compare_sessions(earlier: Earlier, later: Earlier, *, tell: _Tell = _silent) -> SessionComparison:

@@ -13,8 +13,8 @@ from biodance.records import Subject
 
 if TYPE_CHECKING:
     from biodance.dance.dance import Dance
+    from biodance.dance.expectation import PerformanceScore
     from biodance.dance.limits import Limit
-    from biodance.dance.scoring import PerformanceScore
     from biodance.dance.verify import Margin
     from biodance.pipeline.dance_result import DanceResult
     from biodance.pipeline.results import SessionResult
@@ -81,8 +81,7 @@ def design_dance(
         ...
     biodance.errors.BiodanceError: The mass is 6.5 kg; a dance is designed for 30 to 200 kg. Correct it.
     """
-    from biodance.dance.problem.person import HEALTHY
-    from biodance.dance.problem.person_file import read_person
+    from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
     from biodance.pipeline.dance import dancer, designed_for, make_dance
 
@@ -136,8 +135,7 @@ def verify_dance(
     True
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.problem.person import HEALTHY, fit_to_person
-    from biodance.dance.problem.person_file import read_person
+    from biodance.dance.problem.person import HEALTHY, fit_to_person, read_person
     from biodance.dance.problem.plan import read_plan
     from biodance.dance.verify import verify
 
@@ -181,7 +179,7 @@ def simulate(
         tempo wanders by 5, 10, 20 %, about a duration 1.1, 1.2, 1.2 times the planned one; sway 0.7, 1 and 1.5 times
         the usual.
     lab_seed : int, optional
-        Number of a laboratory of the family (`virtual_lab.recording.family`): other plates, cameras, soft tissue,
+        Number of a laboratory of the family (`virtual_lab.recording.laboratory`): other plates, cameras, soft tissue,
         tolerances. None = the usual one.
 
     Returns
@@ -206,8 +204,8 @@ def simulate(
     """
     from biodance.virtual_lab.faults.causes import hide, parse_cause
     from biodance.virtual_lab.movement.protocol import read_protocol
-    from biodance.virtual_lab.recording.family import draw_laboratory
-    from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, LabVisit
+    from biodance.virtual_lab.recording.laboratory import draw_laboratory
+    from biodance.virtual_lab.recording.visit import FIRST_VISIT, LabVisit
     from biodance.virtual_lab.simulate import check_simulated
     from biodance.virtual_lab.simulate import simulate_session as write_session
 
@@ -279,7 +277,7 @@ def performance_of(result: "SessionResult", dance: "Dance | str | Path") -> "Per
         The dance is of another body, or nothing was recorded.
     """
     from biodance.dance.dance import Dance
-    from biodance.dance.scoring import score_performance
+    from biodance.dance.expectation import score_performance
     from biodance.pipeline.identification import FITTED_ROLES
     from biodance.pipeline.trial_result import trial_fit
 

@@ -33,7 +33,7 @@ from biodance.uncertainty.plates import around_zero
 if TYPE_CHECKING:
     import pandas as pd
 
-    from biodance.dance.scoring import PerformanceScore
+    from biodance.dance.expectation import PerformanceScore
 
 FITTED_ROLES: tuple[Role, ...] = ("fit",)
 KEPT_ROLES: tuple[Role, ...] = ("validate", "check")

@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 
 from biodance.dance.dance import Dance
-from biodance.dance.problem.stance import Phase
+from biodance.dance.problem.splines import Phase
 from biodance.errors import BiodanceError
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array, Motion, Subject
 from biodance.spatial import zero_moment_point
 from biodance.virtual_lab.faults.causes import Hidden, hide
-from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.dancing import USUAL_PERFORMER, Performer, Shown, copy_dance
 from biodance.virtual_lab.movement.performance import Performance
+from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import Person
-from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, Instruments, LabVisit, perform_in
+from biodance.virtual_lab.recording.visit import FIRST_VISIT, Instruments, LabVisit, perform_in
 from biodance.virtual_lab.simulate import write_visit
 
 _RATE = 100.0

@@ -9,8 +9,7 @@ import numpy as np
 from biodance import display
 from biodance.errors import TrialRefused
 from biodance.records import Array, Plate, freeze
-from biodance.registration.alignment import Alignment
-from biodance.registration.pose import Forces, FramePose
+from biodance.registration.alignment import Alignment, Forces, FramePose
 from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
 
 if TYPE_CHECKING:

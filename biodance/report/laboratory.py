@@ -1,15 +1,14 @@
-"""What a laboratory learned: ``lab.toml``, to be read by people and by ``--lab``, and what `biodance plates` and
-`biodance learn` print.
+"""What a laboratory learned: ``lab.toml``, to be read by people and by ``--lab``, numbers for programs, and what
+`biodance learn` prints.
 
 ``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`),
 every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and observations;
-``[normal."..."]`` are bands of joint angles, moments and powers. Corrections
-that were accepted stand in ``[corrections]`` of the same file.
+``[normal."..."]`` are bands of joint angles, moments and powers. Corrections that were accepted stand in
+``[corrections]`` of the same file.
 """
 
 import json
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 from rich.console import Console
@@ -18,10 +17,41 @@ from biodance.cycles.curves import normal_toml
 from biodance.errors import SessionRefused
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.report.files import refuse_missing_folder
-from biodance.report.tables.laboratory import CARD_ROW, HARDLY, NORM_ROW
-from biodance.report.tables.schema import Row
+from biodance.report.plates import print_left_out
+from biodance.report.tables.schema import Row, Schema
 from biodance.report.terminal import print_line, print_table
 from biodance.uncertainty.tolerances import shipped, to_toml
+
+HARDLY = 0.5
+"""Coefficients below which a size is the shipped one."""
+NORM_ROW = Schema(
+    "name value sd between_sessions_sd=between unit sessions observations",
+    shown="what: {name} | usual: {value:.3g} | sd between sessions: {between_sessions_sd:.2g} | unit: {unit} | "
+    "sessions: {sessions}",
+)
+"""What is usual of instruments, people and observations."""
+
+
+def learned_document(found: LearnedLaboratory) -> Row:
+    """Return what was learned: sessions, norms, and the sizes that changed most."""
+    before = shipped()
+    ratio = {
+        key: size / before.size(key)
+        for key, size in found.tolerances.sizes.items()
+        if before.size(key) > 0 and found.shown.get(key, 0.0) >= HARDLY
+    }
+    most = sorted(ratio, key=lambda key: -max(ratio[key], 1 / ratio[key]))[:10]
+    return {
+        "sessions": list(found.sessions),
+        "left_out": dict(found.left_out),
+        "learned_utc": found.created,
+        "norms": NORM_ROW.rows(found.norms),
+        "changed_most": [
+            {"key": key, "size": found.tolerances.size(key), "shipped": before.size(key), "values": found.shown[key]}
+            for key in most
+        ],
+    }
+
 
 _SIZE = re.compile(r'^"(?P<key>[^"]+)" = (?P<value>[-+.\deE]+)$')
 
@@ -102,28 +132,10 @@ def refuse_existing(path: Path) -> None:
     refuse_missing_folder(path)
 
 
-def _print_left_out(left_out: Mapping[str, str], console: Console) -> None:
-    for what, why in left_out.items():
-        print_line(console, f"{what} was left out: {why.splitlines()[0]}")
-
-
-def print_plates(document: Row, console: Console) -> None:
-    """Print a row per plate, then everything that a person must see."""
-    print_table(CARD_ROW, document["plates"], console)
-    for one in document["attention"]:
-        print_line(console, one["text"])
-    for person in document["persons"]:
-        for one in person["findings"]:
-            print_line(console, f"Person {person['person']}: {one['text']}")
-    _print_left_out(document["refused"], console)
-    for note in document["notes"]:
-        print_line(console, note)
-
-
 def print_learned(document: Row, console: Console) -> None:
     """Print what a laboratory learned: sessions, norms, what changed most."""
     print_line(console, f"Learned from {len(document['sessions'])} sessions: {', '.join(document['sessions'])}")
     print_table(NORM_ROW, document["norms"], console)
     for one in document["changed_most"]:
         print_line(console, f"{one['key']}: {one['size']:.3g} instead of {one['shipped']:.3g}")
-    _print_left_out(document["left_out"], console)
+    print_left_out(document["left_out"], console)

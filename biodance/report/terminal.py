@@ -11,12 +11,11 @@ from rich.text import Text
 
 from biodance.diagnosis.consequence import LIMIT
 from biodance.diagnosis.diagnosis import ABOUT
-from biodance.display import cause_in_words, spaced
+from biodance.display import cause_in_words
 from biodance.doctor import MachineFinding
 from biodance.errors import without_codes
 from biodance.pipeline.results import SessionResult
 from biodance.records.attention import Attention, told_together, without_path
-from biodance.report.tables.dance import EXPECTED_ROW, MARGIN_ROW
 from biodance.report.tables.diagnosis import LIMIT_ROW
 from biodance.report.tables.identification import SEGMENT_ROW
 from biodance.report.tables.schema import Row, Schema, shown
@@ -158,17 +157,6 @@ def print_identification(found: Row, console: Console) -> None:
         print_line(console, f"note: {note}")
 
 
-def print_robot_diagnosis(found: Row, console: Console) -> None:
-    """Print what is not as drawn about a robot (`robot_document`): the verdict, causes with size and evidence."""
-    print_attention(found["attention"], console)
-    print_line(console, f"verdict: {found['diagnosis']['verdict']}")
-    for one in found["diagnosis"]["findings"]:
-        size = f"{format_number(one['value'], 4)} ± {format_number(1.96 * one['sd'], 4)} {one['unit']}".rstrip()
-        others = f"; it could also be {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
-        text = f"{spaced(one['cause'])}, {one['where']}: {size}, {one['evidence_nats']:.0f} nats{others}"
-        print_line(console, text)
-
-
 def _print_performance(found: Row, console: Console) -> None:
     """Print how well a dance was danced, and which transitions to dance once more."""
     print_line(console, f"dance {found['dance']}, share of the table's variance removed, reached (planned):")
@@ -259,23 +247,6 @@ def _print_witnesses(found: Row, console: Console) -> None:
     seen, blind = (sum(bool(row["witnesses"]) is looked for row in found["witness_table"]) for looked in (True, False))
     text = f"feet, clocks and empty plates would show {seen} causes and {blind} not: how small, and "
     print_line(console, f"{text}what looks like what, stands in the page and in results.json")
-
-
-def print_dance(found: Row, console: Console) -> None:
-    """Print what was designed: its size, its criteria, the margins and what will be known."""
-    if found["feasible"]:
-        criterion = found["criterion"]
-        print_line(console, shown("{postures} postures, {transitions} moves, {duration_s:0} s ({protocol})", found))
-        share = criterion["static"] / criterion["static_bound"]
-        print_line(console, f"static criterion {criterion['static']:.1f} kg, {share:.2f} of its bound")
-        print_table(MARGIN_ROW, found["margins"], console, title="least margins")
-        print_table(EXPECTED_ROW, found["expected_sd"], console, title="expected standard deviations")
-        if criterion["hardly_excited"]:
-            print_line(console, f"hardly tilted: {', '.join(criterion['hardly_excited'])}")
-    if found["simplicity_price"]:
-        print_line(console, found["simplicity_price"]["sentence"])
-    for note in (*found["warnings"], *found["emphasis"], *found["notes"]):
-        print_line(console, f"look: {note}")
 
 
 _PART = Schema("", shown="part: {name} | state: {state} | what: {text}")

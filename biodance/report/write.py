@@ -29,7 +29,7 @@ from biodance.report.pages.diagnosis import diagnosis_page, diagnosis_section
 from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
-from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, diagnosis_document
+from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
 from biodance.report.tables.identification import corrected_document, identification_document
 from biodance.report.tables.schema import plain_values, to_text
 from biodance.report.tables.session import PROVENANCE_ROW, filter_document, movement_document, results_document
@@ -158,7 +158,7 @@ def _accepted(
     written, kept = write_mended(result.session, found.mended, folder) if found.mended else ((), ())
     body, proven = found.accepted, found.gain is not None and found.gain.proven
     if body is not None and body.status == "solved" and proven:
-        named = ", ".join(_cause(one) for one in findings if one.changes)
+        named = ", ".join(cause_name((one.effect, one.target)) for one in findings if one.changes)
         files[BODY_FILE] = body_text(body.identified, f"S{name[1:]}: identified with {named} accepted.")
         written = (*written, Written(BODY_FILE, f"the body identified with {named} accepted"))
     made = accepted_corrections((one for one in findings if one.gain and one.gain.proven), name)
@@ -174,10 +174,10 @@ def _accepted(
         "files": [*sorted(files), *(one.file for one in written if one.file not in files)],
         "corrections": [*dict.fromkeys(f"{one.text} Put right in a copy." for one in undone), *map(str, made)],
         "trials": trials,
-        "not_in_recordings": [_cause(one) for one in findings if (one.effect, one.target) not in others],
+        "not_in_recordings": [cause_name(key) for one in findings if (key := (one.effect, one.target)) not in others],
         "refused": [*refused, *kept],
         "written": [one._asdict() for one in (*written, *_of_trials(trials, rewritten))],
-        "not_applied": [{"cause": " ".join(names).strip(), "why": why} for names, why in left.items()],
+        "not_applied": [{"cause": cause_name(names), "why": why} for names, why in left.items()],
     }
     return document, files
 
@@ -190,10 +190,6 @@ def _of_trials(trials: tuple[str, ...], changes: tuple[str, ...]) -> list[Writte
     beside = Written(f"{CORRECTED}/{APPLIED}", f"says what was taken off: {told}")
     roles = Written(f"{CORRECTED}/session.toml", "subject and roles")
     return [beside, roles, *(Written(f"{CORRECTED}/{trial}.c3d", f"taken off: {told}") for trial in trials)]
-
-
-def _cause(one: Finding) -> str:
-    return f"{one.effect} {one.target}".strip()
 
 
 def _not_applied(findings: tuple[Finding, ...], *, proven: bool) -> dict[tuple[str, str], str]:

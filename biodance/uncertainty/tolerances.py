@@ -162,13 +162,17 @@ def without_habits(found: Tolerances) -> Tolerances:
     return replace(found, sizes={**found.sizes, **wider}, means=physics)
 
 
+_LEARNED = ("null_sessions", "family", "real_laboratories")
+"""Where the sizes were learned by which sessions without fault are judged."""
+
+
 def table_sizes() -> dict[str, float]:
     """Return the sizes of the one table that sessions without fault are judged by, by key: the learned ones, and
     those of joints before any functional calibration.
     """
     sizes = {}
     for row in error_rows():
-        if row["learned_on"] in ("null_sessions", "family") or row["quantity"] in CALIBRATED:
+        if row["learned_on"] in _LEARNED or row["quantity"] in CALIBRATED:
             key = " ".join((row["quantity"], row["target"])).removesuffix(" session")
             sizes[key + (BEFORE if row["state"] == "before" else "")] = float(row["sd"])
     return sizes

@@ -20,12 +20,12 @@ from biodance.virtual_lab.faults.forces import wobbling_mass
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.person.prosthesis import with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
-from biodance.virtual_lab.recording.family import SWINGING, soft_parts
-from biodance.virtual_lab.recording.laboratory import (
+from biodance.virtual_lab.recording.laboratory import SWINGING, Laboratory, soft_parts
+from biodance.virtual_lab.recording.visit import (
     FIRST_VISIT,
     Instruments,
-    Laboratory,
     LabVisit,
     perform_in,
     record,
@@ -96,9 +96,9 @@ def write_visit(
         loads=loads,
         session=visit.number,
         joint_shifts=visit.joint_shifts,
-        lighter_limbs=visit.lighter_limbs,
         population=visit.laboratory.population,
     )
+    person = with_prostheses(person, visit.lighter_limbs)
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
     with whole_folder(out) as part:
         _write(plan, person, instruments, visit, performed, part)

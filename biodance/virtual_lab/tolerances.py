@@ -7,7 +7,7 @@ in-situ measurements. Every tolerance can be set to zero alone (``dataclasses.re
 zero.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from zlib import crc32
 
 import numpy as np
@@ -62,14 +62,6 @@ class LabTolerances:
 
 REALISTIC = LabTolerances(**{row["quantity"]: float(row["sd"]) for row in error_rows(whose="virtual")})
 PERFECT = LabTolerances(**{f.name: 0.0 for f in fields(LabTolerances)})
-
-
-def instruments_perfect(tolerances: LabTolerances = REALISTIC) -> LabTolerances:
-    """Return the tolerances with perfect plates, cameras and bone-fixed markers, but an unchanged person and motion."""
-    from_skin_on = [f.name for f in fields(LabTolerances)][
-        list(LabTolerances.__dataclass_fields__).index("marker_placement") :
-    ]
-    return replace(tolerances, **dict.fromkeys(from_skin_on, 0.0))
 
 
 def stream(seed: int, *purpose: str) -> np.random.Generator:

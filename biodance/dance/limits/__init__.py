@@ -21,9 +21,9 @@ from biodance.dance.limits._checked import CheckedMotion as CheckedMotion
 from biodance.dance.limits._checked import ForImprecise as ForImprecise
 from biodance.dance.limits._checked import ImpreciseCopy as ImpreciseCopy
 from biodance.dance.limits._checked import Remaining as Remaining
-from biodance.dance.problem.nlp import FAR as FAR
-from biodance.dance.problem.nlp import Margins as Margins
 from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import FAR as FAR
+from biodance.dance.problem.state import Margins as Margins
 from biodance.dance.problem.state import State
 from biodance.discovery import Family
 from biodance.errors import BiodanceError, UnknownName

@@ -1,5 +1,5 @@
-"""A stretch of any motion, as the check of every limit sees it: an ordinary Motion of the body, nothing of the design's
-coordinates; and a copy by somebody imprecise, as what a limit demands of such people sees it.
+"""A motion as the check of every limit sees it, nothing of the design's coordinates; what is left of a limit; and a
+copy by somebody imprecise, as what a limit demands of such people sees it.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from biodance.body.body import Body
 from biodance.body.inertia import rigid_inertia
 from biodance.body.parts import GRAVITY
-from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.stance import Stance, support_depth
 from biodance.motion.dynamics import distribute, joint_torques
 from biodance.motion.kinematics import Poses, poses
 from biodance.motion.regressor import predict_wrench
@@ -124,11 +124,7 @@ class ImpreciseCopy:
         """Return how far (T,) m the zero-moment point lies inside the base of support of all feet on the ground, drawn
         together to ``share``.
         """
-        point, out = self.zero_moment_point, np.full(len(self.q), np.inf)
-        for k in np.unique(self.on):
-            normals, offsets = self.stances[k].whole.reduced(share)
-            out[self.on == k] = (point[self.on == k] @ normals.T + offsets).min(axis=1)
-        return out
+        return support_depth(self.stances, self.on, self.zero_moment_point, share)
 
 
 @dataclass(frozen=True)
@@ -156,3 +152,16 @@ def _vector(turn: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """What is left of one limit at its worst: ``worst`` in ``unit`` (negative: broken), at ``where_s`` s, of ``what``
+    (a joint, a pair).
+    """
+
+    limit: str
+    worst: float
+    where_s: float
+    unit: str
+    what: str = ""

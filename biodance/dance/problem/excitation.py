@@ -12,7 +12,6 @@ over the joints, angles in units of half the joint's range:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -64,7 +63,7 @@ def _spectrum(gram: Array) -> tuple[Array, Array]:
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """What counts of each segment: ``first`` (of MX, MY, MZ) and ``second`` (of the six inertias) base columns,
-    ``weight`` (N,) kg; and of the performer: ``simplicity``, what a hardness of 1 (`simplicity.hardness`) is worth
+    ``weight`` (N,) kg; and of the performer: ``simplicity``, what a hardness of 1 (`effort`) is worth
     in mean condition numbers.
     """
 
@@ -125,29 +124,17 @@ def upright_slopes(state: State, slope: Array) -> Array:
     return np.einsum("tnc,tkc,nk->tk", lever, state.twists[:, :, 3:], moved)
 
 
-class Inertias:
-    """The moment K(w, dw) (3, 6) by the six inertias of one segment: dw-part and w-w-part as constant tensors."""
-
-    @cached_property
-    def linear(self) -> Array:
-        """(3, 3, 6): linear[c] = K of unit acceleration along c."""
-        out = np.zeros((3, 3, 6))
-        for k, (i, j) in enumerate(TENSOR):
-            out[j, i, k] = out[i, j, k] = 1.0
-        return out
-
-    @cached_property
-    def square(self) -> Array:
-        """(3, 3, 3, 6): sum_bc w_b w_c square[b, c] = w x (I w)."""
-        return np.einsum("bij,cjk->bcik", skew(np.eye(3)), self.linear)
-
-
-INERTIAS = Inertias()
+_LINEAR = np.zeros((3, 3, 6))
+"""[c]: the moment K (3, 6) by the six inertias of one segment of unit angular acceleration along c."""
+for _k, (_i, _j) in enumerate(TENSOR):
+    _LINEAR[_j, _i, _k] = _LINEAR[_i, _j, _k] = 1.0
+_SQUARE = np.einsum("bij,cjk->bcik", skew(np.eye(3)), _LINEAR)
+"""(3, 3, 3, 6): sum_bc w_b w_c _SQUARE[b, c] = w x (I w)."""
 
 
 def moments(w: Array, dw: Array) -> Array:
     """Return K (..., 3, 6) of angular velocity and acceleration (..., 3) in the segment's frame."""
-    return np.einsum("...c,cik->...ik", dw, INERTIAS.linear) + np.einsum("...b,...c,bcik->...ik", w, w, INERTIAS.square)
+    return np.einsum("...c,cik->...ik", dw, _LINEAR) + np.einsum("...b,...c,bcik->...ik", w, w, _SQUARE)
 
 
 def turning(state: State, segments: list[int]) -> tuple[Array, Array]:
@@ -168,8 +155,8 @@ def dynamic_slopes(state: State, segments: list[int], slope: Array) -> Array:
     """Return (3, T, n) derivative by x, v, a of sum <slope (S, 6, 6), K'K>."""
     w, dw = turning(state, segments)
     Y = 2 * np.einsum("tsik,skl->tsil", moments(w, dw), slope)
-    by_dw = np.einsum("tsik,cik->tsc", Y, INERTIAS.linear)
-    by_w = np.einsum("tsik,tsb,bcik->tsc", Y, w, INERTIAS.square + np.swapaxes(INERTIAS.square, 0, 1))
+    by_dw = np.einsum("tsik,cik->tsc", Y, _LINEAR)
+    by_w = np.einsum("tsik,tsb,bcik->tsc", Y, w, _SQUARE + np.swapaxes(_SQUARE, 0, 1))
     links = [state.chain.carriers[i] for i in segments]
     turn, moved = state.rotation[:, segments], state.chain.ancestors[links]
     by_dw, by_w = (np.einsum("tsij,tsj->tsi", turn, s) for s in (by_dw, by_w))

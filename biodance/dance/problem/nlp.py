@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from biodance.dance.limits import Limit
 from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.stance import Stance
 from biodance.dance.problem.state import Closure, State, close_legs
@@ -26,37 +27,6 @@ Objective = Callable[[State], tuple[float, Array]]
 def no_objective(state: State) -> tuple[float, Array]:
     """Objective of a problem that has none: any point that keeps the limits will do."""
     return 0.0, np.zeros((3, *state.x.shape))
-
-
-FAR = 2.0
-"""Scales from its limit beyond which the slopes of a margin do not count."""
-
-
-@dataclass(frozen=True, eq=False)
-class Margins:
-    """``value`` (T, m) >= 0 where the limit holds; ``slopes`` (k, T, m, n) by x, v, a in this order, k = 1, 2 or 3 as
-    far as needed.
-
-    Columns that are further than ``FAR`` scales from their limit in all samples may have slopes of zero.
-    """
-
-    value: Array
-    slopes: Array
-
-
-class Constraint(Protocol):
-    """What the problem needs of a limit."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def scale(self) -> float:
-        """A noticeable amount of it."""
-
-    def margins(self, state: State) -> Margins:
-        """Return what is left of it in every sample."""
 
 
 def free_coordinates(chain: Chain, stance: Stance) -> list[int]:
@@ -76,7 +46,7 @@ class NonlinearProgramme:
     base: Array
     basis: Array
     free: list[int]
-    limits: tuple[Constraint, ...]
+    limits: tuple[Limit, ...]
     objective: Objective
     reserve: Array
 

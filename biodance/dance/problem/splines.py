@@ -6,16 +6,19 @@ constant matrices times the points.
 """
 
 from dataclasses import dataclass, fields
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import BSpline
 
-from biodance.dance.problem.stance import Phase
+from biodance.dance.problem.stance import Stance
 from biodance.errors import BiodanceError
-from biodance.records import Array, freeze
+from biodance.records import Array, Index, freeze
 
 _DEGREE = 5
 """Order six: continuous up to the fourth derivative."""
+_THIRDS = np.array([0.20987654, 0.79012346])
+"""Of the way at one and two thirds of the time, for least jerk (10 s³ - 15 s⁴ + 6 s⁵)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,28 @@ def basis_at(time: Array, duration: float, *, via: int = 2) -> Basis:
     conditions = np.concatenate([spline(through), spline(stops, nu=1), spline(stops, nu=2)])
     coefficients = np.linalg.inv(conditions)[:, : via + 2]
     return Basis(time, *(spline(time, nu=nu) @ coefficients for nu in range(3)))
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of a dance from ``start`` to ``end`` s on the same feet; ``posture`` is held, or moved to."""
+
+    start: float
+    end: float
+    kind: Literal["hold", "move"]
+    stance: Stance
+    posture: int
+
+
+def phase_at(phases: tuple[Phase, ...], time: Array) -> Index:
+    """Return which of the ``phases`` every instant (T,) s lies in."""
+    starts = np.array([phase.start for phase in phases])
+    return np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+
+
+def straight_via(start: Array, end: Array) -> Array:
+    """Return the via points (..., 2, n) of the moves of least jerk from ``start`` to ``end`` (..., n)."""
+    return np.asarray(start[..., None, :] + _THIRDS[:, None] * (end - start)[..., None, :])
 
 
 def path_in(phase: Phase, postures: Array, via: Array, time: Array) -> tuple[Array, Array, Array]:

@@ -1,8 +1,9 @@
 """Where the feet stand and which part of the ground may carry the weight."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -237,27 +238,21 @@ def stance_words(stance: Stance) -> str:
     return _FEET[stance.name] + weight
 
 
-@dataclass(frozen=True)
-class Phase:
-    """A stretch of a dance from ``start`` to ``end`` s on the same feet; ``posture`` is held, or moved to."""
-
-    start: float
-    end: float
-    kind: Literal["hold", "move"]
-    stance: Stance
-    posture: int
-
-
 def stance_fields(stance: Stance) -> dict[str, Any]:
     """Return a stance in words that JSON knows."""
     found = {field.name: getattr(stance, field.name) for field in fields(stance)}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
 
 
-def phase_at(phases: tuple[Phase, ...], time: Array) -> Index:
-    """Return which of the ``phases`` every instant (T,) s lies in."""
-    starts = np.array([phase.start for phase in phases])
-    return np.clip(np.searchsorted(starts, time + 1e-9, side="right") - 1, 0, None)
+def support_depth(stances: Sequence[Stance], on: Index, point: Array, share: float = 1.0) -> Array:
+    """Return how far (T,) m each ``point`` (T, 2) lies inside the base of all planted feet of its stance
+    ``stances[on[t]]``, drawn together to ``share``; negative outside.
+    """
+    out = np.empty(len(point))
+    for k in np.unique(on):
+        normals, offsets = stances[k].whole.reduced(share)
+        out[on == k] = (point[on == k] @ normals.T + offsets).min(axis=1)
+    return out
 
 
 _TINY = 1e-30

@@ -13,15 +13,22 @@ from numpy.typing import NDArray
 
 from biodance.dance.problem.chain import Chain
 from biodance.dance.problem.excitation import static_grams
+from biodance.dance.problem.feet import support_sequence
 from biodance.dance.problem.plan import Plan
 from biodance.dance.problem.stance import Stance, stance_words
-from biodance.dance.problem.support import support_sequence
-from biodance.dance.search.context import DesignContext
-from biodance.dance.search.course import Course, PlainStep
-from biodance.dance.search.exciting_moves import with_exciting_moves
+from biodance.dance.search.course import Course, DesignContext, PlainStep, with_exciting_moves
 from biodance.dance.search.information import PostureInformation, update_posterior
-from biodance.dance.search.posture import KEPT, Exciting, initial_guess, intermediate_posture, posture_at, solve
-from biodance.dance.search.posture_set import alike, criterion, find_postures
+from biodance.dance.search.postures import (
+    KEPT,
+    Exciting,
+    alike,
+    criterion,
+    find_postures,
+    initial_guess,
+    intermediate_posture,
+    posture_at,
+    solve,
+)
 from biodance.errors import BiodanceError
 from biodance.records import Array
 

@@ -47,11 +47,11 @@ def look() -> Iterator[None]:
         yield
 
 
-def figure(height: float, *, width: float = FIGURE_WIDTH) -> "Figure":
-    """Return an empty figure of ``width`` x ``height`` inch that belongs to no window."""
+def figure(height: float) -> "Figure":
+    """Return an empty figure of ``height`` inch that belongs to no window."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(figsize=(FIGURE_WIDTH, height), layout="constrained")
 
 
 def svg_address(drawn: "Figure") -> str:

@@ -18,8 +18,20 @@ from biodance.pipeline.provenance import Provenance, now
 from biodance.pipeline.results import SessionResult
 from biodance.records import CHANNEL_TITLES, CHANNELS
 from biodance.records.attention import told_together
-from biodance.report.figures.curves import Curve, CurveFigure, Strip
-from biodance.report.figures.vector import LEFT_SIDE, RIGHT_SIDE, Axis, Frame, Stroke, panel, points, rule, segments
+from biodance.report.figures.vector import (
+    LEFT_SIDE,
+    RIGHT_SIDE,
+    Axis,
+    Curve,
+    CurveFigure,
+    Frame,
+    Strip,
+    Stroke,
+    panel,
+    points,
+    rule,
+    segments,
+)
 from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.tables.diagnosis import CONFUSION_ROW, LIMIT_ROW, OBSERVED_ROW, VISIBILITY_ROW, observed_rows
 from biodance.report.tables.schema import Row, Schema

@@ -16,14 +16,16 @@ from biodance.motion.regressor import Agreement
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNEL_TITLES, AngleState
 from biodance.report.figures.bodies import ROW, mass_figure, shape_figure
-from biodance.report.figures.curves import Curve, CurveFigure, Strip
 from biodance.report.figures.session import bar_list
 from biodance.report.figures.vector import (
     LEFT_SIDE,
     MIDDLE_SIDE,
     RIGHT_SIDE,
     Axis,
+    Curve,
+    CurveFigure,
     Frame,
+    Strip,
     Stroke,
     around,
     panel,
@@ -46,7 +48,7 @@ from biodance.report.tables.schema import Row, Schema
 from biodance.report.wording import changed, parted_gain, signed
 
 if TYPE_CHECKING:
-    from biodance.dance.scoring import PerformanceScore
+    from biodance.dance.expectation import PerformanceScore
     from biodance.identification.sessions import Difference
 
 

@@ -12,8 +12,7 @@ from biodance.cycles.movement import TrialMovement
 from biodance.display import GREY, spaced
 from biodance.identification.knowledge import SIGMAS
 from biodance.pipeline.movement import SessionMovement
-from biodance.report.figures.curves import Curve, CurveFigure, Strip
-from biodance.report.figures.vector import LEFT_SIDE, MIDDLE_SIDE, RIGHT_SIDE, Stroke
+from biodance.report.figures.vector import LEFT_SIDE, MIDDLE_SIDE, RIGHT_SIDE, Curve, CurveFigure, Strip, Stroke
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import FILE_ANGLE_ROW

@@ -39,7 +39,7 @@ OBSERVED_ROW = Schema(
 """An observation; ``cause`` is the one to which it responds most, "" where to none."""
 VISIBILITY_ROW = Schema(
     "effect target sd unit witnesses=observers would_be_seen_by=would",
-    {"alike": lambda one: list(map(_cause, one.alike))},
+    {"alike": lambda one: list(map(cause_name, one.alike))},
     "cause: {effect:name} {target:name} | seen to: ± {sd:size} | seen by: {witnesses:name} | "
     "could also be: {alike:name}",
 )
@@ -68,7 +68,8 @@ def _masses(found: Identification | None) -> list[Row] | None:
     return [{"name": name, "mass_kg": mass, "mass_sd_kg": s} for name, mass, s in columns]
 
 
-def _cause(names: Iterable[str]) -> str:
+def cause_name(names: Iterable[str]) -> str:
+    """Return a cause as programs read it: its effect and, where it has one, its target."""
     return " ".join(names).strip()
 
 
@@ -76,7 +77,7 @@ def observed_rows(evidence: ObservedEvidence | None) -> list[Row]:
     """Return every observation."""
     if evidence is None:
         return []
-    strongest = (_cause(evidence.strongest(i)) for i in range(len(evidence.observations)))
+    strongest = (cause_name(evidence.strongest(i)) for i in range(len(evidence.observations)))
     rows = OBSERVED_ROW.rows(evidence.observations)
     return [{**row, "cause": cause} for row, cause in zip(rows, strongest, strict=True)]
 
@@ -117,7 +118,7 @@ _SEATED = (
 )
 CONFUSION_ROW = Schema(
     "log_bayes_factor=difference",
-    {"cause": lambda pair: _cause(pair.cause), "other": lambda pair: _cause(pair.other)},
+    {"cause": lambda pair: cause_name(pair.cause), "other": lambda pair: cause_name(pair.other)},
     "cause: {cause:name} | looks like: {other:name} | told by: {log_bayes_factor:1}",
 )
 """Two causes that look alike, and the log Bayes factor that is expected to tell them apart."""
@@ -147,8 +148,8 @@ _FORESIGHT = Schema(
         "changes": Schema(
             "do",
             {
-                "unseen": lambda one: list(map(_cause, one.unseen)),
-                "confused": lambda one: list(map(_cause, one.confused)),
+                "unseen": lambda one: list(map(cause_name, one.unseen)),
+                "confused": lambda one: list(map(cause_name, one.confused)),
             },
         ),
     },

@@ -9,15 +9,14 @@ import numpy as np
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Subject
 from biodance.virtual_lab.faults import forces
-from biodance.virtual_lab.faults import plate_faults as plate
-from biodance.virtual_lab.faults import recording_faults as whole
+from biodance.virtual_lab.faults import recording_faults as made
 from biodance.virtual_lab.faults.forces import sloshing_load, wobbling_mass
-from biodance.virtual_lab.faults.plate_faults import Builder, Clock, axis_index
+from biodance.virtual_lab.faults.recording_faults import Builder, Clock, axis_index
 from biodance.virtual_lab.movement.performance import AppliedForce
 from biodance.virtual_lab.movement.protocol import Protocol
-from biodance.virtual_lab.person.flesh import fit_prosthesis
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
-from biodance.virtual_lab.recording.laboratory import FIRST_VISIT, Fault, LabVisit
+from biodance.virtual_lab.person.prosthesis import with_prostheses
+from biodance.virtual_lab.recording.visit import FIRST_VISIT, Fault, LabVisit
 from biodance.virtual_lab.truth import load_on
 
 
@@ -73,11 +72,11 @@ def clock_of(protocol: Protocol) -> Clock:
 FAULTS: dict[str, Builder] = {
     f.__name__: f
     for f in (
-        *(plate.plate_offset, plate.plate_gain, plate.plate_crosstalk, plate.plate_drift, plate.plate_position),
-        *(plate.plate_rotation, plate.plate_hysteresis, plate.plate_creep, plate.plate_bending, plate.object_on_plate),
-        *(plate.axis_error, plate.clipping, plate.mains_hum, plate.loose_connection, plate.saturating),
-        *(whole.time_delay, whole.clock_drift, whole.trigger_jitter, whole.frame_rate, whole.filter_mismatch),
-        *(whole.body_mass, whole.unit_error, whole.labels_swapped, whole.dropped_frames, whole.swaying_cameras),
+        *(made.plate_offset, made.plate_gain, made.plate_crosstalk, made.plate_drift, made.plate_position),
+        *(made.plate_rotation, made.plate_hysteresis, made.plate_creep, made.plate_bending, made.object_on_plate),
+        *(made.axis_error, made.clipping, made.mains_hum, made.loose_connection, made.saturating),
+        *(made.time_delay, made.clock_drift, made.trigger_jitter, made.frame_rate, made.filter_mismatch),
+        *(made.body_mass, made.unit_error, made.labels_swapped, made.dropped_frames, made.swaying_cameras),
     )
 }
 FORCES: dict[str, Callable[..., AppliedForce]] = {
@@ -168,9 +167,7 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
 def _prosthesis(cause: Hidden, scene: Scene) -> Scene:
     """Make the limb from a segment on ``lighter`` kg: a prosthesis."""
     limbs = {**scene.visit.lighter_limbs, cause.target: cause.numbers(("lighter",))["lighter"]}
-    fit_prosthesis(
-        scene.person.body.sip, cause.target, limbs[cause.target]
-    )  # refused here, before anything is simulated
+    with_prostheses(scene.person, limbs)  # refused here, before anything is simulated
     return replace(scene, visit=replace(scene.visit, lighter_limbs=limbs))
 
 

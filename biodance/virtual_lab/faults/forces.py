@@ -10,8 +10,8 @@ from biodance.body.parts import GRAVITY
 from biodance.errors import UnknownName
 from biodance.motion.kinematics import Poses, poses
 from biodance.records import Array
-from biodance.virtual_lab.movement.choreography import septic
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
+from biodance.virtual_lab.movement.posing import septic
 from biodance.virtual_lab.person.person import AddedLoad, Person
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
 from biodance.virtual_lab.tolerances import stream

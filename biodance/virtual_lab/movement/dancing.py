@@ -18,9 +18,20 @@ from biodance.body.parts import UPRIGHT
 from biodance.errors import BiodanceError
 from biodance.motion.kinematics import poses
 from biodance.records import SIDES, Array, Motion, freeze
-from biodance.virtual_lab.movement.choreography import COLUMNS, RAISED, SHIFT, WIDTH, Curves
 from biodance.virtual_lab.movement.performance import MARGIN, NODE_RATE, Performance, keep_balance
-from biodance.virtual_lab.movement.posing import FootStance, Pose, Z, leg_tops, turn_about, upper_body
+from biodance.virtual_lab.movement.posing import (
+    COLUMNS,
+    RAISED,
+    SHIFT,
+    WIDTH,
+    Curves,
+    FootStance,
+    Pose,
+    Z,
+    leg_tops,
+    turn_about,
+    upper_body,
+)
 from biodance.virtual_lab.movement.protocol import TrialPlan
 from biodance.virtual_lab.person.person import Person
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, smooth_noise, stream

@@ -15,11 +15,12 @@ from scipy.spatial.transform import Rotation
 from biodance.body.parts import GRAVITY
 from biodance.body.pinocchio_model import load_pinocchio
 from biodance.records import Array, Motion, Wrench
-from biodance.virtual_lab.movement.choreography import Curves, choreograph
 from biodance.virtual_lab.movement.posing import (
+    Curves,
     FootStance,
     Height,
     Pose,
+    choreograph,
     pelvis_height,
     stand_on_feet,
     take_stance,

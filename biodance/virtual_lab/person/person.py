@@ -1,4 +1,6 @@
-"""A virtual person: the true body, its habits and the loads it carries."""
+"""A virtual person: the true body, its masses drawn around a population mean (``anthropometry/virtual/people.toml``),
+its habits and the loads it carries.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -10,14 +12,8 @@ from biodance.body.body import Body
 from biodance.body.parts import Foot, JointLimits
 from biodance.errors import BiodanceError, UnknownName
 from biodance.records import SIDES, Array, Sip, Subject, freeze
-from biodance.virtual_lab.person.flesh import (
-    draw_sip,
-    fit_prosthesis,
-    of_parameters,
-    parameters_of_inertia,
-    true_pseudo_inertia,
-)
 from biodance.virtual_lab.person.skeleton import (
+    ARM_AND_LEG,
     TRUE_SEGMENTS,
     Proportions,
     build_joints,
@@ -27,6 +23,91 @@ from biodance.virtual_lab.person.skeleton import (
     virtual_people,
 )
 from biodance.virtual_lab.tolerances import REALISTIC, LabTolerances, stream
+
+_POPULATION = 0.08
+"""Relative standard deviation of what the people of one place have in common beside the tables' midpoint: as published
+tables differ among themselves (de Leva 1996, Dumas 2018, Zatsiorsky)."""
+
+
+def true_pseudo_inertia(mass: float, com: Array, radii: Array) -> Array:
+    """Return the pseudo-inertia (4, 4) of ``mass`` kg with CoM (3,) m and radii of gyration (3,) m about the frame's
+    axes at the CoM: J = [[S, h], [h', m]] with S second moment, h first moment, m mass. Possible bodies have J >= 0,
+    and a linear map of the points, A J A', keeps it so.
+    """
+    gyration = np.asarray(radii, float) ** 2
+    second = np.diag(0.5 * gyration.sum() - gyration)
+    out = np.empty((4, 4))
+    out[:3, :3] = mass * (second + np.outer(com, com))
+    out[:3, 3] = out[3, :3] = mass * np.asarray(com)
+    out[3, 3] = mass
+    return out
+
+
+def parameters_of_inertia(J: Array) -> Array:
+    """Return phi (10,) = [m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz] about the frame's origin (kg, kg·m, kg·m²)."""
+    second = J[:3, :3]
+    inertia = np.trace(second) * np.eye(3) - second
+    rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
+    return np.concatenate([[J[3, 3]], J[:3, 3], inertia[rows, columns]])
+
+
+def of_parameters(phi: Array) -> Array:
+    """Return the pseudo-inertia (4, 4) of phi (10,)."""
+    xx, xy, yy, xz, yz, zz = phi[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    out = np.empty((4, 4))
+    out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    out[:3, 3] = out[3, :3] = phi[1:4]
+    out[3, 3] = phi[0]
+    return out
+
+
+def place_inertia(J: Array, rotation: Array, position: Array) -> Array:
+    """Return J of the same body in another frame, given the pose (3, 3), (3,) m of its present frame in the other."""
+    move = np.eye(4)
+    move[:3, :3], move[:3, 3] = rotation, position
+    return move @ J @ move.T
+
+
+def _stretched(J: Array, rng: np.random.Generator, shape_sd: float, com_sd: float) -> Array:
+    """Return J after a random linear map of the body about its CoM and a random shift, relative to its own size."""
+    com = J[:3, 3] / J[3, 3]
+    centred = place_inertia(J, np.eye(3), -com)
+    size = np.sqrt(np.diag(centred)[:3] / J[3, 3])
+    return place_inertia(
+        centred, np.eye(3) + shape_sd * rng.normal(size=(3, 3)), com + com_sd * size * rng.normal(size=3)
+    )
+
+
+def draw_sip(
+    size: Proportions, subject: Subject, seed: int, *, tolerances: LabTolerances, population: int | None = None
+) -> Sip:
+    """Draw the true parameters of the 16 segments; their masses add up to the subject's exactly.
+
+    All persons of one ``population`` differ from the midpoint of the tables alike (`_POPULATION`), None = not at all.
+    Of the ``tolerances``: ``segment_mass`` is the relative sd of a kind of segment, common to both sides; ``side_mass``
+    that between right and left; ``segment_shape`` that of the linear map of the shape; ``com`` the sd of the CoM shift
+    in units of the body's own spread along each axis.
+    """
+    table = virtual_people()["segments"][subject.sex]
+    rng = stream(seed, "flesh")
+    factor = {kind: np.exp(tolerances.segment_mass * rng.normal()) for kind in table}
+    if population is not None:
+        common = stream(population, "population")
+        factor = {kind: own * np.exp(_POPULATION * common.normal()) for kind, own in factor.items()}
+    bodies = []
+    for segment in TRUE_SEGMENTS:
+        kind = next((k for k in ARM_AND_LEG if segment.endswith(k)), segment)
+        percent, *rest = table[kind]
+        place = size[kind] * np.array(rest)
+        if segment.startswith("left"):
+            place[2] = -place[2]
+        side = np.exp(tolerances.side_mass * rng.normal() if kind != segment else 0.0)
+        inertia = true_pseudo_inertia(percent * factor[kind] * side, place[:3], place[3:])
+        bodies.append(_stretched(inertia, rng, tolerances.segment_shape, tolerances.com))
+    total = sum(J[3, 3] for J in bodies)
+    phi = np.concatenate([parameters_of_inertia(J * subject.mass / total) for J in bodies])
+    return Sip(TRUE_SEGMENTS, phi, np.zeros((phi.size, phi.size)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +183,6 @@ class Person:
 
 
 NO_SHIFTS: Mapping[str, Array] = MappingProxyType({})
-NO_LIMBS: Mapping[str, float] = MappingProxyType({})
 _BEYOND = {"hip": "thigh", "knee": "shank", "ankle": "foot", "shoulder": "upper_arm"}
 MOVABLE = (*(f"{side}_{joint}" for side in SIDES for joint in _BEYOND), "lumbar", "neck")
 """Joints whose true centre can be moved."""
@@ -117,21 +197,17 @@ def make_person(
     session: int = 0,
     joint_shifts: Mapping[str, Array] = NO_SHIFTS,
     population: int | None = None,
-    lighter_limbs: Mapping[str, float] = NO_LIMBS,
 ) -> Person:
     """Return the virtual person number ``seed`` of the given mass (kg), stature (m) and sex.
 
     The same ``seed`` is the same body for ever; ``session`` only moves the markers as another day does. ``loads`` come
     on top of the subject's mass. ``joint_shifts`` (3,) m by joint (one of ``MOVABLE``) move true joint centres in the
     frame of the segment before them. People of one ``population`` have something in common (`draw_sip`).
-    ``lighter_limbs`` kg by segment: from there on a prosthesis, so much lighter (`fit_prosthesis`).
     """
     t = tolerances
     size = draw_proportions(subject, seed, length_sd=t.segment_length, centre_sd=t.joint_centre, tilt_sd=t.joint_axis)
     size = _with_joints_moved(size, joint_shifts)
     sip = draw_sip(size, subject, seed, tolerances=t, population=population)
-    for segment, less in lighter_limbs.items():
-        sip = fit_prosthesis(sip, segment, less)
     joints = build_joints(size)
     ranges = virtual_people()["range_deg"]
     lower, upper = np.radians([ranges[j.name.removeprefix("right_").removeprefix("left_")] for j in joints]).T

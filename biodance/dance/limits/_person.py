@@ -1,11 +1,5 @@
-"""No arm is lifted farther than a person may, by whatever joint angles: a limit that comes with the person
-(`problem.person`), no member of the family.
-
-The upper arm's lift is the angle θ between its axis and the trunk's down axis, in the plane φ between sideways (0) and
-forward or backward (90 degrees): elevation and plane of elevation of the thoracohumeral joint (Wu et al. 2005, ISB).
-From straight sideways to straight forward the greatest lift goes along an ellipse,
-
-    1 / greatest(φ)² = (cos φ / sideways)² + (sin φ / forward)².
+"""Limits that come with a person (`problem.person`), no members of the family: no arm is lifted farther than it may, by
+whatever joint angles, and no foot bears more.
 """
 
 from dataclasses import dataclass
@@ -15,6 +9,7 @@ import numpy as np
 from biodance.dance.limits import NOTHING, CheckedMotion, Limit, Margins, Remaining, bounded, unconcerned
 from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.state import State
+from biodance.motion.dynamics import distribute
 from biodance.records import SIDES, Array
 from biodance.spatial import axis_rotation
 
@@ -29,6 +24,11 @@ _X, _Y, _Z = np.eye(3)
 class ArmLift(Limit):
     """Degrees by which the ``right`` and the ``left`` upper arm are lifted at most, ``forward`` (and backward) and
     ``sideways``; ``hand`` degrees to which the palm, seen from its shoulder, is lifted at most (90: shoulder height).
+
+    The lift is the angle θ between the upper arm's axis and the trunk's down axis, in the plane φ between sideways (0)
+    and forward or backward (90 degrees): elevation and plane of elevation of the thoracohumeral joint (Wu et al. 2005,
+    ISB). From straight sideways to straight forward the greatest lift goes along an ellipse,
+    1 / greatest(φ)² = (cos φ / sideways)² + (sin φ / forward)².
     """
 
     right_forward: float = bounded(_FREE, LEAST_LIFT, _FREE, "degrees")
@@ -134,3 +134,31 @@ def _left(seen: Array, greatest: Array) -> tuple[Array, Array]:
     slopes = by_lift * (size / flat)[..., None] + (lift / flat)[..., None] * by_size
     slopes -= (lift * size / flat**2)[..., None] * by_flat
     return least * (1 - used), -least[:, None] * slopes
+
+
+@dataclass(frozen=True)
+class FootLoad(Limit):
+    """Share of the vertical ground force that the ``right`` and the ``left`` foot bear at most, both on the ground."""
+
+    right: float = bounded(1.0, 0.0, 1.0)
+    left: float = bounded(1.0, 0.0, 1.0)
+    name, unit, scale, suspicion = "foot_load", "N", 50.0, 15
+
+    def margins(self, state: State) -> Margins:
+        """Return how much more each foot may bear, (T, 2) N; none on a stool."""
+        if not state.stance.planted:
+            return unconcerned(state)
+        share, (force, by) = np.array([self.right, self.left]), state.feet
+        value = share * state.wrench[:, 2:3] - force[:, :, 2]
+        slopes = share[:, None] * state.wrench_slopes[:, :, 2:3] - by[None, :, :, 2] @ state.wrench_slopes
+        return Margins(value, slopes)
+
+    def check(self, motion: CheckedMotion) -> Remaining:
+        """Return how much more each foot may bear, (T, 2) N, from where the soles really are; nothing on a stool."""
+        if not motion.stance.planted:
+            return NOTHING
+        right, left = (sole.mean(axis=1) for sole in motion.soles)
+        touching = np.tile([side in motion.stance.planted for side in (0, 1)], (motion.motion.time.size, 1))
+        borne = [part.force[:, 2] for part in distribute(motion.wrench, right, left, touching)]
+        value = np.array([self.right, self.left]) * motion.wrench.force[:, 2:] - np.stack(borne, axis=1)
+        return Remaining(value, tuple(f"{side}_foot" for side in SIDES))

@@ -1,29 +1,128 @@
-"""The page of a laboratory's plates: what changed when, what is wrong, who stands out."""
+"""A laboratory's plates over all sessions: numbers for programs, the page (what changed when, what is wrong, who stands
+out), and what `biodance plates` prints.
+"""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 
-from biodance.diagnosis.archive.changes import ALL, History
+from biodance.diagnosis.archive.changes import ALL, Change, History, Stranger
 from biodance.diagnosis.archive.conditions import ConditionEffect
-from biodance.diagnosis.archive.judge import PlateLevel, said
+from biodance.diagnosis.archive.judge import PlateFinding, PlateLevel, said
 from biodance.diagnosis.archive.quantities import PLATE_QUANTITIES
-from biodance.display import BLACK, BLUE, GREY, RED
+from biodance.display import BLACK, BLUE, GREY, RED, spaced
 from biodance.pipeline.plates import PlatesJudged
 from biodance.pipeline.provenance import now
 from biodance.report.figures.style import figure, look, svg_address
 from biodance.report.files import for_spreadsheets, write_files
 from biodance.report.pages.template import print_sheet, render, template_text
-from biodance.report.tables.laboratory import plates_document
 from biodance.report.tables.schema import Row, Schema, plain_values, to_text
+from biodance.report.terminal import print_line, print_table
 from biodance.report.wording import moment
 from biodance.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+_OFFSET = ("offset_x", "offset_y", "offset_z")
+
+
+def _unit(one: PlateLevel | ConditionEffect | PlateFinding | Change) -> str:
+    return PLATE_QUANTITIES[one.quantity].unit
+
+
+CARD_ROW = Schema(
+    "plate visits place_m=place_x.value,place_y.value place_sd_m=place_x.sd,place_y.sd gain=gain.value gain_sd=gain.sd "
+    "offset_n=offset_x.value,offset_y.value,offset_z.value offset_sd_n=offset_x.sd,offset_y.sd,offset_z.sd "
+    "delay_s=delay.value delay_sd_s=delay.sd",
+    {
+        "offset_taken_off": lambda card: min((card[one].taken_off for one in _OFFSET if one in card), default=None),
+        "levels": Schema("quantity value sd between_visits_sd=between visits", {"unit": _unit}),
+        "changes": Schema(
+            "visit=visit.name plate quantity before after ci95=interval matters",
+            {
+                "date": lambda one: one.visit.date or None,
+                "earliest": lambda one: one.earliest.date or one.earliest.name,
+                "latest": lambda one: one.latest.date or one.latest.name,
+                "unit": _unit,
+            },
+        ),
+        "findings": Schema("effect target text quantity value ci95=interval", {"unit": _unit}),
+    },
+    "plate: {plate} | visits: {visits} | place x, y (mm): {place_m:mm1} | gain (%): {gain:%2} | "
+    "offset Fx, Fy, Fz (N): {offset_n:1} | delay (ms): {delay_s:ms1} | changes: {changes:count}",
+)
+"""A plate over all its visits, its levels by their quantity, too. Of a change ``ci95`` is of the step, ``date`` of the
+first visit after it.
+"""
+_CONDITION = Schema(
+    "plate quantity factor level base value=shared.mean ci95=shared.interval between_persons_sd=shared.spread "
+    "persons=#visits",
+    {"unit": _unit, "persons_named": lambda one: sorted(one.persons)},
+)
+
+
+def plates_document(found: PlatesJudged) -> Row:
+    """Return all that was found: a card per plate, persons, what all share, and what was left out; null where nothing
+    tells a quantity.
+    """
+    judged = found.judgement
+    return {
+        "archive": found.archive.resolve().name,
+        "visits": Schema("visit=name person date", {"date": lambda one: one.date or None}).rows(judged.visits),
+        "plates": CARD_ROW.rows(vars(card) | {one.quantity: one for one in card.levels} for card in judged.plates),
+        "persons": _persons(found),
+        "common": _CONDITION.rows(judged.conditions),
+        "attention": [
+            {"level": "warn", "text": f"{card.plate}: {one.text}", "trial": "", "about": one.effect}
+            for card in judged.plates
+            for one in card.findings
+        ],
+        "refused": dict(found.refused),
+        "notes": list(found.notes),
+    }
+
+
+def _persons(found: PlatesJudged) -> list[Row]:
+    """Return every person with visits, what stands out, and what conditions do in that person's visits."""
+    judged = found.judgement
+    names = list(dict.fromkeys(visit.person for visit in judged.visits))
+    return [
+        {
+            "person": name,
+            "visits": sum(visit.person == name for visit in judged.visits),
+            "findings": [
+                *(_stranger(one) for one in judged.strangers if one.person == name),
+                *(_of_person(one, name) for one in judged.conditions if name in one.persons),
+            ],
+        }
+        for name in names
+    ]
+
+
+def _stranger(one: Stranger) -> Row:
+    much = said(one.quantity, one.value)
+    what = f"{one.visit or 'All visits'}: {spaced(one.quantity)} on {one.plate} differs by {much} from all others."
+    return _personal(what, one.quantity, one.value, one.sd)
+
+
+def _of_person(one: ConditionEffect, person: str) -> Row:
+    value, sd = one.persons[person]
+    much = said(one.quantity, value)
+    text = f"{one.factor} {one.level} reads {much} more than {one.factor} {one.base}."
+    return _personal(text, one.quantity, value, sd)
+
+
+def _personal(text: str, quantity: str, value: float, sd: float) -> Row:
+    known, interval = PLATE_QUANTITIES[quantity], [value - 1.96 * sd, value + 1.96 * sd]
+    row = {"effect": known.effect, "target": known.target, "text": text, "quantity": quantity, "value": value, "sd": sd}
+    return {**row, "ci95": interval, "unit": known.unit}
 
 
 _SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e2, "%"), "N": (1.0, "N")}
@@ -173,3 +272,22 @@ def write_plates(found: PlatesJudged, folder: Path) -> dict[str, Any]:
     }
     write_files(folder, texts)
     return dict(plain_values(document))
+
+
+def print_plates(document: Row, console: Console) -> None:
+    """Print a row per plate, then everything that a person must see."""
+    print_table(CARD_ROW, document["plates"], console)
+    for one in document["attention"]:
+        print_line(console, one["text"])
+    for person in document["persons"]:
+        for one in person["findings"]:
+            print_line(console, f"Person {person['person']}: {one['text']}")
+    print_left_out(document["refused"], console)
+    for note in document["notes"]:
+        print_line(console, note)
+
+
+def print_left_out(left_out: Mapping[str, str], console: Console) -> None:
+    """Print what was left out and why, a line each."""
+    for what, why in left_out.items():
+        print_line(console, f"{what} was left out: {why.splitlines()[0]}")

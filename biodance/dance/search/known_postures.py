@@ -1,20 +1,28 @@
-"""Postures that people know, limb by limb, and a few free ones of the arms: what a followable dance is made of.
-
-The words lie in ``protocols/vocabulary/people.toml``, which explains its keys.
+"""Postures that people know, limb by limb (``protocols/vocabulary/people.toml``), and all whole postures that these
+words can make on given feet, with the pelvis where it keeps the balance.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biodance.body.body import Body
+from biodance.dance.dance import Dance
+from biodance.dance.limits import Limit
+from biodance.dance.performers import deviations_of_copies
+from biodance.dance.problem.chain import ROOT, Chain
 from biodance.dance.problem.plan import Plan
+from biodance.dance.problem.shapes import palm
 from biodance.dance.problem.stance import Stance
+from biodance.dance.problem.state import State
+from biodance.dance.search.postures import counterpart, describe
 from biodance.errors import BiodanceError
 from biodance.library import locate, read_toml
-from biodance.records import SIDES
+from biodance.records import SIDES, Array
 
 _FLAGS = ("rest", "gentle", "deep", "lively", "double")
 _KEYS = ("name", "angles", "mirror", *_FLAGS)
@@ -70,7 +78,7 @@ class Word:
 _HOLDING = Word(
     "hold", "{} hands on the frame", (("shoulder_adduction", -0.3), ("elbow_flexion", 0.7)), "hold", rest=True
 )
-"""What an arm does that holds a frame: from these angles it is bent to its grip (`posture_table.posed`)."""
+"""What an arm does that holds a frame: from these angles it is bent to its grip (`posed`)."""
 
 _HANGING = Word(
     "hang", "{} arms hanging", (("shoulder_adduction", -np.radians(30.0)), ("elbow_flexion", 0.2)), "hang", rest=True
@@ -257,3 +265,190 @@ def singular(text: str) -> str:
     for limb in ("arm", "forearm", "elbow", "leg", "thigh"):
         text = text.replace(f"{limb}s ", f"{limb} ", 1)
     return text
+
+
+_ROUNDS = 5
+"""Corrections of the pelvis; each leaves about a fifth of the error."""
+_BACK = 0.03
+"""m behind the middle of the support where people stand: over the arch of the foot."""
+_GRIPPED, _STEPS, _DAMPING = 2, 12, 1e-3
+"""Times that holding arms are bent and the pelvis is set anew, least-squares steps of each, and their damping, m²."""
+_ELBOW_OUT = tuple(np.radians([0.0, -60.0, 40.0, 60.0]))
+"""rad (shoulder flexion, adduction, rotation, elbow flexion) which a holding arm comes near to: away from the trunk."""
+_FROM_STOP = float(np.radians(3.0))
+"""rad that the joints of a holding arm keep from their stops."""
+_TURN, _LEAN, _TILT = ROOT - 3, ROOT - 2, ROOT - 1
+"""Coordinates of the pelvis' turn to the left, of its lean to the right, and of its tilt backward."""
+
+
+@dataclass(frozen=True, eq=False)
+class PostureTable:
+    """``words`` of every part of the body on the feet of ``stance``; posture s has the words ``index[s]`` (S, parts)
+    and the coordinates ``x`` (S, n).
+    """
+
+    chain: Chain
+    stance: Stance
+    words: Vocabulary
+    index: NDArray[np.intp]
+    x: Array
+
+    @classmethod
+    def of(cls, chain: Chain, stance: Stance, words: Vocabulary) -> "PostureTable":
+        """Return all combinations of ``words`` on the feet ``stance``."""
+        index = np.array(list(product(*(range(len(group)) for group in words.values()))), dtype=np.intp)
+        return cls(chain, stance, words, index, posed(chain, stance, words, index))
+
+    @cached_property
+    def parts(self) -> tuple[str, ...]:
+        """What moves, in the order of the columns of ``index``."""
+        return tuple(self.words)
+
+    @cached_property
+    def mirrored(self) -> NDArray[np.intp]:
+        """(S,) number of the posture with the sides exchanged, -1 where there is none."""
+        if any("lifted" in part for part in self.parts):
+            return np.full(len(self.index), -1)
+        place = {tuple(row): s for s, row in enumerate(self.index)}
+        names = {part: [word.key for word in group] for part, group in self.words.items()}
+        other = {part: counterpart(part) for part in self.parts}
+        out = np.full(len(self.index), -1)
+        for s, row in enumerate(self.index):
+            keys = {other[part]: self.words[part][k].mirror for part, k in zip(self.parts, row, strict=True)}
+            if all(keys[part] in names[part] for part in self.parts):
+                out[s] = place[tuple(names[part].index(keys[part]) for part in self.parts)]
+        return out
+
+    @cached_property
+    def arms_at_rest(self) -> NDArray[np.intp]:
+        """(S,) number of the posture that does the same but for the arms, which rest."""
+        still = np.where([part.endswith("_arm") for part in self.parts], 0, self.index)
+        return np.ravel_multi_index(tuple(still.T), tuple(len(group) for group in self.words.values()))
+
+    def words_of(self, s: int) -> dict[str, Word]:
+        """Return the word of every part of posture ``s``."""
+        return {part: self.words[part][k] for part, k in zip(self.parts, self.index[s], strict=True)}
+
+    def keeps(self, s: int, limits: tuple[Limit, ...]) -> tuple[float, str]:
+        """Return by how many deviations of imprecise people posture ``s`` keeps the limits and the one of which that is
+        least; minus infinity where itself it breaks one or leaves too little for moves.
+        """
+        state = State(self.chain, self.stance, self.x[s : s + 1], *np.zeros((2, 1, self.chain.size)))
+        for limit in (limit for limit in limits if limit.at_rest):
+            if (limit.margins(state).value < limit.straight_reserve(self.stance) * limit.scale).any():
+                return -np.inf, limit.name
+        no_way = np.empty((0, 2, self.chain.size))
+        held = Dance("", self.chain.body, state.x, (self.stance,), np.ones(1), no_way, np.empty(0), (), 0)
+        return deviations_of_copies(held, limits, np.zeros(1))
+
+
+def posed(chain: Chain, stance: Stance, words: Vocabulary, index: NDArray[np.intp]) -> Array:
+    """Return the coordinates (S, n) of the postures with the words ``index`` (S, parts)."""
+    x, knee, names = np.zeros((len(index), chain.size)), np.zeros(len(index)), _columns(chain)
+    for column, (part, group) in enumerate(words.items()):
+        for k, word in enumerate(group):
+            rows = index[:, column] == k
+            turn, aside, ahead = (0.0, 0.0, 0.0) if stance.seat else word.pelvis  # whoever sits keeps it on the seat
+            x[rows, _TURN] += turn
+            x[rows, _LEAN] += -aside if part.startswith("right") else aside
+            x[rows, _TILT] -= ahead
+            for joint, angle in word.angles:
+                if part == "legs" and joint == "knee_flexion":
+                    knee[rows] = angle
+                elif (name := own_joint(part, joint)) in names:
+                    x[rows, names[name]] = angle
+    for _ in range(_GRIPPED if stance.holding else 0):
+        x = _gripping(chain, stance, settled(chain, stance, x, knee))
+    return settled(chain, stance, x, knee)
+
+
+def _gripping(chain: Chain, stance: Stance, x: Array) -> Array:
+    """Return coordinates ``x`` (S, n) with the holding arms bent so that the palms come to their grips, or as near as
+    their joints reach: by least squares, step by step.
+    """
+    x, limits = x.copy(), chain.body.limits
+    for side in stance.holding:
+        segment, local = palm(chain.body, SIDES[side])
+        arm = chain.arm_columns[side]
+        low, high = limits.lower[np.array(arm) - ROOT] + _FROM_STOP, limits.upper[np.array(arm) - ROOT] - _FROM_STOP
+        for _ in range(_STEPS):
+            place, slope = State(chain, stance, x, *np.zeros((2, *x.shape))).points([segment], local[None])
+            J, out = slope[:, 0][:, :, arm], np.array(_ELBOW_OUT) - x[:, arm]
+            inverse = np.swapaxes(J, 1, 2) @ np.linalg.inv(J @ np.swapaxes(J, 1, 2) + _DAMPING * np.eye(3))
+            left = stance.hands[side] - place[:, 0] - np.einsum("sij,sj->si", J, out)
+            step = np.einsum("sij,sj->si", inverse, left) + out
+            x[:, arm] = np.clip(x[:, arm] + step, np.minimum(low, high), np.maximum(low, high))
+    return x
+
+
+def _columns(chain: Chain) -> dict[str, int]:
+    return {joint.name: ROOT + j for j, joint in enumerate(chain.body.joints)}
+
+
+def settled(chain: Chain, stance: Stance, x: Array, knee: Array) -> Array:
+    """Return coordinates ``x`` (S, n) with the pelvis over the middle of the support and the planted ``knee`` (S,) rad
+    bent; of a person on a stool on the seat.
+    """
+    x = x.copy()
+    if stance.seat:
+        x[:, 2] = stance.seat
+        return x
+    x[:, :2] = middle = _middle(stance)
+    for _ in range(_ROUNDS):
+        x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
+        x = chain.plant(x, stance.planted, stance.ankle)
+        x[:, :2] += middle - chain.mass_centre(x)[:, :2]
+    x[:, 2] = chain.root_heights(x, stance.ankle, knee, stance.planted).min(axis=0)
+    return chain.plant(x, stance.planted, stance.ankle)
+
+
+def _middle(stance: Stance) -> Array:
+    """Return the point (2,) m over which people stand: behind the middle of the support, or of the foot that bears."""
+    along = stance if stance.over is None else stance.on(stance.over)
+    return np.array([along.centre[0] - _BACK, stance.centre[1]])
+
+
+def nearest_in_words(table: PostureTable, limits: tuple[Limit, ...]) -> str:
+    """Return what forbids every posture of a table: the ``limits`` that the posture nearest to them breaks, joint and
+    number, and how much more would do.
+    """
+    short = _short(table, limits)
+    s = int(np.maximum(short, 0.0).sum(axis=0).argmin())
+    broken = _broken(table, s, limits, short[:, s])
+    if not broken:
+        limit = table.keeps(s, limits)[1].replace("_", " ")
+        return f"imprecise people leave too little of the limit on {limit} in all of them"
+    return f"the one nearest to all limits breaks that on {broken}"
+
+
+def words_never_kept(table: PostureTable, limits: tuple[Limit, ...]) -> tuple[str, ...]:
+    """Return a sentence for every word that no posture of a table can have, with what the nearest one would break."""
+    short, out = _short(table, limits), []
+    worst = np.maximum(short, 0.0).sum(axis=0)
+    for column, (part, words) in enumerate(table.words.items()):
+        for k, word in enumerate(words[1:], start=1):
+            rows = np.flatnonzero(table.index[:, column] == k)
+            if (worst[rows] > 0).all():
+                s = int(rows[worst[rows].argmin()])
+                text = singular(word.text.format(f"the {part.partition('_')[0]}"))
+                out.append(f"Left out: {text}; it would break the limit on {_broken(table, s, limits, short[:, s])}.")
+    return tuple(out)
+
+
+def _short(table: PostureTable, limits: tuple[Limit, ...]) -> Array:
+    """Return what every posture of a table lacks of each of the limits at rest, (limits, S) in their scale, at most 0
+    where it is kept.
+    """
+    rest = np.zeros_like(table.x)
+    state, rows = State(table.chain, table.stance, table.x, rest, rest, sloped=False), list[Array]()
+    for limit in (limit for limit in limits if limit.at_rest):
+        reserve = limit.straight_reserve(table.stance)
+        rows.append(reserve - limit.margins(state).value.min(axis=1, initial=np.inf) / limit.scale)
+    return np.array(rows)
+
+
+def _broken(table: PostureTable, s: int, limits: tuple[Limit, ...], short: Array) -> str:
+    """Return in words which limits posture ``s`` of a table breaks, where and by how much."""
+    asked, rest = [limit for limit in limits if limit.at_rest], np.zeros((1, table.chain.size))
+    held = State(table.chain, table.stance, table.x[s : s + 1], rest, rest, sloped=False)
+    return " and that on ".join(describe(held, limit) for limit, lack in zip(asked, short, strict=True) if lack > 0)

@@ -1,8 +1,11 @@
-"""What was found of a robot, as numbers and as a page."""
+"""What was found of a robot: numbers, page, and what the commands print."""
 
 from pathlib import Path
 
+from rich.console import Console
+
 from biodance.body.body_file import body_text
+from biodance.display import spaced
 from biodance.pipeline.provenance import now
 from biodance.pipeline.robot import RobotResult
 from biodance.pipeline.saved_results import BODY_FILE
@@ -12,6 +15,8 @@ from biodance.report.pages.template import render, template_text
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW
 from biodance.report.tables.identification import AGREEMENT_ROW, identification_document
 from biodance.report.tables.schema import Row, Schema, plain_values, to_text
+from biodance.report.terminal import print_attention, print_line
+from biodance.report.wording import format_number
 from biodance.report.write import PAGE
 from biodance.version import __version__
 
@@ -86,3 +91,14 @@ def _page(result: RobotResult, numbers: Row) -> str:
         version=__version__,
         section=Markup(identification_section(result.identified)),
     )
+
+
+def print_robot_diagnosis(found: Row, console: Console) -> None:
+    """Print what is not as drawn about a robot (`robot_document`): the verdict, causes with size and evidence."""
+    print_attention(found["attention"], console)
+    print_line(console, f"verdict: {found['diagnosis']['verdict']}")
+    for one in found["diagnosis"]["findings"]:
+        size = f"{format_number(one['value'], 4)} ± {format_number(1.96 * one['sd'], 4)} {one['unit']}".rstrip()
+        others = f"; it could also be {', '.join(one['not_told_from'])}" if one["not_told_from"] else ""
+        text = f"{spaced(one['cause'])}, {one['where']}: {size}, {one['evidence_nats']:.0f} nats{others}"
+        print_line(console, text)

@@ -14,7 +14,7 @@ from biodance.body.solids import segment_solids
 from biodance.dance.cues import dance_instructions
 from biodance.dance.dance import Dance
 from biodance.dance.expectation import movement_information
-from biodance.dance.problem.footprint import plate_corners
+from biodance.dance.problem.feet import plate_corners
 from biodance.dance.problem.stance import Stance, stance_words
 from biodance.display import spaced
 from biodance.errors import BiodanceError
@@ -197,7 +197,7 @@ def _outline(stance: Stance, side: int) -> Array:
 
 
 _BUNDLE = {"program": "pose.js", "kernels": "pose.wasm", "model": "movenet.json", "weights": "movenet.bin"}
-"""What follows a person: parts of the bundle that `make bundle` writes beside this module."""
+"""What follows a person: parts of the bundle that `make bundle` writes into ``report/feedback``."""
 
 
 def write_feedback(dance: Dance, path: Path, *, force: bool = False, despite: bool = False) -> bool:
@@ -225,7 +225,7 @@ def write_feedback(dance: Dance, path: Path, *, force: bool = False, despite: bo
 
 def bundle() -> dict[str, str] | None:
     """Return what follows a person, in base64, with its ``notices``; None where it was not built."""
-    folder = files("biodance.report.feedback") / "bundle"
+    folder = files("biodance.report") / "feedback" / "bundle"
     if not all((folder / name).is_file() for name in (*_BUNDLE.values(), "NOTICES.txt")):
         return None
     parts = {key: b64encode((folder / name).read_bytes()).decode("ascii") for key, name in _BUNDLE.items()}

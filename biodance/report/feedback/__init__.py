@@ -1,1 +1,0 @@
-"""The page that leads a person through a dance."""
