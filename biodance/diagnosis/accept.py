@@ -12,7 +12,7 @@ from biodance.diagnosis.gain import Gain
 from biodance.effects import Case, NamedCause, Transient
 from biodance.errors import BiodanceError
 from biodance.identification.statistics import Fit
-from biodance.identification.validation import BLOCK_SECONDS, FEWEST, block_interval, removed_share
+from biodance.identification.validation import BLOCK_SECONDS, FEWEST_BLOCKS, block_interval, removed_share
 from biodance.motion.regressor import predict_wrench
 from biodance.records import Array
 from biodance.spatial import wrench_about_point
@@ -77,9 +77,10 @@ def gain_by_naming(before: Residuals, after: Residuals, *, fitted: tuple[Residua
         (_blocks(left, use, rate), _blocks(right, use, rate)) for left, right, use, rate in _aligned(before, after)
     ]
     a, b = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
-    if len(a) < FEWEST:
+    if len(a) < FEWEST_BLOCKS:
         raise BiodanceError(
-            f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs {FEWEST}."
+            f"The kept trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs "
+            f"{FEWEST_BLOCKS}."
         )
     blocks, unit = np.stack([a, b], axis=2), np.maximum(_rms(fitted[1]), _TINY) ** 2
     channels = block_interval(lambda squares: removed_share(squares, 0, 1), blocks).T

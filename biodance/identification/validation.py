@@ -72,7 +72,7 @@ class TrialValidation:
 
         def removed(first: int, second: int) -> ShareRemoved:
             share = removed_share(blocks.sum(axis=0), first, second)
-            if len(blocks) < FEWEST:
+            if len(blocks) < FEWEST_BLOCKS:
                 return ShareRemoved(float(share), None)
             low, high = block_interval(lambda sums: removed_share(sums, first, second), blocks)
             return ShareRemoved(float(share), (float(low), float(high)))
@@ -130,7 +130,7 @@ def validate(body: Body, identified: Body, fit: Fit, *, about: Array, mass: floa
     )
 
 
-_DRAWS, FEWEST = 1000, 3
+_DRAWS, FEWEST_BLOCKS = 1000, 3
 """Of the bootstrap, and blocks that it needs."""
 _TINY = 1e-12
 """N², N²·m²: least unit of a channel."""
@@ -170,10 +170,10 @@ def residual_ratio(trials: tuple[TrialValidation, ...]) -> ResidualRatio:
         np.concatenate([_block_squares(one, getattr(one, name)) for one in trials]).reshape(-1, 2, 3).sum(axis=2)
         for name in ("table", "identified")
     )
-    if len(a) < FEWEST:
+    if len(a) < FEWEST_BLOCKS:
         raise BiodanceError(
-            f"The trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs {FEWEST}. Record "
-            f"longer."
+            f"The trials hold {len(a)} blocks of {BLOCK_SECONDS:g} s; an interval of the gain needs {FEWEST_BLOCKS}. "
+            "Record longer."
         )
     low, high = block_interval(lambda sums: np.sqrt(sums[..., 0, :] / sums[..., 1, :]), np.stack([a, b], axis=1))
     force, moment = np.sqrt(a.sum(axis=0) / b.sum(axis=0))
