@@ -53,6 +53,7 @@ CAUSES = (
     "wobbling_mass:target=trunk_head,mass=8",
     "added_mass:target=right_shank,mass=4",
     "added_mass:target=trunk_head,mass=7",
+    "unequal_limbs:target=left_shank,lighter=2",
     "head_joint:angle=0.25",
     "trunk_joint:angle=0.2",
     "shoulder_girdle:angle=0.25",

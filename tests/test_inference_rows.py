@@ -11,10 +11,12 @@ from inferred_sessions import SILENT, inferred
 from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
+from biodance.diagnosis.candidates import SCALE, candidate
 from biodance.diagnosis.model import causes_of
 from biodance.diagnosis.problem import problem
 from biodance.diagnosis.witness_evidence import ObservedEvidence
 from biodance.effects import NamedCause, effects
+from biodance.effects.unequal_limbs import UnequalLimbs
 from biodance.inference.columns import VisibleColumns
 from biodance.inference.rows import BODY, TOLERATED, rows_of
 from biodance.inference.scales import bare, nominal, posterior, prior_sd
@@ -183,3 +185,25 @@ def test_a_fault_beyond_its_tolerance_does_not_hide_in_it(size: float) -> None:
     hidden = about_plate(lambda local, session: local + size * np.eye(6)[0])
     one = inferred(body(), windows(3, hidden=hidden), tolerances=known(), effects=("plate_offset",))
     assert one.posterior.probabilities().get(OFFSET, 0.0) > 0.95
+
+
+def test_the_difference_of_two_limbs_is_told_with_what_of_it_lies_in_the_body() -> None:
+    """By the whole posterior covariance of all columns as they are: a table that errs on one side is lighter, too."""
+    lighter = UnequalLimbs("left_shank")
+    posed = problem(body(), short(), chosen={lighter.name: lighter})
+    found = rows_of(posed, (), known(), SILENT)
+    search = Search.of(found, (candidate(posed, lighter, posed.unit(lighter)),))
+    one = hypothesis(search, (NamedCause(lighter, np.array([1.5, 0.1, 0.02]), np.empty((0, 0))),))
+    (cause,) = one.causes
+    share, at = lighter.in_body(posed.cases[0]), found.group == found.groups.index(BODY)
+    assert one.whole(cause)[0] == pytest.approx(cause.theta[0] + share @ one.phi)
+    scale = np.where(found.group < 0, 1.0, np.exp(one.fit.scales.groups[found.group]))
+    both = np.concatenate([found.X * scale, one.Z], axis=1)
+    covariance = np.linalg.inv(both.T @ (both * search.weight(one)[:, None]) + np.eye(both.shape[1]))
+    row = np.zeros(both.shape[1])
+    row[: at.size][at] = scale[at] * (posed.factor.T @ share)
+    row[found.X.shape[1]] = SCALE * lighter.typical[0]
+    told = one.whole_covariance(cause)
+    assert told[0, 0] == pytest.approx(row @ covariance @ row, rel=0.02)
+    assert told[0, 0] < 0.8 * cause.covariance[0, 0]
+    np.testing.assert_array_equal(told[1:], cause.covariance[1:])

@@ -121,7 +121,7 @@ def test_nothing_to_fit_is_refused_with_what_to_do():
 def test_the_section_shows_every_segment(found):
     text = identification_section(found)
     assert all(f'<th scope="row">{name.replace("_", " ")}</th>' in text for name in body().segments)
-    assert text.count('class="panel"') == 2  # of the masses: heavy and light segments
+    assert text.count('class="panel"') == 8  # masses (heavy, light), centres and inertias along three axes
     for word in ("validate_1", "From the data", "cannot be known", "No load is found beyond the table"):
         assert word in text
 

@@ -46,6 +46,7 @@ EXAMPLES = (
     "sloshing_load:target=trunk_head,mass=4,sloshing=3", "lab_tilt:target=x,angle=0.03",
     "joint_centre:target=right_hip,shift=0.03;0;0",
     "marker_misplaced:target=RKNE,shift=0.04;0;0", "segment_length:target=right_thigh,error=0.03",
+    "unequal_limbs:target=left_shank,lighter=1.5",
     "head_joint:angle=0.2",
     "trunk_joint:angle=0.15", "shoulder_girdle:angle=0.15",
 )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -162,6 +162,10 @@ def identify_command(
         Path | None,
         Parameter(name="--dance", help="dance.npz that the person followed; reports how well it was performed."),
     ] = None,
+    method: Annotated[
+        Literal["posterior", "paper"],
+        Parameter(help="posterior: with intervals; paper: the quadratic programme of Bonnet 2016, beside it."),
+    ] = "posterior",
     robot: RobotFile = NO_ROBOT,
 ) -> int:
     """Identify segment masses with credible intervals, validate them on held-out trials, and search for an added mass.
@@ -173,10 +177,11 @@ def identify_command(
         s, rad) and force plate files.
     """
     if robot.given:
-        given = {"--dance": dance, "--tables": results.tables}
+        given = {"--dance": dance, "--tables": results.tables, "--method": None if method == "posterior" else method}
         for_people = (*reading.given(), *(name for name, value in given.items() if value is not None))
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
+    from biodance.pipeline.by_paper import by_paper
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.front_dance import performance_of
     from biodance.pipeline.judged_trials import failed_checks
@@ -191,6 +196,7 @@ def identify_command(
         result, before, place = examine_with_reference(session, reading, results, tell, dance=shown)
         known = read_lab(reading.lab).tolerances
         result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
+        result = by_paper(result) if method == "paper" else result
         found = identification_of(result)
         if shown is not None:
             found = replace(found, performance=performance_of(result, shown))

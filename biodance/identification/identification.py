@@ -16,7 +16,7 @@ from biodance.errors import NotSolved, UnknownName
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.calibration import discounted, undo_dilution
 from biodance.identification.information import Information
-from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_together, mass_interval
+from biodance.identification.knowledge import QUANTITIES, Known, knowledge, known_interval, known_together
 from biodance.identification.learning import learn_noise
 from biodance.identification.loads import with_unknown_load
 from biodance.identification.mismatch import Mismatch, Sizes, mismatch, softness
@@ -162,7 +162,9 @@ class Identification(Sendable):
         >>> identified.identification.plot_masses().get_xlabel()
         'mass (kg), 95 % intervals'
         """
-        drawn = display.intervals([mass_interval(known) for known in self.known if known.quantity == "mass"], axes=axes)
+        drawn = display.intervals(
+            [known_interval(known) for known in self.known if known.quantity == "mass"], axes=axes
+        )
         drawn.set_xlabel("mass (kg), 95 % intervals")
         return drawn
 

@@ -52,15 +52,14 @@ class Known:
         return self.value - SIGMAS * self.sd, self.value + SIGMAS * self.sd
 
 
-def mass_interval(known: Known) -> Interval:
-    """Return the table's and the identified value of a quantity with their 95 % intervals, as they are drawn."""
+def known_interval(known: Known, times: float = 1.0) -> Interval:
+    """Return the table's and the identified value of a quantity with their 95 % intervals, as they are drawn, in units
+    of which its own has so many ``times``.
+    """
     reach = SIGMAS * known.table_sd
-    return Interval(
-        known.segment,
-        (known.table, known.table - reach, known.table + reach),
-        (known.value, *known.interval),
-        known.verdict,
-    )
+    low, high = known.interval
+    before = times * known.table, times * (known.table - reach), times * (known.table + reach)
+    return Interval(known.segment, before, (times * known.value, times * low, times * high), known.verdict)
 
 
 def segment_quantities(phi: Array) -> tuple[Array, Array]:

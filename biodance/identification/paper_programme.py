@@ -9,16 +9,21 @@ would be infeasible; eps is taken relative to the table's smallest eigenvalue of
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from biodance.body.inertia import TENSOR
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
-from biodance.identification.information import Information
-from biodance.identification.physical import FailedFit
-from biodance.records import Array
+from biodance.identification.identification import Identification
+from biodance.identification.information import Information, fold, information
+from biodance.identification.knowledge import knowledge
+from biodance.identification.physical import FailedFit, PhysicalFit
+from biodance.identification.statistics import Fit, usable
+from biodance.records import Array, Sip
+from biodance.threads import one_thread
+from biodance.uncertainty.noise import Noise
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -106,6 +111,34 @@ def paper_programme(data: Information, body: "Body") -> PaperFit | FailedFit:
         f"The paper's programme has no solution ({word}), not even without equalities: the CoM boxes contradict each "
         f"other."
     )
+
+
+@one_thread()
+def identify_as_paper(found: Identification, fits: tuple[Fit, ...]) -> Identification:
+    """Return the identification ``found`` with the solution of eq. 8 in place of its parameters and base parameters:
+    from the believable frames of the same trials ``fits``, each sample as it is, moments about the standing point.
+
+    The programme has no intervals: standard deviations are NaN, and what the session can know stays as it was found.
+    Where it has no solution, the fit failed.
+    """
+    used, about, _ = usable(found.body, fits)
+    noise, R, frames = Noise.of_sd(1.0, 1.0, about), None, 0
+    for fit in used:
+        one = information(found.body, fit.motion, fit.wrench, noise, use=fit.use)
+        R, frames = fold(one.R, R), frames + one.frames
+    assert R is not None
+    solved = paper_programme(Information(R, frames), found.body)
+    if solved.status == "failed":
+        return replace(found, fit=solved, known=(), notes=(solved.cause,), frames=frames)
+    prior = found.posterior.prior
+    sip = Sip(prior.segments, solved.phi, np.zeros_like(prior.covariance))
+    known = tuple(replace(one, sd=float("nan")) for one in knowledge(sip, prior, found.posterior))
+    solution = PhysicalFit(sip, np.zeros(len(prior.segments), dtype=bool), float("nan"))
+    tied = f"{solved.equalities} of {solved.base.base.count} base parameters are held as equalities." * (
+        not solved.cause
+    )
+    notes = (solved.cause or tied, "The paper's programme gives no intervals.")
+    return replace(found, fit=solution, base=solved.base, known=known, notes=notes, frames=frames)
 
 
 def solve_convex(problem: "cp.Problem") -> str:

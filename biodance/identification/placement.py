@@ -13,6 +13,7 @@ from biodance.body.body import Body
 from biodance.body.tables.error_sizes import error_size
 from biodance.identification.information import Information
 from biodance.identification.posterior import find_posterior
+from biodance.lab.markers.sets import other_side
 from biodance.records import Sip
 from biodance.uncertainty.caution import shift_slope, widened_prior
 
@@ -20,6 +21,8 @@ _ALONG = 1
 """The axis along the spine in the frames of pelvis and trunk."""
 ODDS = np.log(2.0)
 """Log evidence by which sides each on their own must be more probable than sides alike, which most people have."""
+_OPEN = 3.0
+"""Times that the variance of a mass, as a share of it, is that of the other side in a limb that is open."""
 _TOLD = 1.0
 """mm: a joint of the trunk nearer to the table's cut than this is not told."""
 
@@ -82,14 +85,23 @@ def with_sides(table: Sip, *, apart: bool) -> Sip:
     return replace(table, covariance=covariance)
 
 
+def _has_open_limb(table: Sip) -> bool:
+    """Return whether one limb of the table is open (`limbs.with_open_limb`): that is how the sides differ."""
+    spread = dict(
+        zip(table.segments, np.diag(table.covariance)[::10] / np.maximum(table.mass, 1e-12) ** 2, strict=True)
+    )
+    return any(spread[name] > _OPEN * spread.get(other_side(name), np.inf) for name in spread)
+
+
 def more_probable_table(data: Information, table: Sip, body: Body) -> tuple[Sip, bool, tuple[str, ...]]:
     """Return the ``table`` with the trunk's matter and the sides as the ``data`` of the session make more probable
     (evidence under the table's own standard deviations and those of the trunk's place), whether the sides are apart in
-    it, and both in words.
+    it, and both in words. Where a limb is open, the sides are not asked for.
     """
     places = (False, True) if body.at_joint is not None else (False,)
     placed = [_at(body, float(table.mass.sum()), along=x) if len(places) > 1 else table for x in places]
-    choices = {(x, s): with_sides(placed[x], apart=True) if s else placed[x] for x, s in product(places, (False, True))}
+    sides = (False,) if _has_open_limb(table) else (False, True)
+    choices = {(x, s): with_sides(placed[x], apart=True) if s else placed[x] for x, s in product(places, sides)}
     evidence = {choice: find_posterior(data, one).log_evidence for choice, one in choices.items()}
     along, apart = best = max(evidence, key=lambda choice: evidence[choice] - ODDS * choice[1])
     words = []

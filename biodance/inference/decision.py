@@ -179,7 +179,7 @@ def _averaged(posterior: Posterior, cause: NamedCause, alike: Set[Key]) -> Named
     if cause.course:
         return cause
     found = [
-        (weight, one.whole(own), own.covariance)
+        (weight, one.whole(own), one.whole_covariance(own))
         for one, weight in zip(posterior.hypotheses, posterior.weights.sum(axis=1), strict=True)
         for own in one.causes
         if cause_key(own) == cause_key(cause) and weight > 0 and alike.isdisjoint(one.names)

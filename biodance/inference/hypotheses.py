@@ -7,10 +7,11 @@ from itertools import permutations
 import numpy as np
 from scipy.special import logsumexp
 
+from biodance.diagnosis.candidates import SCALE
 from biodance.effects import Effect, NamedCause
 from biodance.inference.causes import cause_key
 from biodance.inference.columns import VisibleColumns
-from biodance.inference.rows import Rows
+from biodance.inference.rows import BODY, Rows
 from biodance.inference.scales import ScaledFit
 from biodance.records import Array
 
@@ -79,11 +80,38 @@ class Hypothesis:
         )
 
     def whole(self, one: NamedCause) -> Array:
-        """Return the size (p,) of a cause with what its own tolerance has taken of it: both look alike, and the sum is
-        what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
+        """Return the size (p,) of a cause with what its own tolerance, or the body, has taken of it: both look alike,
+        and the sum is what is there (docs/decisions/2026-11-22-size-with-its-tolerance.md).
         """
         where, unit = self.rows.tolerated.get(cause_key(one), (slice(0), np.zeros((one.theta.size, 0))))
-        return np.asarray(one.theta + unit @ self.coefficients[where])
+        size = np.asarray(one.theta + unit @ self.coefficients[where])
+        if (share := self._in_body(one)) is not None:
+            size[0] += share @ self.phi
+        return size
+
+    def whole_covariance(self, one: NamedCause) -> Array:
+        """Return the covariance (p, p) of the size of a cause, with what of the first parameter lies in the body: the
+        sum is better known than either.
+        """
+        share, found = self._in_body(one), self.rows.problem
+        if share is None or found is None:
+            return one.covariance
+        own = found.factor.T @ share
+        seen = self.columns.turn[: own.size].T @ own
+        body = self.rows.groups.index(BODY)
+        row = np.append(seen, np.zeros(self.Z.shape[1])) * self.fit.size
+        at = self.columns.X.shape[1]
+        for other in self.causes:
+            row[at] = SCALE * one.effect.typical[0] * (cause_key(other) == cause_key(one))
+            at += other.theta.size
+        unseen = float(own @ own - seen @ seen) * float(np.exp(2 * self.fit.scales.groups[body]))
+        covariance = np.array(one.covariance)
+        covariance[0, 0] = self.fit.variance(row) + unseen
+        return covariance
+
+    def _in_body(self, one: NamedCause) -> Array | None:
+        """Return what of the body's parameters (10N,) counts to the size of a cause; None where none does."""
+        return None if self.rows.problem is None else one.effect.in_body(self.rows.problem.cases[0])
 
 
 @dataclass(frozen=True, eq=False)

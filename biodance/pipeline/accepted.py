@@ -72,10 +72,14 @@ def _session_toml(session: Session) -> str:
     session.toml says them.
     """
     subject = session.subject
-    said = {"mass_kg": subject.mass, "height_m": subject.stature, "age": subject.age}
+    said = {"mass_kg": subject.mass - sum(subject.devices.values()), "height_m": subject.stature, "age": subject.age}
     guessed = {{"mass": "mass_kg", "stature": "height_m"}.get(what, what) for what in subject.guessed}
     lines = ["[subject]", *(f"{key} = {float(x)}" for key, x in said.items() if np.isfinite(x) and key not in guessed)]
     lines += [f'sex = "{subject.sex}"'] * (subject.sex in ("F", "M") and "sex" not in guessed)
+    lines += [f'prosthesis = "{subject.prosthesis}"'] * bool(subject.prosthesis)
+    lines += ["", "[devices]", *(f"{segment} = {kg}" for segment, kg in subject.devices.items())] * bool(
+        subject.devices
+    )
     own = {trial.marker_set for trial in session.trials if trial.marker_set.endswith(".toml")}
     for file in own:
         lines += ["", "[markers]", f"file = {json.dumps(str(Path(file).resolve()))}"]

@@ -128,14 +128,15 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
 
 
 def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
-    """Return what was taken off the recordings before the body was fitted, one sentence each: the laboratory's next
-    recording will have it again.
+    """Return what was taken off the recordings before the body was fitted, or left open in it, one sentence each: the
+    laboratory's next recording will have it again.
     """
     found = result.identification.corrected if result.identification else ()
     return tuple(
         Attention(
             "warn",
-            f"taken off before the body was fitted, in {listed(one.trials) or 'all trials'}: {spoken(one).fact}. "
+            f"{'left open when' if one.cause.of_person() else 'taken off before'} the body was fitted, in "
+            f"{listed(one.trials) or 'all trials'}: {spoken(one).fact}. "
             f"{one.advice}".strip(),
             about=one.effect,
         )

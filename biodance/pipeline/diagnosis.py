@@ -155,7 +155,8 @@ def diagnose_session(
     plates = next((trial.plates for trial in result.session.trials if trial.plates), ())
     whole = of_family(replace(whole, findings=with_plate_axes(whole.findings, plates)), family)
     result = with_weighed_load(result, whole)
-    whole = with_load(whole, result.identification.search if result.identification else None)
+    searched = result.identification and not any(one.cause.of_person() for one in whole.findings)
+    whole = with_load(whole, result.identification.search if result.identification and searched else None)
     return replace(found, diagnosis=reconcile_with_checks(whole, result, judged_trials(result, found.looked_at)))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from biodance import display
 from biodance.body.body import Body
@@ -12,6 +12,7 @@ from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
 from biodance.pipeline.body import refuse_another_reference
+from biodance.pipeline.by_paper import by_paper
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
 from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
@@ -95,6 +96,7 @@ def identify(
     dance: "Dance | str | Path | None" = None,
     body: Body | str | Path | None = None,
     lab: str | Path | None = None,
+    method: Literal["posterior", "paper"] = "posterior",
     tell: _Tell = _silent,
 ) -> SessionIdentification:
     """Return what every segment of a person weighs, with intervals, validated on the trials kept.
@@ -113,6 +115,8 @@ def identify(
         The same person's body of an earlier visit (body.json): what is known before, instead of the table.
     lab : str or pathlib.Path, optional
         The laboratory's lab.toml: its corrections are made first.
+    method : {"posterior", "paper"}
+        With intervals, or by the paper's quadratic programme, the posterior beside it (``posterior``).
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -146,9 +150,8 @@ def identify(
     """
     before = None if reference is None else _earlier(reference, tell)
     result = examined_visit(session, reference=before, body=body, lab=lab, tell=tell)
-    known = read_lab(lab).tolerances
-    result, _ = diagnosed_and_corrected(result, reference=before, tolerances=known, tell=tell)
-    found = identification_of(result)
+    result, _ = diagnosed_and_corrected(result, reference=before, tolerances=read_lab(lab).tolerances, tell=tell)
+    found = identification_of(by_paper(result) if method == "paper" else result)
     return found if dance is None else replace(found, performance=performance_of(result, dance))
 
 

@@ -8,7 +8,7 @@ nothing of it.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, reduce
 from itertools import compress
 
 import numpy as np
@@ -23,6 +23,7 @@ from biodance.effects import Case, NamedCause
 from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.statistics import Fit, standing_point
+from biodance.identification.unloaded_body import tables_by_sides
 from biodance.inference.decision import NAMED, Inferred
 from biodance.inference.hypotheses import Key
 from biodance.inference.session import is_moving
@@ -32,7 +33,7 @@ from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionId
 from biodance.pipeline.judged_trials import cases_of, windows
 from biodance.pipeline.results import MendedCopy, SessionResult
 from biodance.pipeline.session import examine
-from biodance.records import Array, Role
+from biodance.records import Array, Role, Sip
 
 _Mend = Callable[[Case], Case]
 _Fits = tuple[Fit, ...]
@@ -90,8 +91,8 @@ def with_proven_corrections(
 ) -> SessionResult:
     """Return the session examined again without what is proven: what checks undid in the copy ``mended``, and the
     zeros, delays and gains that are `proven` in ``inferred`` or known there as tolerances (`Inferred.tolerated`), each
-    as unsure in the fit as there. The identification names them all (``corrected``). The same session where there are
-    none; what is only suspected stays as recorded.
+    as unsure in the fit as there; a proven limb that is lighter than the other is fitted as a declared one. The
+    identification names them all (``corrected``). The same session where there are none; what is only suspected stays.
     """
     checks = mended.checks if mended else ()
     if any(one.alike for one in checks):
@@ -106,18 +107,20 @@ def with_proven_corrections(
     if own:
         tell("identifying without what is proven to be wrong")
         corrections = accepted_corrections(own, f"session {result.session.folder.name}")
-        base = examine(base.session, reference=reference, known=result.known, corrections=corrections)
+        subject = reduce(lambda who, one: one.cause.declared(who, one.target), own, base.session.subject)
+        session = replace(base.session, subject=subject)
+        base = examine(session, reference=reference, known=result.known, corrections=corrections)
     if not (undone or own) or base.identification is None:
         return result
     return replace(base, identification=replace(base.identification, corrected=(*undone, *own)))
 
 
 def proven(one: Finding, prior: Mapping[Key, float]) -> bool:
-    """Return whether a finding is taken off before the fit: a zero, a delay or a gain without which data that were not
-    used for it fit better, and which is there with the probability `NAMED` rather than another cause of its set (of
-    log ``prior`` probabilities by effect and target).
+    """Return whether a finding is taken off before the fit: a zero, a delay, a gain or an unequal limb without which
+    data that were not used for it fit better, and which is there with the probability `NAMED` rather than another cause
+    of its set (of log ``prior`` probabilities by effect and target).
     """
-    if one.effect not in _INSIDE or one.gain is None or not one.gain.proven:
+    if not (one.effect in _INSIDE or one.cause.of_person()) or one.gain is None or not one.gain.proven:
         return False
     logs = np.array([alias.log_bayes_factor + prior.get((alias.effect, alias.target), 0.0) for alias in one.set])
     same = np.array([alias.effect == one.effect for alias in one.set])
@@ -178,13 +181,28 @@ def _accepted(result: SessionResult, inferred: Inferred, before: Identification)
     findings = tuple(replace(one, changes=_changes(before, found.identified)) for one in inferred.diagnosis.findings)
     single, habits = len(every) == 1, (None,) * (len(findings) - len(every))  # a habit is nothing to accept
     gains = [
-        _gain(as_is if single else _without(result, inferred, k), found) if _acts(result, one) else None
+        _gain_of_person(result, inferred, k, before) if one.effect.of_person()
+        else _gain(as_is if single else _without(result, inferred, k), found) if _acts(result, one) else None
         for k, one in enumerate(every)
-    ]
+    ]  # fmt: skip
     findings = tuple(replace(one, gain=gain) for one, gain in zip(findings, (*gains, *habits), strict=True))
     told = replace(inferred, diagnosis=replace(inferred.diagnosis, findings=findings))
     left = (as_is.kept, found.kept) if as_is.kept and found.kept else None
-    return Accepted(told, found.identified, left, _gain(as_is, found))
+    return Accepted(told, found.identified, left, gains[0] if single else _gain(as_is, found))
+
+
+def _gain_of_person(result: SessionResult, inferred: Inferred, index: int, before: Identification) -> Gain | None:
+    """Return what a finding of the person gains against sides alike: by the halves of the movement, as trials that are
+    kept move both sides alike (squats), and show nothing of one.
+    """
+    alike, rest = tables_by_sides(before)[0][0], inferred.without(index)
+    try:
+        return _gain(
+            _corrected(result, partial(accept, named=rest.named), _phi(result, rest), prior=alike, halves=True),
+            _corrected(result, partial(accept, named=inferred.named), _phi(result, inferred), halves=True),
+        )
+    except NotSolved:
+        return None
 
 
 def _without(result: SessionResult, inferred: Inferred, index: int) -> _Corrected | None:
@@ -218,16 +236,20 @@ def _gain(before: _Corrected | None, after: _Corrected) -> Gain | None:
         return None
 
 
-def _corrected(result: SessionResult, mend: _Mend, phi: Array, as_is: Identification | None = None) -> _Corrected:
-    """Return the session with every trial mended, seen with the parameters ``phi`` (10N,), and identified again.
-    ``as_is``: the body identified from the trials as they are, where it is known.
+def _corrected(
+    result: SessionResult, mend: _Mend, phi: Array, as_is: Identification | None = None, *,
+    prior: Sip | None = None, halves: bool = False,
+) -> _Corrected:  # fmt: skip
+    """Return the session with every trial mended, seen with the parameters ``phi`` (10N,), and identified again, after
+    ``prior`` where that is given; judged by the ``halves`` of the movement also where trials were kept. ``as_is``: the
+    body identified from the trials as they are, where it is known.
     """
     body, fitted, judged = _mended(result, FITTED_ROLES, mend, phi)
-    kept = _mended(result, KEPT_ROLES, mend, phi)[2]
-    found = as_is or identify_body(body, fitted)
+    kept = () if halves else _mended(result, KEPT_ROLES, mend, phi)[2]
+    found = as_is or identify_body(body, fitted, prior=prior)
     about = standing_point(kept or fitted)
     if not kept:
-        return _Corrected(found, *(_by_halves(body, judged, about) if judged else (None, None)))
+        return _Corrected(found, *(_by_halves(body, judged, about, prior) if judged else (None, None)))
     return _Corrected(found, *(residuals_of(found.identified, some, about) for some in (fitted, kept)))
 
 
@@ -243,7 +265,7 @@ def _mended(result: SessionResult, roles: tuple[Role, ...], mend: _Mend, phi: Ar
     return (cases[0].body if cases else result.body), fits, tuple(compress(fits, judged))
 
 
-def _by_halves(body: Body, fits: _Fits, about: Array) -> tuple[Residuals | None, Residuals | None]:
+def _by_halves(body: Body, fits: _Fits, about: Array, prior: Sip | None) -> tuple[Residuals | None, Residuals | None]:
     """Return what the body that each half of the movement gives leaves of that half, and of the other one; nothing
     where a half gives none.
     """
@@ -255,7 +277,7 @@ def _by_halves(body: Body, fits: _Fits, about: Array) -> tuple[Residuals | None,
     ]
     halves = [tuple(fit for fit in half if fit.use.any()) for half in parts]
     try:
-        bodies = [identify_body(body, half).identified for half in halves]
+        bodies = [identify_body(body, half, prior=prior).identified for half in halves]
     except (TrialRefused, NotSolved):
         return None, None
     used, kept = (

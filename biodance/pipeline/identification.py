@@ -71,6 +71,8 @@ class SessionIdentification(Sendable):
         the fields that need them are empty.
     corrected : tuple of Finding
         What was proven to be wrong with the recordings, and was taken off before the fit (`with_proven_corrections`).
+    posterior : SessionIdentification or None
+        Beside one by the paper's programme (`by_paper`) that of the posterior; None for the latter.
 
     Examples
     --------
@@ -91,6 +93,7 @@ class SessionIdentification(Sendable):
     notes: tuple[str, ...] = ()
     failures: Mapping[str, str] = field(default_factory=dict)
     corrected: tuple[Finding, ...] = ()
+    posterior: "SessionIdentification | None" = None
 
     def __repr__(self) -> str:
         sip = self.identification.sip
@@ -101,6 +104,11 @@ class SessionIdentification(Sendable):
 
     def _repr_html_(self) -> str:
         return display.card(repr(self), self.table(), self.notes)
+
+    @property
+    def method(self) -> Literal["posterior", "paper"]:
+        """How it was identified."""
+        return "posterior" if self.posterior is None else "paper"
 
     @property
     def status(self) -> Literal["solved", "failed"]:
@@ -152,7 +160,7 @@ class SessionIdentification(Sendable):
 
 def can_identify(results: tuple[TrialResult, ...]) -> bool:
     """Whether any trial with role fit can be identified from."""
-    return bool(_fits(results, FITTED_ROLES))
+    return bool(fits_of_roles(results, FITTED_ROLES))
 
 
 @one_thread()
@@ -180,7 +188,7 @@ def identify_trials(
     TrialRefused
         No trial with role fit has motion and fully measured ground contact.
     """
-    fits = _fits(results, FITTED_ROLES, *corrections)
+    fits = fits_of_roles(results, FITTED_ROLES, *corrections)
     if not fits:
         raise TrialRefused(
             f"Session {name} has no trial with role fit in which markers and plates measure all, so nothing can be "
@@ -199,19 +207,10 @@ def identify_trials(
     doubts = (*load_doubts(own, weighed=reference is not None), *earlier)
     search = added_mass(found, reference=reference.identification if reference else None, doubts=doubts)
     lies_on = nearest_segment(body, tuple(fit.motion for fit in fits), search.best.segment, search.best.place)
-    one = SessionIdentification(
-        name,
-        found,
-        (),
-        (),
-        {},
-        None,
-        replace(search, lies_on=lies_on, reference=f"session {reference.name}" if reference else search.reference),
-        changes=_changes(reference, found, failures),
-        notes=found.notes,
-        failures=failures,
-    )
-    told = one if found.status == "failed" else _predicted(one, results, weighed)
+    load = replace(search, lies_on=lies_on, reference=f"session {reference.name}" if reference else search.reference)
+    changes = _changes(reference, found, failures)
+    one = SessionIdentification(name, found, (), (), {}, None, load, changes, notes=found.notes, failures=failures)
+    told = one if found.status == "failed" else predicted(one, results, weighed)
     return _weighed(told, reference) if reference is not None and found.status == "solved" else told
 
 
@@ -252,13 +251,13 @@ def _changes(
         return ()
 
 
-def _predicted(
+def predicted(
     one: SessionIdentification, results: tuple[TrialResult, ...], weighed: Weighing | None
 ) -> SessionIdentification:
     """Return the same with what the identified body predicts of all trials."""
     found, identified, mass = one.identification, one.identification.identified, weighed.mass if weighed else None
-    parts = [_fits(results, roles) for roles in (FITTED_ROLES, KEPT_ROLES)]
-    about, every = standing_point(parts[0]), _fits(results, ROLES)
+    parts = [fits_of_roles(results, roles) for roles in (FITTED_ROLES, KEPT_ROLES)]
+    about, every = standing_point(parts[0]), fits_of_roles(results, ROLES)
     fitted, kept = (
         tuple(validate(found.body, identified, fit, about=about, mass=mass) for fit in some) for some in parts
     )
@@ -286,7 +285,8 @@ def _shown(results: tuple[TrialResult, ...]) -> TrialResult | None:
     return next((one for role in (*KEPT_ROLES, *FITTED_ROLES) for one in told if one.trial.role == role), None)
 
 
-def _fits(results: tuple[TrialResult, ...], roles: tuple[Role, ...], *made: PlateCorrection) -> tuple[Fit, ...]:
+def fits_of_roles(results: tuple[TrialResult, ...], roles: tuple[Role, ...], *made: PlateCorrection) -> tuple[Fit, ...]:
+    """Return the trials of some roles as identification takes them, less the corrections ``made``."""
     found = [trial_fit(result, made) for result in results if result.trial.role in roles]
     return tuple(fit for fit in found if fit is not None)
 

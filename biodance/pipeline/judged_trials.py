@@ -20,15 +20,17 @@ TOO_SHORT = f"no {SHORTEST_RUN:g} s in which the plates measure all ground conta
 """Why a trial with measured contact is not looked at."""
 _STATIC = "quiet standing tells nothing beside so much movement"
 _KEPT = "kept to measure what a finding gains"
+_POSTURES = "its rows are postures: identified from, and nothing told of movement, clocks or plates"
 _NEVER = "it holds no measured ground contact"
 _DIFFERENT = "plates and motion differ by more than a wrong body can make of it, in most of what is measured."
 
 
 def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[TrialWindow, ...]:
     """Return the trials of the given roles that have motion and measured contact, each at its place in the session's
-    time; static trials belong to that time only where they are asked for.
+    time; static trials belong to that time only where they are asked for, rows of postures never.
     """
-    moving = [one for one in results if one.motion is not None and (one.trial.role != "static" or "static" in roles)]
+    asked = [one for one in results if one.trial.role != "static" or "static" in roles]
+    moving = [one for one in asked if one.motion is not None and not _of_postures(one)]
     seconds = [float(np.ptp(one.motion.time[[0, -1]])) for one in moving if one.motion is not None]
     ends = np.cumsum(seconds)
     found = []
@@ -37,6 +39,11 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
             continue
         found.append(TrialWindow(one.trial, one.motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1]))
     return tuple(found)
+
+
+def _of_postures(one: TrialResult) -> bool:
+    """Return whether the frames of a trial are postures at rest, with no movement between them (`smoothing.smooth`)."""
+    return one.motion is not None and one.motion.time.size > 1 and not one.motion.v.any()
 
 
 def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
@@ -81,7 +88,8 @@ def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
     """Return by name why a trial is not looked at, though it should be."""
     seen = {window.trial.name: window.seconds for window in windows(results, ("static", *FITTED_ROLES))}
     wanted = [one for one in results if one.trial.role in FITTED_ROLES and not seen.get(one.name, 0.0)]
-    return {one.name: TOO_SHORT if one.name in seen else " ".join(one.reasons) for one in wanted}
+    why = {one.name: _POSTURES if _of_postures(one) else " ".join(one.reasons) for one in wanted}
+    return {one.name: TOO_SHORT if one.name in seen else why[one.name] for one in wanted}
 
 
 def judged_trials(result: SessionResult, looked_at: Set[str]) -> tuple[Judged, ...]:

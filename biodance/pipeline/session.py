@@ -7,6 +7,7 @@ from functools import partial
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
 from biodance.errors import SessionRefused
+from biodance.identification.limbs import with_declared_limbs
 from biodance.lab.corrections import PlateCorrection, corrected_trial
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
@@ -115,6 +116,9 @@ def examine(
     prior = None
     if body is not None and known is not None:
         body, prior, source = starting_from(known, body, session.subject.mass, source)
+    elif body is not None:
+        body, limbs = with_declared_limbs(body, session.subject)
+        source = f"{source} {limbs}".strip()
     plain, shown = body, ShownJoints()
     if body is not None:
         body, shown = shown_joints(body, read, steps)

@@ -88,7 +88,8 @@ def spoken(finding: Finding, others: Sequence[Finding] = ()) -> SpokenFinding:
     of = listed(finding.trials) or place_in_words(finding.target)
     pairs = listed([one.target.replace("/", " and ") or "something" for one in (finding, *others)])
     shown = {
-        "it": place_in_words(finding.target.partition("->")[0]) or "something",
+        "it": place_in_words(words.called(finding.target).partition("->")[0]) or "something",
+        "opposite": "right" if finding.target.startswith("left") else "left",
         "plate": place_in_words(whole) if whole else "the plate",
         "axis": first,
         "other": other,

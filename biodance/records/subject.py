@@ -76,6 +76,10 @@ class Subject:
         Axis of that file that points up.
     foot_outline : mapping
         `FootSizes` by side, right and left; empty = not measured.
+    prosthesis : str
+        First segment of a limb that is a prosthesis (``left_shank``): nothing is known of its matter; "" = none.
+    devices : mapping
+        What is worn, kg by segment, known; ``mass`` holds it.
 
     Examples
     --------
@@ -94,6 +98,8 @@ class Subject:
     scan: str = ""
     scan_up: Literal["z", "y", "x"] = "z"
     foot_outline: Mapping[str, FootSizes] = field(default_factory=dict)
+    prosthesis: str = ""
+    devices: Mapping[str, float] = field(default_factory=dict)
 
     def require(self, *quantities: Literal["mass", "stature", "age"]) -> None:
         """Refuse to go on where a quantity is not known.

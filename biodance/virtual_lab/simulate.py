@@ -20,6 +20,7 @@ from biodance.virtual_lab.faults.forces import wobbling_mass
 from biodance.virtual_lab.movement.performance import AppliedForce, Performance
 from biodance.virtual_lab.movement.protocol import Protocol, TrialPlan, read_protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.person.prosthesis import with_prostheses
 from biodance.virtual_lab.person.skeleton import TRUE_SEGMENTS
 from biodance.virtual_lab.recording.laboratory import SWINGING, Laboratory, soft_parts
 from biodance.virtual_lab.recording.visit import (
@@ -97,6 +98,7 @@ def write_visit(
         joint_shifts=visit.joint_shifts,
         population=visit.laboratory.population,
     )
+    person = with_prostheses(person, visit.lighter_limbs)
     instruments = set_up(person, replace(visit, forces=(*visit.forces, *_swinging_flesh(person, visit.laboratory))))
     with whole_folder(out) as part:
         _write(plan, person, instruments, visit, performed, part)

@@ -148,6 +148,12 @@ class Effect(Checked):
         """
         return None
 
+    def in_body(self, case: Case) -> Array | None:
+        """Return (10N,) how the parameters of the body count to the first parameter of this cause, which says what is
+        there and not only how the body is unlike the table; None where none of it lies in the body.
+        """
+        return None
+
     def measured(self, theta: Array, *cases: Case) -> Array:
         """Return the size (p,) of a cause that was named with ``theta`` (p,): where the markers of all ``cases`` show
         it by themselves, that, in place of what was inferred from all rows; by default ``theta``.

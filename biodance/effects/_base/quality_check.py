@@ -13,7 +13,7 @@ from biodance.effects._base.case import Case
 from biodance.effects._base.quantity import Quantity
 from biodance.effects._base.words import About, CauseWords, CheckKind
 from biodance.motion.newton import LagAndMass, newton_of
-from biodance.records import Session, Trial
+from biodance.records import Session, Subject, Trial
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,16 @@ class Checked:
     def undone(cls, trial: Trial, found: QualityCheck) -> Trial:
         """Return a trial as read without what its check ``found`` in it; by default as it is: nobody can undo it."""
         return trial
+
+    @classmethod
+    def declared(cls, subject: Subject, target: str) -> Subject:
+        """Return the person as declared once this cause at ``target`` is accepted: by default the same."""
+        return subject
+
+    @classmethod
+    def of_person(cls) -> bool:
+        """Return whether it is declared of the person, not taken off the recordings."""
+        return cls.declared.__func__ is not Checked.declared.__func__  # type: ignore[attr-defined]
 
     @classmethod
     def undoes(cls) -> bool:

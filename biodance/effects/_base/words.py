@@ -1,6 +1,7 @@
 """What is said of a cause: what it is for the analyst's page, and how a person is told of it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 
@@ -19,8 +20,9 @@ class About:
 @dataclass(frozen=True)
 class CauseWords:
     """How a cause is told: the ``fact`` about {it} with its {size} and the interval {between}, {more} where it is
-    positive; what to ``do``; its name as an ``alternative``; the two words of {more}; ``signs`` what a positive and a
-    negative size mean where the number stands alone.
+    positive, {opposite} the other side; what to ``do``; its name as an ``alternative``; the two words of {more};
+    ``signs`` what a positive and a negative size mean where the number stands alone; ``places`` what {it} is called by
+    the end of its target, where that is not its name.
     """
 
     fact: str
@@ -28,6 +30,12 @@ class CauseWords:
     alternative: str
     more: tuple[str, str] = ("", "")
     signs: tuple[str, str] = ("", "")
+    places: Mapping[str, str] = field(default_factory=dict)
+
+    def called(self, target: str) -> str:
+        """Return the target as it is told: ``left leg below the knee``; unchanged where it has no name of its own."""
+        side, _, end = target.partition("_")
+        return f"{side} {self.places[end]}" if end in self.places else target
 
 
 class CheckKind(StrEnum):

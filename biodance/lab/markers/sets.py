@@ -18,7 +18,7 @@ from biodance.errors import BiodanceError, FileRefused, TrialRefused, UnknownNam
 from biodance.library import read_toml
 from biodance.records import SIDES, Array, Markers, Trial
 
-_SEGMENTS = (
+MARKED_SEGMENTS = (
     "pelvis",
     *(f"{side}_{part}" for side in SIDES for part in ("thigh", "shank", "foot")),
     "trunk_head",
@@ -140,8 +140,8 @@ def _parse_map(given: Mapping[str, Any], path: str) -> Contents:
     markers: dict[str, _SetMarker] = {}
     landmarks: dict[str, tuple[tuple[str, ...], ...]] = {}
     for label, place in given.items():
-        if place not in (*LANDMARKS, *_SEGMENTS):
-            legal = f"landmarks {', '.join(LANDMARKS)}; segments {', '.join(_SEGMENTS)}"
+        if place not in (*LANDMARKS, *MARKED_SEGMENTS):
+            legal = f"landmarks {', '.join(LANDMARKS)}; segments {', '.join(MARKED_SEGMENTS)}"
             raise BiodanceError(
                 f"{path}: [markers] map says {label} = {place!r}, which is no landmark and no segment. Legal are "
                 f"{legal}."
@@ -150,7 +150,7 @@ def _parse_map(given: Mapping[str, Any], path: str) -> Contents:
             raise BiodanceError(
                 f"{path}: [markers] map gives {place} to {landmarks[place][0][0]} and to {label}. Keep one of the two."
             )
-        markers[label] = _SetMarker(label, place if place in _SEGMENTS else segment_of(place))
+        markers[label] = _SetMarker(label, place if place in MARKED_SEGMENTS else segment_of(place))
         if place in LANDMARKS:
             landmarks[place] = ((*landmarks.get(place, ((),))[0], label),)
     if "mid_psis" not in landmarks and {"left_psis", "right_psis"} <= landmarks.keys():
@@ -164,7 +164,7 @@ def segment_of(landmark: str) -> str:
     """Return the segment that a marker on a landmark sits on."""
     side, _, part = landmark.rpartition("_") if landmark.startswith("mid") else landmark.partition("_")
     segment = _SEGMENT_OF.get(landmark) or _SEGMENT_OF[part]
-    return f"{side}_{segment}" if f"{side}_{segment}" in _SEGMENTS else segment
+    return f"{side}_{segment}" if f"{side}_{segment}" in MARKED_SEGMENTS else segment
 
 
 def part_of(landmark: str) -> str:
@@ -172,9 +172,9 @@ def part_of(landmark: str) -> str:
     return landmark.partition("_")[2] if landmark.startswith(SIDES) else landmark
 
 
-def other_side(landmark: str) -> str:
-    """Return the same landmark of the other side."""
-    side, _, part = landmark.partition("_")
+def other_side(name: str) -> str:
+    """Return the same landmark or segment of the other side."""
+    side, _, part = name.partition("_")
     return f"{'left' if side == 'right' else 'right'}_{part}"
 
 
@@ -214,8 +214,8 @@ def _marker(path: Path, label: str, fields: Any) -> _SetMarker:
     """Return one marker after checking its entry."""
     where = f"{path}: marker {label}"
     if not isinstance(fields, dict) or "segment" not in fields:
-        raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(_SEGMENTS)}.")
-    for key, legal in (("segment", _SEGMENTS), ("normaliser", _NORMALISERS.split()), ("origin", _ORIGINS)):
+        raise BiodanceError(f"{where} has no segment. Write segment = one of {', '.join(MARKED_SEGMENTS)}.")
+    for key, legal in (("segment", MARKED_SEGMENTS), ("normaliser", _NORMALISERS.split()), ("origin", _ORIGINS)):
         if key in fields and fields[key] not in legal:
             raise BiodanceError(f"{where} has the {key} {fields[key]!r}. Legal: {', '.join(legal)}.")
     unknown = [key for key in fields if key not in _MARKER_KEYS]

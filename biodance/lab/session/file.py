@@ -27,6 +27,9 @@ that points up, by default z).
 ``[plates.plate1]`` gives or corrects a force plate: ``corners_m``, ``type``, ``channels``, ``sensitivity``,
 ``origin_m``, the ``foot`` that stands on it, ``use = false``.
 
+``[subject] prosthesis = "left_shank"`` says that this limb is a prosthesis from there on; ``[devices] right_shank =
+0.6`` what is worn there in kg, on top of ``mass_kg`` (`worn`).
+
 ``[session]`` may say ``date`` (2026-03-05), ``lab``, ``operator`` and ``condition``.
 
 A ``subject.toml`` or ``session.toml`` in the folder above (the subject's folder) has the same keys and fills in what
@@ -53,6 +56,7 @@ from biodance.lab.plates.corners import LONGEST_SIDE, SHORTEST_SIDE, Told, ToldP
 from biodance.lab.plates.decode import DEEPEST
 from biodance.lab.plates.parameters import CHANNELS_OF_TYPE, CONTENT, channel_groups, plate_parameters
 from biodance.lab.readers.c3d import file_frame
+from biodance.lab.session.worn import legal_devices, legal_prosthesis
 from biodance.lab.shape import legal_girths, traced_outline, typed_outline
 from biodance.library import read_toml
 from biodance.records import Array, FootSizes, Plate, Role, Session, Trial
@@ -268,6 +272,7 @@ class SubjectEntry(_Entry):
     scan: str | None = None
     scan_up: Literal["z", "y", "x"] | None = None
     foot_outline: str | dict[str, float] | None = None
+    prosthesis: str | None = None
 
     @property
     def girths(self) -> dict[str, float]:
@@ -310,6 +315,7 @@ class _Contents(_Entry):
     markers: _MarkersEntry = _MarkersEntry()
     trials: dict[str, _TrialEntry] = {}
     plates: dict[str, _PlateEntry] = {}
+    devices: dict[str, float] = {}
     settings: dict[str, Any] = {}
 
 
@@ -317,7 +323,8 @@ class _Contents(_Entry):
 class SessionFile:
     """What all files of the chain say together: ``subject``, ``trials`` by name or pattern (the innermost file first),
     ``read`` paths, ``visit`` when and where; ``settings`` with what ``[settings]`` changes; ``marker_set`` the name or
-    file of the set that was worn, "" where none is said (see `read_marker_set`); ``plates`` by name.
+    file of the set that was worn, "" where none is said (see `read_marker_set`); ``plates`` by name;
+    ``devices`` kg by segment.
     """
 
     subject: SubjectEntry = field(default_factory=SubjectEntry)
@@ -327,6 +334,7 @@ class SessionFile:
     marker_set: str = ""
     visit: VisitEntry = field(default_factory=VisitEntry)
     plates: Mapping[str, ToldPlate] = field(default_factory=dict)
+    devices: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def told(self) -> Told:
@@ -381,7 +389,9 @@ def read_session_file(folder: Path) -> SessionFile:
     worn = [name for path, content in zip(paths, contents, strict=True) if (name := _marker_set(path, content.markers))]
     settings, marker_set = _settings(paths, contents), (worn or [""])[-1]
     told = {name: _told_plate(name, entry) for name, entry in plates.items()}
-    return SessionFile(SubjectEntry(**said), trials, tuple(paths), settings, marker_set, VisitEntry(**visit), told)
+    worn_kg = {segment: mass for content in contents for segment, mass in content.devices.items()}
+    subject, day_of = SubjectEntry(**said), VisitEntry(**visit)
+    return SessionFile(subject, trials, tuple(paths), settings, marker_set, day_of, told, worn_kg)
 
 
 def _over(earlier: _PlateEntry | None, entry: _PlateEntry) -> _PlateEntry:
@@ -421,6 +431,7 @@ def _read(path: Path) -> _Contents:
         raise SessionRefused(" ".join(_sentence(path, fault) for fault in error.errors())) from None
     try:
         _ = [_told_plate(name, entry) for name, entry in found.plates.items()]
+        _ = legal_prosthesis(found.subject.prosthesis), legal_devices(found.devices)
     except SessionRefused as error:
         raise SessionRefused(f"{path}: {error}") from None
     return found
@@ -471,6 +482,7 @@ _HELP = {
     "girths_cm": "Write {thigh = 54, right_shank = 37}, in cm.",
     "scan": 'Write the path of a mesh, for example "body.obj".',
     "scan_up": 'Write the axis of the scan that points up: "z", "y" or "x".',
+    "prosthesis": 'Write the segment that it begins with, for example "left_shank".',
     "foot_outline": "Write {length = 26, breadth = 10, heel_breadth = 7} in cm, or the path of a CSV file.",
     "file": 'Write the path of a marker set, for example "my_set.toml".',
     "map": 'Write {LABEL = "left_asis", ...}.',

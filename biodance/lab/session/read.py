@@ -167,7 +167,11 @@ def read_session(
         trials, guessed = dress(trials)
         notes += guessed
     subject, guesses = identify_subject(
-        file_says.subject, measurements, trials, name=subject_name or folder.resolve().name
+        file_says.subject,
+        measurements,
+        trials,
+        name=subject_name or folder.resolve().name,
+        devices=file_says.devices,
     )
     read = [f"{path.name} in {path.parent.name} was followed." for path in file_says.read]
     roles = [f"{trial.name} has the role {trial.role}: {reasons[trial.name]}." for trial in trials]

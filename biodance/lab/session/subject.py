@@ -3,10 +3,12 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
+from biodance.display import spaced
 from biodance.lab.markers.sets import landmark, read_marker_set
 from biodance.lab.markers.upright import standing_mass
 from biodance.lab.session.file import SubjectEntry
@@ -123,6 +125,7 @@ def _has_arm(at: Mapping[str, Array], side: str) -> bool:
     return f"{side}_elbow_lateral" in at and f"{side}_acromion" in at
 
 
+NOTHING_WORN: Mapping[str, float] = MappingProxyType({})
 _MASS_NAMES = ("bodymass", "mass_kg", "mass", "weight")
 _STATURE_NAMES = ("height", "stature", "height_m", "bodyheight")
 _AGE_NAMES = ("age",)
@@ -143,20 +146,25 @@ class _Declared:
 
 
 def identify_subject(
-    typed: SubjectEntry, files: Mapping[str, Mapping[str, float]], trials: Sequence[Trial], *, name: str
+    typed: SubjectEntry,
+    files: Mapping[str, Mapping[str, float]],
+    trials: Sequence[Trial],
+    *,
+    name: str,
+    devices: Mapping[str, float] = NOTHING_WORN,
 ) -> tuple[Subject, tuple[str, ...]]:
     """Return the subject and the notes: what was guessed, what contradicts what.
 
     ``typed`` is the table [subject] of session.toml and comes first; ``files`` are the measurements of .mp and .vsk
     files by file name, in m and kg; then come the measurements in the trials, the static one first. A mass that nobody
     declared is read from quiet standing on the plates; a stature from heights of markers over the ankles. What
-    cannot be known stays NaN and a note says what to do.
+    cannot be known stays NaN and a note says what to do. ``devices`` (kg by segment) come on top of a declared mass.
     """
     ordered = sorted(trials, key=lambda trial: trial.role != "static")
     sources = {**files, **{trial.source.path.name: trial.measurements for trial in ordered}}
     notes: list[str] = []
     masses, statures = _declared(sources, _MASS_NAMES, _LEGAL_MASS), _declared(sources, _STATURE_NAMES, _LEGAL_STATURE)
-    mass = _choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes)
+    mass = _with_devices(_choose("body mass", "kg", [*_typed(typed.mass_kg), *masses], notes), devices, notes)
     stature = _choose("stature", "m", [*_typed(typed.height_m), *statures], notes)
     sex = typed.sex or _declared_sex(sources)
     known = {"mass": math.isfinite(mass), "stature": math.isfinite(stature), "sex": sex is not None}
@@ -174,7 +182,8 @@ def identify_subject(
     measures = {name: value for values in reversed(sources.values()) for name, value in values.items()}
     guessed = tuple(what for what in known if not known[what])
     shape = (typed.girths, typed.scan or "", typed.scan_up or "z", typed.outlines)
-    return Subject(mass, stature, sex, age, typed.name or name, measures, guessed, *shape), tuple(notes)
+    worn = typed.prosthesis or "", dict(devices)
+    return Subject(mass, stature, sex, age, typed.name or name, measures, guessed, *shape, *worn), tuple(notes)
 
 
 def declared_mass(measurements: Mapping[str, float]) -> float:
@@ -216,6 +225,15 @@ def _choose(quantity: str, unit: str, declared: list[_Declared], notes: list[str
             "the first was used. Are all files of the same person and day?"
         )
     return first.value
+
+
+def _with_devices(mass: float, devices: Mapping[str, float], notes: list[str]) -> float:
+    """Return the declared mass with what is worn, which the plates carry, too."""
+    if not devices or math.isnan(mass):
+        return mass
+    worn = ", ".join(f"{kg:g} kg on the {spaced(segment)}" for segment, kg in devices.items())
+    notes.append(f"{worn} are worn and come on top of the {mass:g} kg declared: {mass + sum(devices.values()):g} kg.")
+    return mass + sum(devices.values())
 
 
 def _check_mass(mass: float, on_plates: list[_Declared], notes: list[str]) -> float:

@@ -134,6 +134,8 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
             yield f"# {key} = {json.dumps(value)}  # guessed"
         else:
             yield f"{key} = {json.dumps(value)}"
+    yield '# prosthesis = "left_shank"  # the segment that a prosthesis begins with'
+    yield from ("", "# [devices]  kg worn beside mass_kg, by segment", "# right_shank = 0.6")
     for trial in {trial["name"]: trial for trial in found["trials"]}.values():
         yield from ("", f"[trials.{json.dumps(trial['name'])}]", f'# role = "{trial["role"]}"  # {trial["why"]}')
     yield from ("", *_marker_lines(found))

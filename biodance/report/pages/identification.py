@@ -1,18 +1,21 @@
 """The pages of the report on what the body weighs: figures, tables and sentences; computes nothing."""
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from biodance.display import BLACK, BLUE, GREY, RED, spaced
-from biodance.identification.identification import Identification
-from biodance.identification.knowledge import QUANTITIES, mass_interval
+from biodance.identification.knowledge import QUANTITIES
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
 from biodance.identification.torques import Impact, TorqueBands
+from biodance.identification.validation import TrialValidation
+from biodance.motion.dynamics import Agreement
 from biodance.pipeline.identification import SessionIdentification
 from biodance.records import CHANNEL_TITLES, AngleState
+from biodance.report.figures.bodies import ROW, mass_figure, shape_figure
 from biodance.report.figures.session import bar_list
 from biodance.report.figures.vector import (
     LEFT_SIDE,
@@ -41,7 +44,7 @@ from biodance.report.tables.identification import (
     segments_document,
     torques_document,
 )
-from biodance.report.tables.schema import Row
+from biodance.report.tables.schema import Row, Schema
 from biodance.report.wording import changed, parted_gain, signed
 
 if TYPE_CHECKING:
@@ -83,42 +86,6 @@ def excitation_figure(found: "PerformanceScore") -> str:
     return bar_list(rows, "Share of the table's variance removed, reached (bar) and planned (tick)")
 
 
-LIGHT = 5.0
-"""kg: segments below are drawn in a panel of their own, or their intervals could not be seen beside the trunk's."""
-_INSIDE = {"known": "", "partly known": "#f2b08a", "cannot be known": "#fff"}
-_ROW = 19.0
-"""px of a segment's row."""
-
-
-def forest_figure(found: Identification) -> str:
-    """Return the mass of every segment: table (grey) and identified (filled = known, pale = partly known, open = not
-    known), with 95 % intervals.
-    """
-    masses = [mass_interval(known) for known in found.known if known.quantity == "mass"]
-    groups = ([k for k in masses if k.before[0] >= LIGHT], [k for k in masses if k.before[0] < LIGHT])
-    drawn = []
-    for rows in filter(None, groups):
-        ends = np.array([value for row in rows for value in (*row.before, *row.after)])
-        room = 0.04 * float(np.ptp(ends))
-        x = Axis(max(0.0, float(ends.min()) - room), float(ends.max()) + room, "mass (kg), 95 % intervals")
-        ticks = tuple((len(rows) - 1.0 - i, spaced(row.name)) for i, row in enumerate(rows))
-        y = Axis(-0.6, len(rows) - 0.4, "", ticks)
-        marks = []
-        for (at, _), row in zip(ticks, rows, strict=True):
-            edge = BLACK if row.known == "cannot be known" else RED
-            for up, (value, low, high), colour, inside, wide in (
-                (at + 0.17, row.before, GREY, "#fff", 1.0),
-                (at - 0.17, row.after, edge, _INSIDE[row.known], 1.8),
-            ):
-                marks.append(segments(x, y, np.array([[low, up], [high, up]]), Stroke(colour, "", wide)))
-                marks.append(points(x, y, np.array([value]), np.array([up]), Stroke(colour), inside=inside, size=6.5))
-        frame = Frame(height=_ROW * len(rows), left=112.0, above=4.0)
-        drawn.append(panel(x, y, marks, "mass of every segment, table and identified", frame=frame))
-    words = ("grey ring: table", "orange point: identified, known", "pale: partly known", "black ring: cannot be known")
-    legend = "".join(f"<span>{word}</span>" for word in words)
-    return f'<div class="legend">{legend}</div><div class="cells">{"".join(drawn)}</div>'
-
-
 _RANKED = 15
 """Quantities that the figure of pulls and impacts shows."""
 
@@ -143,7 +110,7 @@ def impact_figure(found: Sequence[Impact]) -> str:
         right += [segments(moment, y, knee, Stroke(BLUE, "", 2.0)), segments(moment, y, hip, Stroke(RED, "4 2", 2.0))]
         right += [_point(moment, y, row.knee, at + 0.16, RIGHT_SIDE)]
         right += [_point(moment, y, row.hip, at - 0.16, LEFT_SIDE, inside="#fff")]
-    frame = Frame(height=_ROW * len(rows), left=138.0, above=4.0)
+    frame = Frame(height=ROW * len(rows), left=138.0, above=4.0)
     drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
     drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
     words = ("grey: one prior standard deviation", "blue point: knee flexion", "orange ring: hip flexion")
@@ -206,11 +173,48 @@ def _mass_changes(changes: "Iterable[Difference]") -> list[Row]:
     return [row if row["known"] else row | {"p": "cannot be known"} for row in rows]
 
 
+_METHODS = Schema(
+    "segment table posterior paper",
+    shown="segment: {segment:name} | table (kg): {table[0]:2} | posterior (kg): {posterior[0]:2} | paper (kg): "
+    "{paper[0]:2} | table (mm): {table[1]:mm0} | posterior (mm): {posterior[1]:mm0} | paper (mm): {paper[1]:mm0}",
+)
+"""Mass (kg) and centre of mass along its segment (m) by the table, the posterior and the paper's programme."""
+
+
+def _compared(found: SessionIdentification) -> list[Row]:
+    """Return a row for each segment where the paper's programme stands beside the posterior."""
+    if found.posterior is None:
+        return []
+    pairs = zip(
+        segments_document(found.posterior.identification), segments_document(found.identification), strict=False
+    )
+    return [
+        {
+            "segment": mine["name"],
+            "table": (mine["mass_prior_kg"], mine["com_prior_m"][1]),
+            "posterior": (mine["mass_kg"], mine["com_m"][1]),
+            "paper": (other["mass_kg"], other["com_m"][1]),
+        }
+        for mine, other in pairs
+    ]
+
+
+def _agreements(found: SessionIdentification, trial: TrialValidation) -> list[tuple[str, Agreement]]:
+    """Return how well the table, the identified parameters and, beside the paper's, those of the posterior agree."""
+    if found.posterior is None:
+        return [("table", trial.table_agreement), ("identified", trial.identified_agreement)]
+    every = (*found.posterior.validations, *found.posterior.fitted)
+    same = [("posterior", other.identified_agreement) for other in every if other.name == trial.name]
+    return [("table", trial.table_agreement), *same, ("paper", trial.identified_agreement)]
+
+
 def identification_section(found: SessionIdentification) -> str:
     """Return the sections as HTML text; the same argument gives the same characters."""
     from markupsafe import Markup
 
     one, sure = found.identification, certain_changes(found.changes)
+    drawn, paper = (found.posterior.identification, one) if found.posterior else (one, None)
+    carried = (found.search.best.segment, found.search.best.mass) if found.search.found else None
     rows = segments_document(one)
     return render(
         "identification.html.j2",
@@ -220,7 +224,10 @@ def identification_section(found: SessionIdentification) -> str:
         notes=[note for note in found.notes if not note.startswith(LISTED)],
         failures=found.failures,
         girths="; ".join(f"{spaced(name)}: {spaced(', '.join(said))}" for name, said in one.body.girths.items()),
-        forest=Markup(forest_figure(one)) if rows else "",
+        forest=Markup(mass_figure(drawn, paper, carried)) if rows else "",
+        shape=Markup(shape_figure(drawn, paper)) if rows else "",
+        methods=_METHODS,
+        compared=_compared(found),
         segments=rows,
         quantities=QUANTITIES,
         marks=MARKS,
@@ -228,6 +235,7 @@ def identification_section(found: SessionIdentification) -> str:
         trials=[(trial, "kept") for trial in found.validations] + [(trial, "fitted") for trial in found.fitted],
         parted={row["trial"]: parted_gain(row["gain"]) for row in VALIDATION_ROW.rows(found.validations)},
         channels=CHANNEL_TITLES,
+        agreements=partial(_agreements, found),
         ranked=Markup(impact_figure(found.impacts)) if found.impacts else "",
         torques=found.torques,
         torque_rows=(torques_document(found.torques) or {}).get("joints", []),

@@ -170,7 +170,7 @@ def _together(one: Identification) -> list[Row]:
 
 
 _IDENTIFICATION = Schema(
-    "status cause=identification.cause failures trials=identification.trials frames=identification.frames",
+    "method status cause=identification.cause failures trials=identification.trials frames=identification.frames",
     {
         "segments": lambda found: segments_document(found.identification),
         "inertia_order": lambda _: TENSOR_ORDER,
@@ -190,6 +190,7 @@ _IDENTIFICATION = Schema(
         "differences": DIFFERENCE_ROW.at("changes"),
         "performance": _PERFORMANCE,
         "notes": lambda found: found.notes,
+        "posterior": lambda found: identification_document(found.posterior) if found.posterior else None,
     },
 )
 
@@ -205,7 +206,8 @@ def identification_document(found: SessionIdentification) -> Row:
     ``impacts`` the ``pull`` of every quantity from its prior and what is ``left`` of its standard deviation, both in
     prior ones, and the RMS moment that one standard deviation of it after the data adds at knee and hip, largest first;
     ``differences`` to the reference session, empty without one; ``performance`` how well the dance that was shown was
-    danced, null without one. ``failures`` what could not be computed, with cause and
-    cure; after a failed fit (``status``) there are no segments.
+    danced, null without one. ``method`` "paper": parameters of the paper's programme, without standard deviations, and
+    under ``posterior`` the same document of the posterior (else null). ``failures`` what could not be computed, with
+    cause and cure; after a failed fit (``status``) there are no segments.
     """
     return _IDENTIFICATION.row(found)

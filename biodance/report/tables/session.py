@@ -90,7 +90,7 @@ def filter_document(result: SessionResult) -> Row:
 _SESSION = Schema(
     "session=session.folder.name subject trials refused=session.refused notes=session.notes steps",
     {
-        "subject": Schema("name mass_kg=mass height_m=stature sex age guessed"),
+        "subject": Schema("name mass_kg=mass height_m=stature sex age guessed prosthesis devices_kg=devices"),
         "trials": lambda one: [_trial(trial, one) for trial in one.trials],
         "steps": STEP_ROW,
         "body": Schema(

@@ -15,6 +15,7 @@ from biodance.virtual_lab.faults.recording_faults import Builder, Clock, axis_in
 from biodance.virtual_lab.movement.performance import AppliedForce
 from biodance.virtual_lab.movement.protocol import Protocol
 from biodance.virtual_lab.person.person import AddedLoad, Person, make_person
+from biodance.virtual_lab.person.prosthesis import with_prostheses
 from biodance.virtual_lab.recording.visit import FIRST_VISIT, Fault, LabVisit
 from biodance.virtual_lab.truth import load_on
 
@@ -163,6 +164,13 @@ def _longer(cause: Hidden, scene: Scene) -> Scene:
     )
 
 
+def _prosthesis(cause: Hidden, scene: Scene) -> Scene:
+    """Make the limb from a segment on ``lighter`` kg: a prosthesis."""
+    limbs = {**scene.visit.lighter_limbs, cause.target: cause.numbers(("lighter",))["lighter"]}
+    with_prostheses(scene.person, limbs)  # refused here, before anything is simulated
+    return replace(scene, visit=replace(scene.visit, lighter_limbs=limbs))
+
+
 def _motion(tolerance: str) -> Callable[[Hidden, Scene], Scene]:
     """Return the change that lets the person move a joint that the model lacks by ``angle`` rad rms per axis."""
 
@@ -183,6 +191,7 @@ IN_THE_PERSON: dict[str, Callable[[Hidden, Scene], Scene]] = {
     "joint_centre": _shifted("joint_shifts"),
     "marker_misplaced": _shifted("marker_shifts"),
     "segment_length": _longer,
+    "unequal_limbs": _prosthesis,
     "head_joint": _motion("head_motion"),
     "trunk_joint": _motion("thorax_motion"),
     "shoulder_girdle": _motion("girdle_motion"),

@@ -57,7 +57,7 @@ class LabVisit:
     ``tilt`` (3,) rad turns the laboratory's axes off the true vertical, beyond the tolerance; ``forces`` act on the
     person beside gravity and ground; ``joint_shifts`` (3,) m by joint (``right_hip``) move true joint centres in the
     parent's frame, with all that hangs on them; ``marker_shifts`` (3,) m by label move markers on their segments after
-    the static trial.
+    the static trial; ``lighter_limbs`` kg by the first segment that a prosthesis replaces.
     """
 
     number: int = 0
@@ -68,6 +68,7 @@ class LabVisit:
     forces: tuple[AppliedForce, ...] = ()
     joint_shifts: Mapping[str, Array] = field(default_factory=dict)
     marker_shifts: Mapping[str, Array] = field(default_factory=dict)
+    lighter_limbs: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         assign(self, tolerances=self.tolerances or self.laboratory.tolerances)
