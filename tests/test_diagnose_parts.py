@@ -69,7 +69,7 @@ def test_rows_are_white_under_the_noise_they_were_made_with(put) -> None:
 
 def test_what_comes_and_goes_bears_a_trial_of_which_too_little_is_measured() -> None:
     whole, other = windows(3, trials=2)
-    short = problem(body(), (whole, replace(other, use=other.motion.time < 0.5)))
+    short = problem(body(), (whole, replace(other, use=other.motion.time < 0.35)))
     columns = local_basis(short, replace(effect("external_contact"), target="left_forearm_hand"))
     assert columns.shape[0] == short.wrench_rows
     seen = columns.any(axis=0)

@@ -209,7 +209,7 @@ def test_plates_have_the_sizes_of_the_table() -> None:
     assert around_zero("plate_offset Fz", "offset") > error_size("plate_offset", "Fz"), (
         "what all plates show counts as well"
     )
-    assert plates.delay.max() == pytest.approx(0.00106, abs=2e-5), "1.0 ms late in all sessions, 0.3 ms between them"
+    assert plates.delay.max() == pytest.approx(error_size("time_delay", "session"))
     faults = (plates.mixing != 0).any(axis=(1, 2)).astype(int) + (plates.offset != 0).any(axis=1) + (plates.delay != 0)
     np.testing.assert_array_equal(faults, 1)
 

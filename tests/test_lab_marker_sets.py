@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from biodance.errors import BiodanceError, TrialRefused, UnknownName
-from biodance.lab.markers.sets import _SEGMENTS, FOLDER, LANDMARKS, canonical, landmark, read_marker_set, recognise
+from biodance.lab.markers.sets import (
+    FOLDER,
+    LANDMARKS,
+    MARKED_SEGMENTS,
+    canonical,
+    landmark,
+    read_marker_set,
+    recognise,
+)
 from biodance.library import names
 from biodance.records import Markers
 
@@ -24,7 +32,7 @@ def some_markers(labels: tuple[str, ...], frames: int = 4) -> Markers:
 def test_every_shipped_set_is_sound(name: str) -> None:
     marker_set = read_marker_set(name)
     assert len(set(marker_set.labels)) == len(marker_set.labels) > 30
-    assert {m.segment for m in marker_set.markers} == set(_SEGMENTS)
+    assert {m.segment for m in marker_set.markers} == set(MARKED_SEGMENTS)
     assert set(marker_set.landmarks) <= set(LANDMARKS)
     assert marker_set.source
     for marker in marker_set.markers:

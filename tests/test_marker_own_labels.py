@@ -15,7 +15,7 @@ from biodance.body.human.human import human
 from biodance.cli import run
 from biodance.errors import BiodanceError
 from biodance.lab.c3d.write import PlateRecording, write_c3d
-from biodance.lab.markers.sets import _SEGMENTS, LANDMARKS, read_marker_set, segment_of
+from biodance.lab.markers.sets import LANDMARKS, MARKED_SEGMENTS, read_marker_set, segment_of
 from biodance.lab.read import read_trial
 from biodance.lab.readers.trc import write_trc
 from biodance.lab.session.read import read_session
@@ -149,7 +149,7 @@ def test_a_set_that_was_not_worn_is_said(folder: Path) -> None:
 
 @pytest.mark.parametrize("landmark", LANDMARKS)
 def test_every_landmark_has_its_segment(landmark: str) -> None:
-    assert segment_of(landmark) in _SEGMENTS
+    assert segment_of(landmark) in MARKED_SEGMENTS
     side = landmark.partition("_")[0]
     assert not (
         side in ("left", "right") and any(limb in segment_of(landmark) for limb in ("thigh", "arm", "foot"))

@@ -122,7 +122,8 @@ def test_a_trial_has_the_keys_that_others_rely_on():
 
 def test_the_session_has_the_keys_that_others_rely_on():
     found = read_back(full_session())
-    assert found["subject"] == {"name": "S01", "mass_kg": 65.0, "height_m": 1.7, "sex": "F", "age": 31.0, "guessed": []}
+    said = {"name": "S01", "mass_kg": 65.0, "height_m": 1.7, "sex": "F", "age": 31.0, "guessed": []}
+    assert found["subject"] == {**said, "prosthesis": "", "devices_kg": {}}
     assert found["mass_check"]["mass_on_plates_kg"] == 65.2
     assert found["mass_check"]["difference_percent"] == pytest.approx(100 * 0.2 / 65)
     assert found["provenance"]["inputs_sha256"] == {"walk <1>.c3d": "ab" * 32}

@@ -8,6 +8,7 @@ from biodance.body.body import Body
 from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.effects import Case, QualityCheck, check_quality
+from biodance.lab.markers.time_axis import LONGEST_STEP
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
@@ -42,8 +43,9 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
 
 
 def _of_postures(one: TrialResult) -> bool:
-    """Return whether the frames of a trial are postures at rest, with no movement between them (`smoothing.smooth`)."""
-    return one.motion is not None and one.motion.time.size > 1 and not one.motion.v.any()
+    """Return whether the frames of a trial are postures at rest, with no movement between them (`smooth`)."""
+    time = np.empty(0) if one.motion is None else one.motion.time
+    return time.size > 1 and bool(np.median(np.diff(time)) > LONGEST_STEP)
 
 
 def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
