@@ -1,5 +1,7 @@
 """Faults of forces too large for gates and statistics: found before them, undone in a copy, and nothing else named."""
 
+from dataclasses import replace
+
 import pytest
 import two_plates
 from two_plates import changed, exchanged, foreign, late, session, weak
@@ -25,6 +27,17 @@ def test_nothing_is_undone_without_a_fault(monkeypatch):
     found = diagnosed(monkeypatch)
     assert found.mended is None
     assert names(found) == []
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_a_mass_is_wrong_only_where_one_was_declared(declared, monkeypatch):
+    """What the plates weighed is right for these plates; who asks for the mass by name is answered all the same."""
+    monkeypatch.setattr("biodance.pipeline.session.can_identify", lambda _: False)
+    visit = session()
+    subject = replace(visit.subject, mass=1.08 * visit.subject.mass, guessed=() if declared else ("mass",))
+    result = examine(replace(visit, subject=subject))
+    assert any(one.effect == "body_mass" for one in diagnose_session(result).findings) is declared
+    assert any(one.effect == "body_mass" for one in diagnose_session(result, effects=["body_mass"]).findings)
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.2, 0.4])

@@ -31,8 +31,6 @@ def moved_in_time(time: Array, value: Array, delay: Array) -> Array:
 
 _LEAST = 0.003
 """s that matter: a third of a frame at 100 Hz."""
-_USUAL = 0.008
-"""s up to which laboratories have it without calling it a fault: clocks within a frame."""
 _ALIKE = 0.002
 """Standard deviation of what careful laboratories have: no size is surer against "as the file says"."""
 
@@ -49,7 +47,6 @@ class TimeDelay(Effect):
             0.005,
             "2.1 to 10 ms measured between systems (van den Bogert 2000; Lemaire & Kuo 2024)",
             least=_LEAST,
-            usual=_USUAL,
             alike=_ALIKE,
         ),
     )

@@ -108,23 +108,24 @@ class Inferred:
         fitted = hypothesis(self.search, tuple(one for one in rest if not one.course)).causes if rest else ()
         return replace(self, diagnosis=told, named=(*fitted, *(one for one in rest if one.course)))
 
-    def tolerated(self) -> tuple[Finding, ...]:
+    def known_tolerances(self) -> tuple[Finding, ...]:
         """Return what is no fault and yet known and matters: every tolerance of one size that is not named, whose
-        posterior mean lies two standard deviations from none.
+        posterior mean lies two standard deviations from none; surer than careful laboratories are alike, and than
+        faults are like their models, is none.
         """
-        best, out = self.best, []
+        best, known, out = self.best, self.search.rows.tolerances, []
         named = {(one.effect, one.target) for one in self.diagnosis.findings}
         for one in self.search.causes:
             where, unit = best.rows.tolerated.get(one.names, (slice(0), np.zeros((1, 0))))
             if len(unit) != 1 or not unit.size or one.names in named:
                 continue
-            own = np.zeros(best.fit.u.size)
-            turn = best.columns.turn[where]
-            own[: turn.shape[1]] = unit[0] @ turn * best.fit.size[: turn.shape[1]]
             (parameter,), value = one.effect.parameters, float(unit[0] @ best.coefficients[where])
-            size = Estimate(
-                parameter.name, value, best.fit.variance(own) ** 0.5, unit_at(parameter.unit, one.effect.target)
+            turn, own = best.columns.turn[where], np.zeros(best.fit.u.size)
+            own[: turn.shape[1]] = unit[0] @ turn * best.fit.size[: turn.shape[1]]
+            sd = np.hypot(
+                max(best.fit.variance(own) ** 0.5, parameter.alike), known.model_error(one.effect.name) * value
             )
+            size = Estimate(parameter.name, value, float(sd), unit_at(parameter.unit, one.effect.target))
             if size.known and matters(one.effect, np.array([value])):
                 out.append(Finding(*one.names, (size,), (), 1.0, kind=one.effect))
         return tuple(out)

@@ -142,7 +142,7 @@ def diagnose_session(
     tell("looking for faults too large for statistics")
     family = causes(effects)
     if "mass" in result.session.subject.guessed:  # nobody declared one that could be wrong: the plates weighed it
-        family = {name: one for name, one in family.items() if name != BodyMass.name}
+        family = {name: one for name, one in family.items() if name != BodyMass.name} or family
     right = with_right_labels(result, reference=reference, tell=tell) if LabelsSwapped.name in family else None
     mended = with_faults_undone(right.result if right else result, right, family, reference=reference, tell=tell)
     result = result if mended is None else mended.result

@@ -90,9 +90,10 @@ def with_proven_corrections(
     tell: Callable[[str], None] = lambda _: None,
 ) -> SessionResult:
     """Return the session examined again without what is proven: what checks undid in the copy ``mended``, and the
-    zeros, delays and gains that are `proven` in ``inferred`` or known there as tolerances (`Inferred.tolerated`), each
-    as unsure in the fit as there; a proven limb that is lighter than the other is fitted as a declared one. The
-    identification names them all (``corrected``). The same session where there are none; what is only suspected stays.
+    zeros, delays and gains that are `proven` in ``inferred`` or known there as tolerances
+    (`Inferred.known_tolerances`), each as unsure in the fit as there; a proven limb that is lighter than the other is
+    fitted as a declared one. The identification names them all (``corrected``). The same session where there are none;
+    what is only suspected stays.
     """
     checks = mended.checks if mended else ()
     if any(one.alike for one in checks):
@@ -101,7 +102,7 @@ def with_proven_corrections(
     own: tuple[Finding, ...] = ()
     if inferred is not None:
         named = (f for f in inferred.diagnosis.findings if proven(f, inferred.search.prior))
-        own = (*named, *(f for f in inferred.tolerated() if f.effect in _INSIDE))
+        own = (*named, *(f for f in inferred.known_tolerances() if f.effect in _INSIDE))
     own = tuple(one for one in own if (one.effect, one.target) not in {(c.effect, c.target) for c in checks})
     base = mended.result if mended else result
     if own:
