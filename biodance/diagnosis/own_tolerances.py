@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import needed, spectrum, thinned
@@ -15,6 +16,7 @@ from biodance.uncertainty.bands import BANDS
 from biodance.uncertainty.session_noise import (
     added_noise,
     of_marker_errors,
+    of_unseen_joints,
     of_zeros,
     with_movement,
     with_own_noise,
@@ -60,8 +62,9 @@ def own_tolerances(
 ) -> SessionTolerances:
     """Return the ``known`` tolerances (a laboratory's own; by default the shipped ones) as they hold for these
     recordings: with markers that move more on the body than where they were learned, with the noise of their own
-    cameras and plates as ``recorded`` shows it, with that of a movement that needs more force, with the unrest of a
-    person who stands still where standing is looked at, and with trial means no surer than a plate's zero.
+    cameras and plates as ``recorded`` shows it, with that of a movement that needs more force, with joints that move
+    and no marker shows, with the unrest of a person who stands still where standing is looked at, and with trial means
+    no surer than a plate's zero.
     """
     found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
     postures = np.array([window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size])[
@@ -82,6 +85,15 @@ def own_tolerances(
             f"quarter of them that follows best): soft tissue and joints, and what they leave in the forces, were "
             f"taken for so many times as large, and a fault must be larger to be seen. Tolerances learned on sessions "
             f"of your own laboratory without fault (biodance learn) hold for it."
+        )
+    if moving and not body.free.all():
+        found = with_own_noise(found, of_unseen_joints(body, postures, about), mass)
+        names = dict.fromkeys(
+            j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free
+        )
+        notes.append(
+            f"No marker shows how {', '.join(map(display.spaced, names))} move, and the plates measure it: as much as "
+            f"people move there who walk is taken for theirs, and a fault must be larger to be seen."
         )
     restless = skin_of(body, chosen).excess(found.instruments.skin, found.instruments.swing)
     if restless.any():

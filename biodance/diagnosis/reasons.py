@@ -32,8 +32,6 @@ class Reason(StrEnum):
     """What was measured or declared of the body contradicts itself; forces fit a wrong body as well."""
     UNDESCRIBED_JOINTS = "undescribed joints"
     """The body moves at joints for which nobody has learned yet what is usual."""
-    UNSEEN_JOINTS = "unseen joints"
-    """No marker shows what moves at some joints, and the plates measure it."""
     TOLERANCES_DO_NOT_HOLD = "tolerances do not hold"
     """The markers move more on the body than where tolerances were learned."""
     CONTRADICTED = "contradicted"
@@ -57,7 +55,6 @@ DOUBTS = frozenset(
         Reason.BODY_NOT_SCALED,
         Reason.BODY_DOUBTFUL,
         Reason.UNDESCRIBED_JOINTS,
-        Reason.UNSEEN_JOINTS,
         Reason.TOLERANCES_DO_NOT_HOLD,
         Reason.CONTRADICTED,
     )

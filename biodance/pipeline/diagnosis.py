@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from biodance import display
-from biodance.body.body import Body
 from biodance.diagnosis.accept import Residuals
 from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
 from biodance.diagnosis.gain import Gain
@@ -206,7 +205,7 @@ def _judged(
             unsure = {Reason.BODY_NOT_SCALED: not result.scaled, Reason.TOLERANCES_DO_NOT_HOLD: not own.believed}
             joints = tuple(gain.name for gain in result.shown_joints.gains if gain.taken)
             # new joints of a sound body may be judged; of a doubtful one they excuse anything
-            reasons = unmodelled_joints(result.body, joints if result.doubts else ())
+            reasons = {Reason.UNDESCRIBED_JOINTS: joints} if joints and result.doubts else {}
             reasons |= {reason: () for reason, holds in unsure.items() if holds}
             bare, looked_at = replace(bare, notes=notes, why=reasons), seen.problem.looked_at
             simulate = simulate and not reasons
@@ -283,13 +282,3 @@ def _with_gains(result: SessionResult, found: Inferred) -> SessionDiagnosis:
     told = accepted(result, found, before)
     one = told.inferred
     return SessionDiagnosis(one.diagnosis, one, before, told.identified, told.left, told.failures, gain=told.gain)
-
-
-def unmodelled_joints(body: Body, joints: tuple[str, ...]) -> dict[Reason, tuple[str, ...]]:
-    """Return why what a simulation of ``body`` leaves may be the body's own: joints that no marker shows, or ``joints``
-    that it moves at beside the usual ones, for which nobody has learned what is usual; empty where it moves as usual.
-    """
-    hidden = dict.fromkeys(j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free)
-    if hidden:
-        return {Reason.UNSEEN_JOINTS: tuple(display.spaced(name) for name in hidden)}
-    return {Reason.UNDESCRIBED_JOINTS: joints} if joints else {}

@@ -24,7 +24,6 @@ _WHY: dict[Reason, tuple[str, str]] = {
     Reason.NOT_COMPARED: ("no movement could be compared with a body", _MEND),
     Reason.ONLY_STANDING: ("standing still tells little", _SQUATS),
     Reason.UNDESCRIBED_JOINTS: ("what is usual of some joints of this body is not known yet", _REFERENCE),
-    Reason.UNSEEN_JOINTS: ("no marker shows how some joints move", "Put markers there, or compare two sessions."),
     Reason.TOLERANCES_DO_NOT_HOLD: ("the markers move unusually much on the body", "Check how they are fixed."),
     Reason.CONTRADICTED: ("what the forces resemble rests on one step or is contradicted", "Record more steps."),
     Reason.UNUSUAL_BODY: ("the forces fit only an unusual body, or a load or mass that nobody noted", _REFERENCE),

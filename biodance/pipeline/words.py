@@ -192,7 +192,6 @@ _SENTENCES = {
     Reason.BODY_DOUBTFUL: "The forces fit this body, but {about}.",
     Reason.LIMIT_BROKEN: "No cause was found for what is outside its limit: {about}.",
     Reason.UNDESCRIBED_JOINTS: "The body moves at joints ({about}) for which nobody has learned yet what is usual.",
-    Reason.UNSEEN_JOINTS: "No marker shows what moves at {about}, and the plates measure it all the same.",
     Reason.TOLERANCES_DO_NOT_HOLD: "Its markers move more on the body than where tolerances were learned.",
     Reason.CONTRADICTED: "What the forces resemble rests on a single step, or total force and trunk contradict it.",
 }

@@ -9,11 +9,12 @@ s² (J'WJ)^-1 J'W²J (J'WJ)^-1 (J the marker Jacobian, W the markers' weights), 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.body.tables.error_sizes import error_size
+from biodance.body.tables.error_sizes import error_size, joint_size
 from biodance.motion.dynamics import predict_wrench
 from biodance.motion.kinematics import Poses, place_jacobian, poses
 from biodance.records import CHANNELS, Array, Markers, Motion, Plate, Trial
@@ -91,15 +92,65 @@ def carried(body: Body, q: Array, about: Array) -> Array:
     place = place_jacobian(body, pose, segment, points)
     weighted = np.repeat(np.asarray(body.markers.weight), 3)[:, None] * place[0]
     followed = np.linalg.inv(place[0].T @ weighted + _LEVER**2 * np.eye(body.nv)) @ weighted.T
-    turn = np.eye(body.nv)
+    return _powers(*((one @ followed).reshape(6, -1, 3).swapaxes(0, 1) for one in _felt(body, q, about)))
+
+
+def of_unseen_joints(body: Body, postures: Array, about: Array) -> Array:
+    """Return (B, 6, 6): covariance of one coefficient per band that joints add which no marker shows (`Body.free`) and
+    which the simulation holds still, the trunk upright: each is accelerated by the size ``unseen_joint`` of the table,
+    rad/s² root mean square in the band, evenly over its frequencies (angles fall with the square of the frequency);
+    mean over the ``postures`` (n, nq), each with the joints held, and bent as far as they are on average.
+
+    The mean of a trial is left out: how far unseen matter lies from where it is taken for is among what is not known
+    of the body (``unseen_com``).
+    """
+    hidden = [k for k, free in enumerate(body.free) if not free]
+    out = np.zeros((len(BANDS), 6, 6))
+    if not hidden:
+        return out
+    names, at = [body.joints[k].name for k in hidden], [body.n_root + k for k in hidden]
+    bent = np.zeros(body.nq)
+    bent[[body.nq - len(body.joints) + k for k in hidden]] = [_unseen(name, "mean") for name in names]
+    every = np.concatenate([postures, postures + bent, postures - bent])
+    felt = [[one[:, at].T[:, :, None] for one in _felt(body, q, about)] for q in every]
+    each = np.mean([_powers(*one) for one in felt], axis=0)
+    edges = 2 * np.pi * np.array(BANDS.edges[1:])
+    power = np.stack([np.diff(edges**-k) / -k / np.diff(edges) for k in (3, 1, -1)], axis=1)
+    for b, (low, high) in enumerate(pairwise(BANDS.edges[1:])):
+        sd = np.array([_unseen(name, f"{low:g} to {high:g} Hz") for name in names])
+        out[b + 1] = np.einsum("k,j,kjlm->lm", power[b], sd**2 * BANDS.rate / (2 * (high - low)), each)
+    return out
+
+
+def _unseen(joint: str, state: str) -> float:
+    """Return how far an unseen joint is bent (``mean``), rad, or accelerated within a band, rad/s², about one axis."""
+    return joint_size("unseen_joint", joint.rsplit("_", 1)[0], state=state)
+
+
+def _power() -> Array:
+    """Return (B, 3): mean over each band of the powers 0, 2 and 4 of the angular frequency."""
+    edges = 2 * np.pi * np.array(BANDS.edges)
+    return np.stack([np.diff(edges**k) / k / np.diff(edges) for k in (1, 3, 5)], axis=1)
+
+
+def _felt(body: Body, q: Array, about: Array) -> tuple[Array, Array]:
+    """Return twice (6, nv): what the wrench about ``about`` (3,) m changes by per unit of the tangent of a posture, by
+    the weight of what is displaced, and per unit of its second derivative, by what is accelerated.
+    """
+    pose, turn = poses(body, q[None]), np.eye(body.nv)
     if body.n_root:
         to_root = quaternion_matrix(q[None, 3:7])[0].T
         turn[:3, :3], turn[3:6, 3:6] = to_root, to_root
     rows = np.vstack([np.zeros(body.nv), np.eye(body.nv)]) @ turn.T
     still = Motion(np.arange(len(rows)) / 100.0, np.tile(q, (len(rows), 1)), np.zeros_like(rows), rows)
     value = predict_wrench(body, still).value
-    moved = Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
-    hung, moved = ((one @ followed).reshape(6, -1, 3).swapaxes(0, 1) for one in (_hung(body, pose), moved))
+    return _hung(body, pose), Noise.unit(about, BANDS).shift @ (value[1:] - value[0]).T
+
+
+def _powers(hung: Array, moved: Array) -> Array:
+    """Return (3, n, 6, 6): covariance per power 0, 2 and 4 of the angular frequency of n errors, of which (n, 6, k) are
+    ``hung`` and ``moved`` per unit (`_felt`).
+    """
     both = hung @ moved.swapaxes(1, 2)
     return np.stack([hung @ hung.swapaxes(1, 2), -(both + both.swapaxes(1, 2)), moved @ moved.swapaxes(1, 2)])
 
@@ -125,9 +176,7 @@ def of_cameras(body: Body, postures: Array, about: Array, *, noise: float, rate:
     """Return (B, 6, 6): covariance of one coefficient per band that marker noise of ``noise`` m at ``rate`` Hz adds to
     the wrench residual, mean over the ``postures`` (n, nq).
     """
-    edges = 2 * np.pi * np.array(BANDS.edges)
-    power = np.stack([np.diff(edges**k) / k / np.diff(edges) for k in (1, 3, 5)], axis=1)
-    return of_marker_errors(body, postures, about, noise**2 * min(1.0, BANDS.rate / rate) * power)
+    return of_marker_errors(body, postures, about, noise**2 * min(1.0, BANDS.rate / rate) * _power())
 
 
 def of_plates(density: Array, count: int) -> Array:

@@ -26,11 +26,11 @@ def error_size(quantity: str, target: str, *, state: str = "any") -> float:
     return float(read_table("uncertainty", "sizes").row(**row)["sd"])
 
 
-def joint_size(quantity: str, joint: str) -> float:
+def joint_size(quantity: str, joint: str, *, state: str = "before") -> float:
     """Return the size of ``joint_centre`` (m per axis) or ``tilt`` (rad) of a joint, sides alike, before any
-    functional calibration; of a joint that the table does not name that of "other" ones.
+    functional calibration, or of a ``state`` of its own; of a joint that the table does not name that of "other" ones.
     """
     try:
-        return error_size(quantity, joint.removeprefix("right_").removeprefix("left_"), state="before")
+        return error_size(quantity, joint.removeprefix("right_").removeprefix("left_"), state=state)
     except UnknownName:
-        return error_size(quantity, "other", state="before")
+        return error_size(quantity, "other", state=state)

@@ -11,7 +11,7 @@ _ASIDE = 0.02
 """m by which a left marker must lie to the right of its right partner, or a front one behind its back one."""
 _ENDS = (("FHD", "BHD"), ("ASI", "PSI"), ("TOE", "HEE"))
 """Stems of labels in front and behind of the same bone."""
-_ACROSS = ("asis", "psis", "acromion")
+_ACROSS = ("asis", "psis", "acromion", "knee_lateral")
 """Landmarks of both sides, and (`_AHEAD`) of front and back, that point to the right of the body: each is one vote, so
 that one exchanged pair does not turn it.
 """
