@@ -1,15 +1,20 @@
 """Faults written into the bytes of real walks are named by the observers, and clean walks stay missing."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from inferred_sessions import heard
 from inject import inject
 
 from biodance.diagnosis.diagnosis import Finding
 from biodance.lab.session.read import read_session
+from biodance.observations import recording
+from biodance.observations.stride_force import StrideForce
 from biodance.pipeline.diagnosis import diagnose_session
 from biodance.pipeline.session import examine
+from biodance.records import Wrench
 from biodance.virtual_lab.faults.causes import fault_of, parse_cause
 
 
@@ -58,3 +63,22 @@ def test_a_late_force_never_hides_itself(data: Path, tmp_path: Path) -> None:
     steps = {row.trial: row.seconds for row in found.judged if row.why_not.startswith("only by its steps")}
     assert set(steps) == {"HC050A11", "HC050A33"}
     assert all(0.3 < seconds < 2.0 for seconds in steps.values())
+
+
+def test_two_belts_weigh_a_runner_of_unknown_mass_alike_and_show_the_one_that_is_wrong(data: Path) -> None:
+    """From flight to flight a step carries m (g + a), whoever runs: 72.84 kg by his scales, 30 ms of flight."""
+    trial = next(one for one in read_session(data / "opensim_models/raj_run").trials if one.plates)
+    seen = recording(trial, mass=75.0, declared=False)
+    assert seen.mass_doubt == pytest.approx(22.5)
+    steps = [one for one in StrideForce().observe(seen) if one.what.endswith("alone")]
+    by = {name: np.mean([one.value for one in steps if one.plate == name]) for name in ("plate1", "plate2")}
+    assert len(steps) >= 10
+    assert all(abs(value - 72.84) < 0.01 * 72.84 for value in by.values()), by
+    louder = np.diag([1, 1, 1.05, 1, 1, 1])
+    wrong = tuple(
+        replace(one, wrench=Wrench(one.wrench.time, one.wrench.value @ louder)) if one.name == "plate1" else one
+        for one in trial.plates
+    )
+    again = StrideForce().observe(recording(replace(trial, plates=wrong), mass=75.0, declared=False))
+    heavier = np.mean([one.value for one in again if one.what.endswith("alone") and one.plate == "plate1"])
+    assert heavier == pytest.approx(1.05 * by["plate1"], rel=2e-3)

@@ -183,8 +183,9 @@ def collect_evidence(
     causes; ``norms`` are those of the laboratory (`Tolerances.norms`).
     """
     asked = causes(chosen)
-    mass = float("nan") if "mass" in session.subject.guessed else session.subject.mass
-    seen = tuple(recording(trial, mass=mass) for trial in session.trials if trial.plates and trial.role != "skip")
+    mass, declared = session.subject.mass, "mass" not in session.subject.guessed
+    judged = [trial for trial in session.trials if trial.plates and trial.role != "skip"]
+    seen = tuple(recording(trial, mass=mass, declared=declared) for trial in judged)
     single = all(len(one.trial.plates) == 1 for one in seen)
     known = {c.names: c for one in seen for c in possible_causes(one, single=single) if c.effect in asked}
     by_trial = [tuple(_apply_norm(o, norms) for o in _correlate_strides(observe(one))) for one in seen]

@@ -21,6 +21,8 @@ from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
+DECLARED, UNDECLARED = 0.01, 0.3
+"""Share of the mass by which careful declarations are wrong (clothes, shoes, another day), and a guess may be."""
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
 _SHORTEST, _LONGEST = 0.2, 2.5
@@ -67,10 +69,11 @@ class FootStep:
 
 @dataclass(frozen=True, eq=False)
 class SeenTrial:
-    """One ``trial`` with the declared ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their
-    markers are missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and
-    whether somebody stands ``still`` throughout; the ``trunk``, against which the plates weigh and time (None = not
-    seen). ``kept`` holds what several observers ask for.
+    """One ``trial`` with the ``mass`` kg of the person (NaN = unknown), both ``feet`` (none where their markers are
+    missing), the ``steps`` on its plates, the ``pelvis`` (T, 3) m at marker times (None = not seen), and whether
+    somebody stands ``still`` throughout; the ``trunk``, against which the plates weigh and time (None = not seen);
+    ``declared`` False: nobody said the mass, so that the plates can be held against each other alone. ``kept`` holds
+    what several observers ask for.
     """
 
     trial: Trial
@@ -80,6 +83,7 @@ class SeenTrial:
     pelvis: Array | None
     still: bool
     trunk: Trunk | None = None
+    declared: bool = True
     kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def plate(self, name: str) -> Plate:
@@ -136,6 +140,11 @@ class SeenTrial:
         return self.trunk.beside(self.total, gravity=settings.gravity, sway=settings.standing.sway)
 
     @property
+    def mass_doubt(self) -> float:
+        """Standard deviation of the mass, kg."""
+        return (DECLARED if self.declared else UNDECLARED) * self.mass
+
+    @property
     def one_clock(self) -> bool:
         """Whether all plates share one time base, so that their forces add."""
         time = self.trial.plates[0].wrench.time
@@ -179,11 +188,11 @@ class SeenTrial:
         return track_of(self.trial.markers.time, self.pelvis)
 
 
-def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
+def recording(trial: Trial, *, mass: float = float("nan"), declared: bool = True) -> SeenTrial:
     """Return a trial as observers look at it; as read (forces at their own rate) it says most.
 
-    ``mass`` kg as declared, NaN = unknown. Feet and pelvis are found by the trial's marker set, and by the known ones
-    where it has none. Without foot markers or plates there are no steps; nothing is raised.
+    ``mass`` kg as ``declared``, or as guessed; NaN = unknown. Feet and pelvis are found by the trial's marker set, and
+    by the known ones where it has none. Without foot markers or plates there are no steps; nothing is raised.
     """
     known = (trial.marker_set,) if trial.marker_set else tuple(FAMILY.files())
     feet = feet_of(trial.markers, known)
@@ -196,7 +205,7 @@ def recording(trial: Trial, *, mass: float = float("nan")) -> SeenTrial:
     )
     pelvis = pelvis_path(trial.markers, known)
     steps = tuple(sorted(steps, key=lambda step: step.middle))
-    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial), trunk_of(trial, mass=mass))
+    return SeenTrial(trial, mass, feet, steps, pelvis, is_still(trial), trunk_of(trial, mass=mass), declared)
 
 
 def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:

@@ -15,7 +15,7 @@ from biodance.effects.time_delay import TimeDelay
 from biodance.motion.newton import LagAndMass, slopes_of
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._sensitivity import Sensitivity
-from biodance.observations.stride_force import DECLARED, StrideForce
+from biodance.observations.stride_force import StrideForce
 from biodance.records import Array
 
 _LABORATORY = 0.003
@@ -53,7 +53,7 @@ class Newton(Observer):
                 )
             )
         if math.isfinite(told.mass) and seen.mass > 0:
-            norms = {"person declared mass": DECLARED * seen.mass, "person weighs by newton": _PERSON * seen.mass}
+            norms = {"person declared mass": seen.mass_doubt, "person weighs by newton": _PERSON * seen.mass}
             counts = not seen.still and not any(one.unit == "kg" for one in StrideForce().observe(seen))
             found.append(
                 Observation(

@@ -12,7 +12,6 @@ from biodance.effects.plate_rotation import PlateRotation
 from biodance.observations import Observation, Observer, SeenTrial
 from biodance.observations._recording import ONSET
 from biodance.observations._sensitivity import Sensitivity, of_mean
-from biodance.observations.stride_force import DECLARED
 from biodance.records import Array, Plate
 
 _ON_PLATES = (0.75, 1.35)
@@ -44,7 +43,7 @@ class StandingForce(Observer):
             return ()
         where = plates[0].name if len(plates) == 1 else ""
         mass = force[2] / seen.trial.settings.gravity
-        norms, trial = {"person declared mass": DECLARED * seen.mass}, seen.trial.name
+        norms, trial = {"person declared mass": seen.mass_doubt}, seen.trial.name
         g = seen.trial.settings.gravity
         weighs = Sensitivity({p.name: of_mean(_known(p), 2) / g for p in seen.trial.plates}, mass=1.0)
         found = [
