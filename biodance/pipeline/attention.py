@@ -129,12 +129,12 @@ def session_attention(result: SessionResult, findings: Sequence[Finding] = ()) -
 
 def corrected_attention(result: SessionResult) -> tuple[Attention, ...]:
     """Return what was taken off the recordings before the body was fitted, or left open in it, one sentence each: the
-    laboratory's next recording will have it again.
+    laboratory's next recording will have it again. A note where it is no fault, so that nobody has to do anything.
     """
     found = result.identification.corrected if result.identification else ()
     return tuple(
         Attention(
-            "warn",
+            "warn" if one.advice else "note",
             f"{'left open when' if one.cause.of_person() else 'taken off before'} the body was fitted, in "
             f"{listed(one.trials) or 'all trials'}: {spoken(one).fact}. "
             f"{one.advice}".strip(),
