@@ -9,7 +9,8 @@ import numpy as np
 from biodance import display
 from biodance.body.body import Body
 from biodance.diagnosis.problem import TrialWindow
-from biodance.diagnosis.spectrum import needed, spectrum, thinned
+from biodance.diagnosis.spectrum import Spectrum, needed, spectrum, thinned
+from biodance.effects import Case
 from biodance.identification.statistics import standing_point
 from biodance.records import Array, Trial
 from biodance.uncertainty.bands import BANDS
@@ -67,16 +68,16 @@ def own_tolerances(
     no surer than a plate's zero.
     """
     found, notes, mass = known or shipped(), [], float(body.sip.mass.sum())
-    postures = np.array([window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size])[
-        :_POSTURES
-    ]
+    postures = _postures(chosen)
     about = standing_point(tuple(window.fit for window in chosen))
     if recorded and postures.size:
         found = with_own_noise(found, added_noise(body, recorded, postures, about, known=found.instruments), mass)
-    moving = tuple(window for window in chosen if window.trial.role != "static" and window.seconds > 0)
+    moving, standing = (
+        tuple(one for one in chosen if one.seconds > 0 and (one.trial.role == "static") == still)
+        for still in (False, True)
+    )
     if moving:
-        cases, uses = zip(*(thinned(one.case(body, body.sip.phi), one.use) for one in moving), strict=True)
-        found = with_movement(found, needed(cases, spectrum(cases, uses, about)))
+        found = with_movement(found, needed(*_looked_at(body, moving, about)))
     factor = soft_tissue(chosen) / found.instruments.distance
     if factor > MORE:
         found = widened_by(found, factor)
@@ -88,28 +89,48 @@ def own_tolerances(
         )
     if moving and not body.free.all():
         found = with_own_noise(found, of_unseen_joints(body, postures, about), mass)
-        names = dict.fromkeys(
-            j.name.rsplit("_", 1)[0] for j, free in zip(body.joints, body.free, strict=True) if not free
-        )
-        notes.append(
-            f"No marker shows how {', '.join(map(display.spaced, names))} move, and the plates measure it: as much as "
-            f"people move there who walk is taken for theirs, and a fault must be larger to be seen."
-        )
+        notes.append(_unseen_note(body))
     restless = skin_of(body, chosen).excess(found.instruments.skin, found.instruments.swing)
     if restless.any():
         found = with_own_noise(found, of_marker_errors(body, postures, about, restless), mass)
-    standing = tuple(window for window in chosen if window.trial.role == "static" and window.seconds > 0)
     if standing:
         shaken = unrest(body, standing, about)
         found = with_own_noise(found, shaken, mass)
-        size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
-        notes.append(
-            f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
-            f"{size[3:].max():.1f} N·m above {SWAYING:g} Hz (heart, breath, muscles; root mean square), which no "
-            f"marker shows: a fault must be larger to be seen."
-        )
+        notes.append(_unrest_note(shaken))
     zeros = of_zeros([run for window in chosen for run in window.runs])
     return SessionTolerances(with_zeros(found, zeros, mass), tuple(notes), believed=factor <= _TOO_FAR)
+
+
+def _postures(chosen: tuple[TrialWindow, ...]) -> Array:
+    """Return the middle postures (n, nq) of the first trials."""
+    middle = [window.motion.q[len(window.motion.q) // 2] for window in chosen if window.motion.q.size]
+    return np.array(middle[:_POSTURES])
+
+
+def _looked_at(body: Body, windows: tuple[TrialWindow, ...], about: Array) -> tuple[tuple[Case, ...], Spectrum]:
+    """Return trials at the rate at which they are looked at, and where their rows come from."""
+    cases, uses = zip(*(thinned(one.case(body, body.sip.phi), one.use) for one in windows), strict=True)
+    return cases, spectrum(cases, uses, about)
+
+
+def _unseen_note(body: Body) -> str:
+    """Say what joints no marker shows."""
+    hidden = (joint.name for joint, free in zip(body.joints, body.free, strict=True) if not free)
+    names = ", ".join(dict.fromkeys(display.spaced(name.rsplit("_", 1)[0]) for name in hidden))
+    return (
+        f"No marker shows what moves at {names}, and the plates measure it: as much as people move there who walk "
+        f"is taken for theirs, and a fault must be larger to be seen."
+    )
+
+
+def _unrest_note(shaken: Array) -> str:
+    """Say how large an unrest of covariance ``shaken`` (B, 6, 6) per coefficient is."""
+    size = np.sqrt(np.einsum("b,bcc->c", 2 * np.diff(BANDS.edges) / BANDS.rate, shaken))
+    return (
+        f"Standing still, the person moves the forces by {size[:3].max():.1f} N and the moments by "
+        f"{size[3:].max():.1f} N·m above {SWAYING:g} Hz (heart, breath, muscles; root mean square), which no "
+        f"marker shows: a fault must be larger to be seen."
+    )
 
 
 def widened_by(known: Tolerances, factor: float) -> Tolerances:
@@ -141,8 +162,7 @@ def unrest(body: Body, standing: tuple[TrialWindow, ...], about: Array) -> Array
     """Return (B, 6, 6) covariance of a coefficient of what standing still leaves above `SWAYING`, per band, moments
     about ``about`` (3,) m; zero below.
     """
-    cases, uses = zip(*(thinned(window.case(body, body.sip.phi), window.use) for window in standing), strict=True)
-    where = spectrum(cases, uses, about)
+    cases, where = _looked_at(body, standing, about)
     left = where.rows(tuple(case.residual[:, :, None] for case in cases))[:, :, 0]
     out = np.zeros((len(BANDS), 6, 6))
     for b in np.flatnonzero(np.array(BANDS.edges[:-1]) >= SWAYING):

@@ -93,16 +93,19 @@ def exchanges(recorded: Recorded) -> dict[str, dict[Pair, Spans]]:
     trials = recorded.session.trials
     static = next((trial for trial in trials if trial.role == "static" and trial.markers is not None), None)
     hang = [trial.markers for trial in trials if trial.markers is not None and arms_hang(trial)]
-    known = exchanged_labels(static, None, others=hang) if static else {}
-    right = renamed(static, known).markers if static else None
-    found = {trial.name: known if trial is static else exchanged_labels(trial, right, known, hang) for trial in trials}
+    if static is None:  # then the body was placed by these labels, and follows them whatever they are
+        alone = ((trial.name, exchanged_labels(trial, None, {}, hang)) for trial in trials)
+        return {name: pairs for name, pairs in alone if pairs}
+    known = exchanged_labels(static, None, others=hang)
+    right = renamed(static, known).markers
     bodies = {case.trial.name: case.body for case in recorded.cases}
+    found = {}
     for trial in trials:
-        own = {pair: spans for pair, spans in found[trial.name].items() if pair not in known}
-        # without a static trial the body was placed by these labels, and follows them whatever they are
-        if own and static is not None and trial.name in bodies and refuted(bodies[trial.name], trial, own):
-            found[trial.name] = {}
-    return {name: pairs for name, pairs in found.items() if pairs}
+        pairs = known if trial is static else exchanged_labels(trial, right, known, hang)
+        own = {pair: spans for pair, spans in pairs.items() if pair not in known}
+        if pairs and not (own and trial.name in bodies and refuted(bodies[trial.name], trial, own)):
+            found[trial.name] = pairs
+    return found
 
 
 def refuted(body: Body, trial: Trial, pairs: Mapping[Pair, Spans]) -> bool:

@@ -193,36 +193,56 @@ def _averaged(posterior: Posterior, cause: NamedCause, alike: Set[Key]) -> Named
     return replace(cause, theta=mean, covariance=np.einsum("h,hij->ij", weight, [one[2] for one in found]) + spread)
 
 
+_Told = tuple[Place, Finding]
+
+
 def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     """Return what a session ends with; ``bare`` its diagnosis before any judgement of causes."""
     rows, best = search.rows, posterior.best
-    every = [(place, _finding(place, rows, best)) for place in places(posterior, search.prior)]
-    likely = [(p, f) for p, f in every if p.probability >= SUGGESTED]
-    large = [(p, f) for p, f in likely if _is_large(rows, p.cause)]
-    sure = [(p, f) for p, f in large if p.probability >= NAMED]
-    named = [(p, f) for p, f in sure if not (_is_contradicted(rows, p.cause) or _is_of_one_step(rows, p.cause))]
-    resembled = [f for p, f in large if (p, f) not in named]
-    left = adequacy(posterior.unexplained, rows) if rows.problem is not None else ()
-    unknown = posterior.unknown >= UNKNOWN and any(row.matters for row in left)
-    why = dict(bare.why) | dict.fromkeys(_strange(posterior.unexplained, rows) if unknown or named else (), ())
-    why |= {Reason.FORCES_LEFT: ()} if unknown else {}
-    why |= {Reason.CONTRADICTED: ()} if len(named) < len(sure) else {}
-    findings = tuple(replace(f, set=(*f.set, *_habit_alias(p, best, rows), *_load_alias(p, rows))) for p, f in named)
-    habit = _habit(best, rows, findings)
-    clean = float(posterior.weights[[not one.causes for one in posterior.hypotheses], 0].sum())
+    every = places(posterior, search.prior)
+    likely = [(place, _finding(place, rows, best)) for place in every if place.probability >= SUGGESTED]
+    large = [one for one in likely if _is_large(rows, one[0].cause)]
+    sure = [one for one in large if one[0].probability >= NAMED]
+    named = [one for one in sure if not _is_forbidden(rows, one[0].cause)]
+    resembled = [one for one in large if one not in named]
+    left = adequacy(posterior.unexplained, rows)
+    unknown, open_ = posterior.unknown >= UNKNOWN and any(row.matters for row in left), len(named) < len(sure)
+    findings = _with_look_alikes(named, best, rows)
     told = replace(
         bare,
-        explained=not (unknown or (named and resembled) or len(named) < len(sure)),
-        why=why,
-        findings=(*findings, *habit),
-        resembles=tuple(resembled),
-        tolerated=tuple(f for p, f in likely if (p, f) not in large),
+        explained=not (unknown or (named and resembled) or open_),
+        why={**bare.why, **_why(posterior, rows, named=bool(named), unknown=unknown, open_=open_)},
+        findings=(*findings, *_habit(best, rows, findings)),
+        resembles=tuple(finding for _, finding in resembled),
+        tolerated=tuple(one[1] for one in likely if one not in large),
         adequacy=left,
         candidates=tuple(Alias(s.effect.name, s.effect.target, s.gain) for s in posterior.screened),
-        p_clean=clean,
+        p_clean=posterior.clean,
         p_unknown=posterior.unknown,
     )
-    return Inferred(told, search, posterior, tuple(p.cause for p, _ in named))
+    return Inferred(told, search, posterior, tuple(place.cause for place, _ in named))
+
+
+def _with_look_alikes(named: list[_Told], best: Hypothesis, rows: Rows) -> tuple[Finding, ...]:
+    """Return the findings, with what is no cause of the simulation and looks like them in their sets."""
+    return tuple(
+        replace(finding, set=(*finding.set, *_habit_alias(place, best, rows), *_load_alias(place, rows)))
+        for place, finding in named
+    )
+
+
+def _why(posterior: Posterior, rows: Rows, *, named: bool, unknown: bool, open_: bool) -> dict[Reason, tuple[str, ...]]:
+    """Return why no more is said: what is strange where anything is ``named`` or left, forces that an ``unknown`` cause
+    leaves, and causes that are sure and may not be named (``open_``).
+    """
+    found = dict.fromkeys(_strange(posterior.unexplained, rows) if unknown or named else (), ())
+    further = {Reason.FORCES_LEFT: unknown, Reason.CONTRADICTED: open_}
+    return {**found, **{reason: () for reason, holds in further.items() if holds}}
+
+
+def _is_forbidden(rows: Rows, one: NamedCause) -> bool:
+    """Return whether a law forbids to name a cause, however probable it is."""
+    return _is_contradicted(rows, one) or _is_of_one_step(rows, one)
 
 
 def _is_large(rows: Rows, one: NamedCause) -> bool:

@@ -19,9 +19,11 @@ _TIE = 1e-9
 
 def adequacy(one: Hypothesis, rows: Rows) -> tuple[Adequacy, ...]:
     """Return how far what is left in every band of every channel is from what laboratories leave, in standard
-    deviations of the logarithm of its size, worst first; the worst, and the worst that matters, with its second.
+    deviations of the logarithm of its size, worst first; the worst, and the worst that matters, with its second. Nothing
+    where no forces were compared with a body.
     """
-    assert rows.problem is not None
+    if rows.problem is None:
+        return ()
     where, names = rows.problem.spectrum, [case.trial.name for case in rows.problem.cases]
     square, count = energies(one)
     z = 0.5 * np.log(np.maximum(square, 1e-12)) / np.sqrt(OWN**2 + 0.5 / np.maximum(count, 1))

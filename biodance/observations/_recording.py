@@ -21,7 +21,7 @@ from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
-DECLARED, UNDECLARED = 0.01, 0.3
+DECLARED, GUESSED = 0.01, 0.3
 """Share of the mass by which careful declarations are wrong (clothes, shoes, another day), and a guess may be."""
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -142,7 +142,7 @@ class SeenTrial:
     @property
     def mass_doubt(self) -> float:
         """Standard deviation of the mass, kg."""
-        return (DECLARED if self.declared else UNDECLARED) * self.mass
+        return (DECLARED if self.declared else GUESSED) * self.mass
 
     @property
     def one_clock(self) -> bool:
@@ -210,30 +210,36 @@ def recording(trial: Trial, *, mass: float = float("nan"), declared: bool = True
 
 def _steps(plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], *, raised: bool) -> list[FootStep]:
     """Return the steps on one plate: one foot stands wholly over it while it is loaded, the other one is not on it."""
-    found = []
-    wrench = plate.wrench
-    for start, stop in runs(wrench.force[:, 2] > ONSET):
-        first, last = wrench.time[start], wrench.time[stop - 1]
-        if not _SHORTEST <= last - first <= _LONGEST:
-            continue
-        time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
-        over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
-        on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
-        belt = on[0].drift(time) if on else np.zeros(3)
-        if len(on) != 1:
-            continue
-        others = [foot for foot in feet if foot not in on]
-        mixed = plate.placed and any(_treads(plate, foot, np.linspace(first, last, 30), belt) for foot in others)
-        if mixed and any(_treads(plate, foot, time, belt) for foot in others):
-            continue
-        near = _neighbours(plate, plates) if mixed or over[on[0].side] < 0 else []
-        beside = tuple(one.name for one in near) if mixed or _carry(near, time) else ()
-        if mixed and not beside:
-            continue
-        overhang = 0.0 if beside or not plate.placed else max(0.0, -over[on[0].side])
-        heel_first = _heel_first(on[0], first)
-        found.append(FootStep(plate.name, on[0].side, float(time[5]), overhang, heel_first, beside, mixed))
-    return found
+    time = plate.wrench.time
+    contacts = ((time[start], time[stop - 1]) for start, stop in runs(plate.wrench.force[:, 2] > ONSET))
+    lasting = [(first, last) for first, last in contacts if _SHORTEST <= last - first <= _LONGEST]
+    found = (_step(plate, plates, feet, first, last, raised=raised) for first, last in lasting)
+    return [step for step in found if step is not None]
+
+
+def _step(
+    plate: Plate, plates: tuple[Plate, ...], feet: tuple[FootPath, ...], first: float, last: float, *, raised: bool
+) -> FootStep | None:
+    """Return the step of one contact from ``first`` to ``last`` s; None where not just one foot stands there."""
+    time = np.linspace(first + 0.25 * (last - first), first + 0.7 * (last - first), 10)
+    over = {foot.side: _over(plate, foot, time, raised=raised) for foot in feet}
+    on = [foot for foot in feet if over[foot.side] > -_BESIDE and _stands(foot, time)]
+    if len(on) != 1:
+        return None
+    (foot,), belt = on, on[0].drift(time)
+
+    def beside_it(when: Array) -> bool:
+        return plate.placed and any(_treads(plate, one, when, belt) for one in feet if one is not foot)
+
+    mixed = beside_it(np.linspace(first, last, 30))
+    if mixed and beside_it(time):
+        return None
+    near = _neighbours(plate, plates) if mixed or over[foot.side] < 0 else []
+    beside = tuple(one.name for one in near) if mixed or _carry(near, time) else ()
+    if mixed and not beside:
+        return None
+    overhang = 0.0 if beside or not plate.placed else max(0.0, -over[foot.side])
+    return FootStep(plate.name, foot.side, float(time[5]), overhang, _heel_first(foot, first), beside, mixed)
 
 
 def _neighbours(plate: Plate, plates: tuple[Plate, ...]) -> list[Plate]:
