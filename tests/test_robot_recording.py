@@ -126,7 +126,7 @@ def test_the_plate_says_which_foot_stands_where_the_angles_leave_it_open(place: 
     one = matched(tmp_path, place / "hoap3.urdf")
     assert one.plate.correlation > 0.95
     assert one.plate.delay == pytest.approx(RobotLab().ahead, abs=0.01)
-    grounded = one.motion.grounded
+    grounded = one.grounded
     clock = grounded.motion.time
     assert (grounded.foot[(clock > 2.0) & (clock < 14.0)] == 1).all()
     assert (grounded.foot[(clock > 18.0) & (clock < 30.0)] == 0).all()

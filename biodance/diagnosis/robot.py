@@ -11,12 +11,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biodance.body.body import Body
-from biodance.diagnosis.robot_columns import LOADED_KINDS, Columns, RobotCause, cause_columns, motion_changes, without
+from biodance.diagnosis.robot_columns import (
+    LOADED_KINDS,
+    Columns,
+    RobotCause,
+    AnyMotion,
+    cause_columns,
+    motion_changes,
+    without,
+)
 from biodance.identification.learning import WORTH
 from biodance.identification.mismatch import long_runs
 from biodance.identification.posterior import prior_factor
-from biodance.identification.robot import RobotMotion, robot_start
-from biodance.identification.robot_errors import THINNED, place_changes, slow_wrench
+from biodance.identification.robot import THINNED, RobotMotion, place_changes, robot_start, slow_wrench
 from biodance.identification.statistics import Statistics, empty
 from biodance.motion.dynamics import regressor
 from biodance.records import Array
@@ -52,8 +59,8 @@ class RobotFinding:
 
 @one_thread()
 def robot_causes(
-    body: Body, fitted: tuple[RobotMotion, ...], kept: tuple[RobotMotion, ...] = ()
-) -> tuple[tuple[RobotFinding, ...], tuple[RobotMotion, ...]]:
+    body: Body, fitted: tuple[AnyMotion, ...], kept: tuple[AnyMotion, ...] = ()
+) -> tuple[tuple[RobotFinding, ...], tuple[AnyMotion, ...]]:
     """Return what is wrong, in the order of finding, empty if the drawing with other masses explains the recording; and
     all trials without it.
 
@@ -95,11 +102,11 @@ def _chosen(columns: Columns, gain: Array, later: Array, known: list[RobotCause]
 def _refined(
     body: Body,
     found: list[RobotFinding],
-    trials: tuple[RobotMotion, ...],
+    trials: tuple[AnyMotion, ...],
     columns: Columns,
     equations: tuple[Array, Array],
     here: Array,
-) -> tuple[list[RobotFinding], tuple[RobotMotion, ...]]:
+) -> tuple[list[RobotFinding], tuple[AnyMotion, ...]]:
     """Return the findings with what is left of them added, and the trials without that."""
     A, b = equations
     size, out = len(b) - len(here), []

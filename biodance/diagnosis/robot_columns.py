@@ -3,16 +3,17 @@ the recording without it.
 """
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from biodance.body.body import Body
 from biodance.effects import unit_of
-from biodance.identification.robot import RobotMotion
-from biodance.identification.robot_errors import (
+from biodance.identification.robot import (
     GIVE,
     ZERO,
     Loads,
+    RobotMotion,
     angle_changes,
     leg_chains,
     loads,
@@ -27,6 +28,7 @@ from biodance.uncertainty.bands import Bands
 from biodance.uncertainty.noise import Noise
 from biodance.uncertainty.plates import SOURCES, Plates, plate_errors, plate_sources, source_sizes
 
+AnyMotion = TypeVar("AnyMotion", bound=RobotMotion)
 _WIDE = 10.0
 """Standard deviation of a cause that is there, over the usual error of its kind."""
 _LOADED = 2.0
@@ -157,14 +159,14 @@ def _unit(one: RobotMotion, cause: RobotCause, found: Loads) -> tuple[Array, Arr
     return angle, tilt
 
 
-def without(body: Body, one: RobotMotion, columns: Columns, cause: RobotCause, amount: float) -> RobotMotion:
+def without(body: Body, one: AnyMotion, columns: Columns, cause: RobotCause, amount: float) -> AnyMotion:
     """Return a trial without ``amount`` units of a cause."""
     fit = one.fit
     if _moves(cause):
         angle, tilt = _unit(one, cause, loads(body, one.grounded, fit.wrench.value))
         angle = one.angle + amount * angle
         found = ground_again(body, one.grounded, angle, tilt=amount * tilt)
-        return RobotMotion(replace(fit, motion=found.motion), angle, found)
+        return replace(one, fit=replace(fit, motion=found.motion), angle=angle, grounded=found)
     plates, k = plate_sources(), columns.causes.index(cause) - len(columns.of_motion)
     fault = Plates(plates.mixing[k : k + 1], plates.offset[k : k + 1], plates.delay[k : k + 1])
     about = layout_for(standing_point((fit,)))

@@ -48,15 +48,13 @@ _SLOW = LowPass(cutoff=0.2 * _COARSE)
 
 
 @dataclass(frozen=True, eq=False)
-class MatchedTrial:
-    """One trial with plate and encoders brought together: ``motion`` to identify from, ``plate`` when and where,
-    ``measured`` wrench, filtered, on the plate's clock, ``innovation`` of the drawing at it.
+class MatchedTrial(RobotMotion):
+    """One trial with plate and encoders brought together: as ``recorded``, ``plate`` when and where, ``innovation`` of
+    the drawing at it.
     """
 
     recorded: RobotTrial
-    motion: RobotMotion
     plate: PlateFit
-    measured: Wrench
     innovation: float
 
 
@@ -112,7 +110,7 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
             f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a "
             f"wrong sign or zero of an encoder, or hands on the robot."
         )
-    return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
+    return MatchedTrial(motion.fit, motion.angle, motion.grounded, replace(one, encoders=encoders), fit, odd)
 
 
 _Placed = tuple[Grounded, PlateFit]
