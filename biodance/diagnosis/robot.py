@@ -13,9 +13,9 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.diagnosis.robot_columns import (
     LOADED_KINDS,
+    AnyMotion,
     Columns,
     RobotCause,
-    AnyMotion,
     cause_columns,
     motion_changes,
     without,
