@@ -17,7 +17,7 @@ from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import SIGMAS
-from biodance.identification.load_place import nearest_segment
+from biodance.identification.loads import nearest_segment
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
