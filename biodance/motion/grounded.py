@@ -217,7 +217,9 @@ def ground_again(
     turn, place, _ = _soles(body, angle)
     q = _q(angle, turn, place, foot, base=base, tilt=lean_over)
     motion = smooth(body, one.motion.time[::every], q, settings=settings)
-    return replace(one, motion=motion, foot=foot, use=one.use[::every], base=base, tilt=lean_over)
+    use, unclear = one.use[::every], one.unclear[::every]
+    lean = None if one.lean is None else one.lean[::every]
+    return replace(one, motion=motion, foot=foot, use=use, unclear=unclear, lean=lean, base=base, tilt=lean_over)
 
 
 def _leg(body: Body) -> float:

@@ -109,7 +109,8 @@ def frozen_frames(xyz: Array) -> Mask:
     equal frames is.
 
     The recording hung, or a gap of all markers was filled by holding them. Nobody stands so still, noise alone moves
-    markers more, and what hangs begins or ends abruptly: a computed movement that rests comes to it by and by.
+    markers more, and what hangs begins or ends abruptly: a computed movement that rests comes to it by and by. Shorter
+    runs come from a slower camera whose frames were repeated.
     """
     seen = ~any_coordinate(~np.isfinite(xyz))
     equal = ~any_coordinate(xyz[1:] != xyz[:-1]) | ~(seen[1:] | seen[:-1])
