@@ -12,6 +12,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from direct_information import information
 from scipy.interpolate import CubicSpline
 
 from benchmarks.people import first_seed
@@ -19,7 +20,6 @@ from biodance.body.body import Body
 from biodance.body.human.human import human
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.identification.identification import identify_body
-from biodance.identification.information import information
 from biodance.identification.knowledge import segment_quantities
 from biodance.identification.paper_programme import paper_programme
 from biodance.identification.statistics import Fit

@@ -70,13 +70,55 @@ def danced(body: Body, seed: int, seconds: float, *, nod: Array | float = 0.0) -
         tilted = pin.SE3(pin.exp3(np.array([0.0, nods[t], 0.0])), np.zeros(3))
         root = tilted * planted * data.oMi[ankle].inverse()
         q[t] = np.concatenate([pin.SE3ToXYZQUAT(root), one])
+    return time[1:-1], angle[1:-1], ground_wrench(model, q)
+
+
+def ground_wrench(model: pin.Model, q: Array) -> Array:
+    """Return the wrench (T - 2, 6) about the origin that the configurations ``q`` (T, nq) at `RATE` need, without the
+    first and the last.
+    """
+    data = model.createData()
     v = np.array([pin.difference(model, a, b) for a, b in zip(q[:-2], q[2:], strict=True)]) * RATE / 2
     a = np.gradient(v, 1 / RATE, axis=0)
     out = []
     for now, rate, change in zip(q[1:-1], v, a, strict=True):
         force = pin.Force(pin.rnea(model, data, now, rate, change)[:6])
         out.append(pin.XYZQUATToSE3(now[:7]).act(force).vector)
-    return time[1:-1], angle[1:-1], np.array(out)
+    return np.array(out)
+
+
+TILTED = {"hip_pitch": -0.4, "knee_pitch": 0.8, "ankle_pitch": -0.4, "ankle_roll": -0.5}
+"""rad of a leg that is lifted by less than its sole is tilted: the other sole, too, lies above that one's plane."""
+
+
+def stepped(body: Body, seed: int) -> tuple[Array, Array, Array]:
+    """Return times (T,) s, angles (T, n) rad and the ground's wrench (T, 6) of 16 s on the left, then 16 s on the right
+    foot, the other one lifted a little and tilted, waist and arms moving; both flat between, at rest. The wrench is
+    about the place of the left ankle on the ground.
+    """
+    rng, time = np.random.default_rng(seed), np.arange(0, 32.0, 1 / RATE)
+    names, model = [joint.name for joint in body.joints], body.model
+    angle = np.zeros((len(time), len(names)))
+    for k, lifted in enumerate(("right", "left")):
+        begin = np.clip((time - 16.0 * k - 1.0) / 2, 0, 1) * np.clip((16.0 * (k + 1) - 1.0 - time) / 2, 0, 1)
+        up = begin**3 * (10 - 15 * begin + 6 * begin**2)
+        sign = 1.0 if lifted == "right" else -1.0
+        for name, size in TILTED.items():
+            angle[:, names.index(f"{lifted}_{name}")] += size * up * (sign if name.endswith("roll") else 1.0)
+        for j, name in enumerate(names):
+            if any(part in name for part in ("waist", "shoulder", "elbow")):
+                rhythm, phase = rng.uniform(0.2, 0.5), rng.uniform(0, 2 * np.pi)
+                angle[:, j] += 0.3 * up * np.sin(2 * np.pi * rhythm * time + phase)
+    ankles = {side: body.segment_joint[body.feet[side].segment] + 2 for side in ("left", "right")}
+    data, q = model.createData(), np.empty((len(time), model.nq))
+    planted = {"left": pin.SE3(np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]]), np.array([0.0, 0.0, -SOLE_OVER_ANKLE]))}
+    for t, one in enumerate(angle):
+        pin.forwardKinematics(model, data, np.concatenate([[0.0, 0, 0, 0, 0, 0, 1], one]))
+        planted.setdefault("right", planted["left"] * data.oMi[ankles["left"]].inverse() * data.oMi[ankles["right"]])
+        side = "left" if time[t] < 16.0 else "right"
+        root = planted[side] * data.oMi[ankles[side]].inverse()
+        q[t] = np.concatenate([pin.SE3ToXYZQUAT(root), one])
+    return time[1:-1], angle[1:-1], ground_wrench(model, q)
 
 
 def recorded(

@@ -20,6 +20,7 @@ ONE_ALGORITHM = {
     "lab/plates/decode.py": "a plate's channels to its wrench: corners, origin, gaps, units, zero, wrench",
     "inference/decision.py": "what a session ends with: places, sizes, habits, reasons, from one posterior",
     "pipeline/live.py": "a recording as a stream: every frame tracked, the wrench watched, the body identified",
+    "diagnosis/robot.py": "what is not as a robot was drawn: a column each, the clearest taken out, and again",
     "dance/dance.py": "a dance and its file, entry by entry: what is written, and what is believed of a stranger's",
     "dance/expectation.py": "what a movement tells of a body, planned or danced: one information, added up",
     "dance/performers.py": "imprecise people: how they err in a dance, and what that leaves of every limit",

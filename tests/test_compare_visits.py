@@ -19,8 +19,7 @@ from biodance.cycles.cut import PERCENT, Cycle, Stride
 from biodance.cycles.movement import TrialMovement
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import SessionMovement
-from biodance.pipeline.visit_cycles import cycle_quantities
-from biodance.pipeline.visit_quantity import Untested
+from biodance.pipeline.visit_quantities import Untested, cycle_quantities
 from biodance.pipeline.visits import VisitComparison, compare_visits, read_visits
 from biodance.records import Subject
 from biodance.report.visits import comparison_sentence, write_visits

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from direct_information import information
 from robots import biped
 
 from biodance.body.export import write_model
@@ -26,15 +27,15 @@ from biodance.dance.problem.plan import read_plan
 from biodance.dance.problem.shapes import capsule_pairs, pairs_of
 from biodance.dance.problem.stance import _WIDTH, apart, hip_width, stance, stature_of
 from biodance.dance.problem.state import Closure, close_legs
-from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, person_sized_plan, robot_plan, robot_rows
+from biodance.dance.robot import _RATE, ERROR, leg_length, person_sized, person_sized_plan, robot_plan
 from biodance.dance.search.move import Task, evaluate_move
 from biodance.dance.verify import broken, verify
 from biodance.errors import BiodanceError
 from biodance.identification.base_parameters import estimate_base, structural_base
-from biodance.identification.information import Information, fold
 from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.pipeline.dance import robot_dancer
-from biodance.records import Subject
+from biodance.records import Subject, Wrench
+from biodance.uncertainty.noise import Noise
 
 HOAP = standing_frames(hoap3())
 PROTOCOL = 'name = "tiny"\nmove_s = 2.0\nhold_s = 1.0\n[postures]\nparallel = 1\nsingle_left = 1\n'
@@ -217,13 +218,14 @@ def test_parameters_come_back_from_the_wrench_of_the_dance(made: tuple[Path, int
     np.testing.assert_allclose(exact, predict_wrench(body, motion, truth).value, atol=1e-12)
     noisy = exact + ERROR * rng.normal(size=exact.shape)
     base = structural_base(body)
-    estimate = estimate_base(Information(fold(robot_rows(body, motion, noisy)), 6 * len(exact)), base)
+    noise = Noise(np.diag(ERROR**2)[None], np.zeros(3))
+    estimate = estimate_base(information(body, motion, Wrench(motion.time, noisy), noise), base)
     known = np.isfinite(estimate.sd)
     assert known.sum() > 80
     z = (estimate.value - base.regroup @ truth)[known] / estimate.sd[known]
     assert np.abs(z).max() < 4.5
     assert 0.7 < np.sqrt(np.mean(z**2)) < 1.3
-    clean = estimate_base(Information(fold(robot_rows(body, motion, exact)), 6 * len(exact)), base)
+    clean = estimate_base(information(body, motion, Wrench(motion.time, exact), noise), base)
     assert np.abs((clean.value - base.regroup @ truth) / clean.sd)[known].max() < 1e-4
 
 

@@ -25,7 +25,7 @@ def faulty(local, session):
     return local
 
 
-def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Inferred, gains.Accepted]:
+def diagnosed(monkeypatch: pytest.MonkeyPatch) -> tuple[Inferred, gains.SessionDiagnosis]:
     """Return the diagnosis of a session with two faults, and what accepting them and a third one changes."""
     every = windows(1, trials=4, hidden=about_plate(faulty))
     by_role = {"fit": every[:2], "validate": every[2:]}

@@ -13,9 +13,9 @@ from identified_sessions import session_result
 
 from biodance.cli import run
 from biodance.identification.paper_programme import inequalities
-from biodance.pipeline.by_paper import by_paper
 from biodance.pipeline.identification import SessionIdentification
 from biodance.pipeline.results import SessionResult
+from biodance.pipeline.session import by_paper
 from biodance.report.pages.identification import identification_section
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from direct_information import information
 from random_bodies import random_body, random_motion
 
 from biodance.identification.base_parameters import estimate_base, structural_base
-from biodance.identification.information import information
 from biodance.motion.dynamics import predict_wrench, regressor
 from biodance.uncertainty.noise import Noise
 

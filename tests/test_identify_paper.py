@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from direct_information import information
 from random_bodies import random_body, random_motion
 from scipy.optimize import nnls
 
-from biodance.identification.information import information
 from biodance.identification.paper_programme import _solve, directions, inequalities, paper_programme
 from biodance.motion.dynamics import predict_wrench
 from biodance.records import Wrench

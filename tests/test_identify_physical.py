@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from direct_information import information
 from identify_trials import person
 from random_bodies import random_body, random_motion
 
 from biodance.body.inertia import smallest_eigenvalues
 from biodance.errors import NotSolved
 from biodance.identification import physical
-from biodance.identification.information import Information, fold, information
+from biodance.identification.information import Information, fold
 from biodance.identification.physical import FailedFit, PhysicalFit, physical_fit
 from biodance.identification.posterior import BodyPosterior, find_posterior
 from biodance.motion.dynamics import predict_wrench

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from direct_information import information
 from random_bodies import random_body, random_motion
 
 from biodance.body.inertia import pseudo_inertia, smallest_eigenvalues
-from biodance.identification.information import information
 from biodance.identification.physical import physical_fit
 from biodance.identification.posterior import find_posterior
 from biodance.motion.dynamics import predict_wrench, regressor

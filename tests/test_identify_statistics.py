@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from direct_information import information
 from random_bodies import random_body
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.information import information
 from biodance.identification.learning import learn_noise
 from biodance.identification.statistics import Fit, Statistics, layout_for, statistics
 from biodance.motion.dynamics import predict_wrench

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biodance.lab.read import frozen_frames, without_frozen
+from biodance.lab.markers.signals import frozen_frames, without_frozen
 from biodance.records import Markers, Source, Trial
 
 

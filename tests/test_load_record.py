@@ -10,8 +10,8 @@ from identified_sessions import session_result
 
 from biodance.diagnosis.diagnosis import Alias, Estimate, Finding
 from biodance.effects.added_mass import AddedMass
-from biodance.identification.load_place import nearest_segment
 from biodance.identification.load_words import say_load
+from biodance.identification.loads import nearest_segment
 from biodance.motion.kinematics import poses
 from biodance.pipeline.diagnosis import SessionDiagnosis
 from biodance.pipeline.load import with_load, with_weighed_load

@@ -11,8 +11,9 @@ from random_bodies import random_body, random_motion
 from biodance.body.human.human import human
 from biodance.errors import TrialRefused
 from biodance.lab.markers.signals import MarkerGaps
+from biodance.lab.markers.upright import quiet_run
 from biodance.motion.kinematics import centre_of_mass, poses
-from biodance.motion.quiet_standing import QuietStanding, facing, quiet_run, quiet_standing
+from biodance.motion.quiet_standing import QuietStanding, facing, quiet_standing
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks
 from biodance.pipeline.still import bone_lines
 from biodance.pipeline.trial import attempt, marker_fit

@@ -164,7 +164,7 @@ def unexplained(folder: Path, said: str) -> Array:
     found = read_robot_recording(folder / "run", tuple(joint.name for joint in body.joints))
     (one,), lost = bring_together(body, found)
     assert not lost
-    fit, truth = one.motion.fit, replace(body, sip=real_robot().sip)
+    fit, truth = one.fit, replace(body, sip=real_robot().sip)
     left = fit.wrench.value - predict_wrench(truth, fit.motion).value
     return np.asarray(left[fit.use].std(axis=0))
 

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from accessible import ASKED, complaints, unfold
 from browser import Page
-from robot_lab import RobotLab
-from robot_recordings import COVER, FEET, drawing, matched, real_robot, recorded
+from robot_lab import RobotLab, write_robot_trial
+from robot_recordings import COVER, FEET, drawing, matched, real_robot, recorded, stepped
 
 from biodance.cli import run
 from biodance.errors import BiodanceError
@@ -115,6 +115,22 @@ def test_clocks_apart_by_seconds_are_brought_together_and_said(place: Path, tmp_
     (clocks,) = (said for said in told if said.about == "time_delay")
     assert clocks.level == "warn"
     assert "at t -6.88" in clocks.text
+
+
+def test_the_plate_says_which_foot_stands_where_the_angles_leave_it_open(place: Path, tmp_path: Path) -> None:
+    body = real_robot()
+    time, angle, wrench = stepped(body, 0)
+    write_robot_trial(
+        tmp_path / "run", tuple(joint.name for joint in body.joints), time, angle, wrench, lab=RobotLab(), seed=0
+    )
+    one = matched(tmp_path, place / "hoap3.urdf")
+    assert one.plate.correlation > 0.95
+    assert one.plate.delay == pytest.approx(RobotLab().ahead, abs=0.01)
+    grounded = one.grounded
+    clock = grounded.motion.time
+    assert (grounded.foot[(clock > 2.0) & (clock < 14.0)] == 1).all()
+    assert (grounded.foot[(clock > 18.0) & (clock < 30.0)] == 0).all()
+    assert grounded.unclear[(clock > 5.0) & (clock < 11.0)].mean() > 0.5  # the angles do not tell
 
 
 def test_a_missing_encoder_is_named_and_a_still_joint_may_be_declared(place: Path, tmp_path: Path) -> None:

@@ -97,15 +97,7 @@ def dance_command(
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.lab.session.results_folder import whole_folder
-    from biodance.pipeline.dance import (
-        UNFINISHED,
-        dance_folder,
-        dancer,
-        designed_for,
-        make_dance,
-        make_robot_dance,
-        robot_dancer,
-    )
+    from biodance.pipeline.dance import UNFINISHED, dance_folder, dancer, make_dance, robot_dancer
     from biodance.report.dance import print_dance, write_dance
 
     if robot.given and asked.plate is not None:
@@ -113,18 +105,18 @@ def dance_command(
     plan, able = asked.plan(), read_person(asked.limits) if asked.limits else HEALTHY
     who = _who(person, robot)
     if isinstance(who, RobotFile):
-        body, make = robot_dancer(*who.named(), mend=who.mend), make_robot_dance
+        body, subject = robot_dancer(*who.named(), mend=who.mend), None
     else:
-        body, make = dancer(who, plan), make_dance
+        body, subject = dancer(who, plan), who
     folder = dance_folder(out, force=force)
     with counted_progress() as tell:
         try:
-            result = make(body, plan, able, seed=seed, tell=tell, resume=folder / UNFINISHED)
+            unfinished = folder / UNFINISHED
+            result = make_dance(body, plan, able, subject=subject, seed=seed, tell=tell, resume=unfinished)
         except KeyboardInterrupt:
             say(f"Stopped; {folder} keeps what is finished. The same command goes on from there.")
             return STOPPED
         tell("writing", 0, 0)
-        result = result if isinstance(who, RobotFile) else designed_for(result, who)
         with whole_folder(folder, over=True) as part:
             found = write_dance(result, part, despite=despite)
     show(found, print_dance, json=json, path=folder)

@@ -181,13 +181,12 @@ def identify_command(
         for_people = (*reading.given(), *(name for name, value in given.items() if value is not None))
         return _told_identified(*examine_robot(session, results, robot, for_people), results.json)
     from biodance.dance.dance import Dance
-    from biodance.pipeline.by_paper import by_paper
     from biodance.pipeline.diagnosis import diagnosed_and_corrected
     from biodance.pipeline.front_dance import performance_of
     from biodance.pipeline.judged_trials import failed_checks
     from biodance.pipeline.lab_file import read_lab
     from biodance.pipeline.movement import describe_movement
-    from biodance.pipeline.session import identification_of
+    from biodance.pipeline.session import by_paper, identification_of
     from biodance.report.write import write_identification
 
     with progress() as tell:

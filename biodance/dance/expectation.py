@@ -102,15 +102,10 @@ class MovementEvidence:
 
     def posterior(self) -> BodyPosterior:
         """Return the posterior after data that agree with the table."""
-        prior, H = widened_prior(self.body.sip), self.H
-        scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
-        value, vector = np.linalg.eigh(H / np.outer(scale, scale))
-        rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
-        triangle = np.linalg.qr(np.column_stack([rows, rows @ prior.phi]), mode="r")
-        R = np.zeros((len(H) + 1, len(H) + 1))
-        R[: len(triangle)] = triangle
-        data = Information(R, 1)
-        return find_posterior(temper(data, self.disturbed, typical_sizes()) if H.any() else data, prior)
+        prior = widened_prior(self.body.sip)
+        expected = np.column_stack([np.eye(prior.phi.size), prior.phi])  # [W y] = W [1 phi]
+        data = Information.of_normal(expected.T @ self.H @ expected, 1)
+        return find_posterior(temper(data, self.disturbed, typical_sizes()) if self.H.any() else data, prior)
 
 
 def movement_evidence(

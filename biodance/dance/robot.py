@@ -29,10 +29,11 @@ from biodance.dance.search.move import Task, exciting_move
 from biodance.dance.search.postures import intermediate_posture
 from biodance.dance.verify import Margin, verify
 from biodance.errors import BiodanceError
-from biodance.identification.information import Information, fold
 from biodance.identification.posterior import find_posterior
-from biodance.motion.dynamics import regressor
-from biodance.records import Array, Motion
+from biodance.identification.statistics import Fit, empty, layout_for, statistics
+from biodance.motion.dynamics import predict_wrench
+from biodance.records import Array
+from biodance.uncertainty.noise import Noise
 
 _WHERE = 4
 """Beside the seed: what is searched for at random here."""
@@ -191,29 +192,18 @@ ERROR = np.array([1.1, 0.5, 0.9, 0.2, 0.7, 0.4])
 """N, N·m: error of one sample of the wrench, unexplained of an unseen movement of HOAP-3 (Bonnet 2016, table II)."""
 _RATE = 4.0
 """Hz: independent samples of the wrench."""
-
-
-def robot_rows(body: Body, motion: Motion, wrench: Array) -> Array:
-    """Return the whitened rows (6 T, 10N + 1) of [W y] for a ``motion`` and a ``wrench`` (T, 6) N, N·m at ``RATE`` or
-    slower.
-    """
-    rows = np.concatenate([regressor(body, motion), wrench[:, :, None]], axis=2) / ERROR[:, None]
-    return np.asarray(rows.reshape(-1, rows.shape[2]))
-
-
 _STEPS = 10
 """Durations of a dance after which what is expected is told."""
 
 
 def expect_robot(dance: Dance) -> Expectation:
     """Return what is expected after ten durations of ``dance``, evenly spread, if it is danced exactly."""
-    body, motion = dance.body, dance.motion(_RATE)
-    rows = robot_rows(body, motion, regressor(body, motion) @ body.sip.phi)
+    body, motion, noise = dance.body, dance.motion(_RATE), Noise(np.diag(ERROR**2)[None], np.zeros(3))
+    wrench, layout = predict_wrench(body, motion), layout_for(noise.about, noise.bands)
     ends = [dance.phases[k].end for k in evenly_spread(dance, _STEPS)]
-    stops = [0, *(6 * int(np.searchsorted(motion.time, end)) for end in ends)]
-    triangles = [np.zeros((rows.shape[1], rows.shape[1]))]
-    for start, stop in pairwise(stops):
-        triangles.append(fold(rows[start:stop], triangles[-1]))
-    known = zip(triangles, (1, *stops[1:]), strict=True)
-    posteriors = [find_posterior(Information(triangle, count), body.sip) for triangle, count in known]
+    told = [empty(10 * len(body.segments), layout)]
+    for start, end in pairwise([0.0, *ends]):
+        use = (motion.time >= start) & (motion.time < end)
+        told.append(told[-1] + statistics(body, Fit(dance.protocol, motion, wrench, use), layout))
+    posteriors = [find_posterior(one.information(noise), body.sip) for one in told]
     return Expectation.of(body, np.array([0.0, *ends]), posteriors)

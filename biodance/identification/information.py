@@ -6,17 +6,11 @@ batch result. The wrench is taken about a point near the feet, where its noise h
 assumes.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from biodance.body.body import Body
-from biodance.errors import TrialRefused
-from biodance.motion.dynamics import regressor
-from biodance.records import Array, Motion, Wrench
-from biodance.uncertainty.noise import Noise
+from biodance.records import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +22,16 @@ class Information:
 
     R: Array
     frames: int
+
+    @classmethod
+    def of_normal(cls, H: Array, frames: int) -> "Information":
+        """Return the information of ``frames`` whitened samples with the normal matrix ``H`` = [W y]'[W y] (p + 1,
+        p + 1).
+        """
+        scale = np.sqrt(np.maximum(np.diag(H), 1e-300))  # a square root of H in units of its diagonal, then R of it
+        value, vector = np.linalg.eigh(H / np.outer(scale, scale))
+        rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
+        return cls(np.asarray(np.linalg.qr(rows, mode="r")), frames)
 
     @property
     def triangle(self) -> Array:
@@ -55,44 +59,3 @@ def fold(rows: Array, onto: Array | None = None) -> Array:
     triangle: Array = np.asarray(np.linalg.qr(stacked, mode="r"))
     missing = rows.shape[1] - triangle.shape[0]
     return np.pad(triangle, ((0, missing), (0, 0))) if missing > 0 else triangle
-
-
-def information(
-    body: Body, motion: Motion, wrench: Wrench, noise: Noise, *, use: NDArray[np.bool_] | None = None
-) -> Information:
-    """Return what one trial says about the 10N parameters of ``body``.
-
-    ``wrench`` (T, 6) at the times of ``motion``, about the lab origin; ``use`` (T,) True for the frames that count (all
-    by default).
-
-    Raises
-    ------
-    TrialRefused
-        Motion and wrench have different lengths, a used wrench is NaN, or no frame is to be used.
-    """
-    used = np.ones(motion.time.size, dtype=bool) if use is None else use
-    if wrench.time.size != motion.time.size:
-        raise TrialRefused(
-            f"The wrench has {wrench.time.size} samples, the motion {motion.time.size}; prepare the trial first."
-        )
-    if not used.any():
-        raise TrialRefused(
-            "No frame of this trial may be used: all are masked (ground contact not measured, or markers hidden)."
-        )
-    if np.isnan(wrench.value[used]).any():
-        raise TrialRefused("The wrench is NaN in a frame that is to be used; mask the frame.")
-    count = 0
-    R: Array | None = None
-    for rows in whitened_rows(body, motion, wrench, noise, used):
-        R = fold(rows.reshape(-1, rows.shape[2]), R)
-        count += len(rows)
-    assert R is not None
-    return Information(R, count)
-
-
-def whitened_rows(body: Body, motion: Motion, wrench: Wrench, noise: Noise, used: NDArray[np.bool_]) -> Iterator[Array]:
-    """Yield whitened rows (m, 6, 10N + 1) of [W y], block by block."""
-    for pick in noise.bands.runs(used, motion.rate):
-        part = motion.at(pick)
-        W = regressor(body, part)
-        yield noise.at(motion.rate).whiten(np.concatenate([W, wrench.value[pick][:, :, None]], axis=2))

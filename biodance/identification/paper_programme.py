@@ -17,13 +17,13 @@ import numpy as np
 from biodance.body.inertia import TENSOR
 from biodance.identification.base_parameters import BaseEstimate, estimate_base, structural_base
 from biodance.identification.identification import Identification
-from biodance.identification.information import Information, fold, information
+from biodance.identification.information import Information
 from biodance.identification.knowledge import knowledge
 from biodance.identification.physical import FailedFit, PhysicalFit
-from biodance.identification.statistics import Fit, usable
+from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
 from biodance.records import Array, Sip
 from biodance.threads import one_thread
-from biodance.uncertainty.noise import Noise
+from biodance.uncertainty.bands import WHITE
 
 if TYPE_CHECKING:
     import cvxpy as cp
@@ -122,12 +122,9 @@ def identify_as_paper(found: Identification, fits: tuple[Fit, ...]) -> Identific
     Where it has no solution, the fit failed.
     """
     used, about, _ = usable(found.body, fits)
-    noise, R, frames = Noise.of_sd(1.0, 1.0, about), None, 0
-    for fit in used:
-        one = information(found.body, fit.motion, fit.wrench, noise, use=fit.use)
-        R, frames = fold(one.R, R), frames + one.frames
-    assert R is not None
-    solved = paper_programme(Information(R, frames), found.body)
+    layout = layout_for(about, WHITE)
+    data = statistics_together(found.body, used, layout).information(layout)
+    solved, frames = paper_programme(data, found.body), data.frames
     if solved.status == "failed":
         return replace(found, fit=solved, known=(), notes=(solved.cause,), frames=frames)
     prior = found.posterior.prior

@@ -1,25 +1,29 @@
 """What a robot weighs, link by link, from encoders and a force plate: the identification of people with the errors that
-a robot's laboratory makes.
+a robot's laboratory makes, as changes of the wrench that the drawing needs.
 
 Encoders are exact but for their zeros, joints are where the drawing has them; where on the plate the robot stood is
 known to what the drawing's own errors allow. All of this enters as independent sources of error (`mismatch`), so that
-intervals hold with them.
+intervals hold with them. A joint that gives lies, beyond its encoder, by torque over stiffness away from it; one with
+play by half of the play to the side to which its load pushes. Both torques are the drawing's. The robot is put on its
+foot anew with every change.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biodance.body.body import Body
+from biodance.body.body import Body, load_pinocchio
 from biodance.identification.base_parameters import BaseEstimate, BaseParameters, estimate_base
 from biodance.identification.identification import Identification, conclude
 from biodance.identification.learning import START, learn_noise
 from biodance.identification.mismatch import Mismatch, long_runs
-from biodance.identification.robot_errors import THINNED, place_changes, places_of, zero_changes
 from biodance.identification.statistics import Fit, layout_for, statistics_together, usable
-from biodance.motion.dynamics import regressor
-from biodance.motion.grounded import Grounded
-from biodance.records import Array, Wrench
+from biodance.lab.prepare import LowPass, low_pass
+from biodance.motion.dynamics import distribute, joint_torques, predict_wrench, regressor
+from biodance.motion.grounded import Grounded, ground_again
+from biodance.motion.kinematics import poses
+from biodance.records import SIDES, Array, Motion, Wrench
+from biodance.spatial import cross, quaternion_matrix, wrench_about_point
 from biodance.threads import one_thread
 from biodance.uncertainty.bands import WHITE, Bands
 from biodance.uncertainty.noise import Noise
@@ -123,3 +127,164 @@ def _errors(body: Body, trials: tuple[tuple[Fit, RobotMotion], ...], noise: Nois
             place += np.tensordot(weight, place_changes(wrench, one.grounded, pick), axes=((0, 1), (0, 1)))
         places.append(place)
     return Mismatch(encoders, np.concatenate([faults, *places], axis=1))
+
+
+ZERO = 0.005
+"""rad: standard deviation of an encoder's zero about the drawing's (judgement: 0.3 degrees, set by hand at stops)."""
+GIVE = 0.01
+"""rad by which a joint that gives does so at its RMS torque, and half of the play of one that has some: the unit."""
+_TURNS = 0.2
+"""Of the RMS torque of a joint: load at which its play is taken up (smooth, as friction holds it near zero load)."""
+PLACE, YAW = 0.02, 0.035
+"""m and rad: how well the place on the plate follows from the drawing's centre of pressure, before the data."""
+SLIP = 0.25
+"""Of both: how far a later stance may be from where the chain of joints puts it; feet slide, soles are set down askew.
+"""
+_NEAR = 0.02
+"""Of the height of the root: soles so near the lower one bear too."""
+_QUIET = 1.5
+"""Hz: accelerations below it are the robot's, above it the encoders' noise and vibrations, which would be taken for
+causes.
+"""
+_SLOW = 0.3
+"""Cut-off over the thinned rate: changes are smooth."""
+THINNED = 4
+"""Every so many frames are enough to see what an encoder's zero does."""
+
+
+def zero_changes(body: Body, one: Grounded, angle: Array) -> Array:
+    """Return the change (T / `THINNED`, 6, n) of the needed wrench by `ZERO` rad at every joint's encoder, of a motion
+    with joint ``angle`` (T, n) rad.
+    """
+    return angle_changes(
+        body, one, angle, np.broadcast_to(ZERO * np.eye(angle.shape[1]), (*angle.shape, angle.shape[1]))
+    )
+
+
+def leg_chains(body: Body) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the joints from the root to the right and to the left foot."""
+    out = []
+    for side in SIDES:
+        found, joint = list[int](), body.segment_joint[body.feet[side].segment]
+        while joint >= 0:
+            found.append(joint)
+            joint = body.joints[joint].parent
+        out.append(tuple(reversed(found)))
+    return out[0], out[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """What gives under load: by how much (T, n) rad each joint lies beyond its encoder where it gives by 1 rad per N·m
+    (``soft``) and where it has play of 1 rad to either side (``play``), zero for joints that are not of the legs; by
+    how much the standing sole is turned, rotation vectors (T, 3) rad, where ground and sole give by 1 rad per N·m
+    ``forwards`` and ``sideways``; and the RMS ``torque`` (n,) of the joints, ``moment`` (2,) of the sole, N·m.
+    """
+
+    soft: Array
+    play: Array
+    forwards: Array
+    sideways: Array
+    torque: Array
+    moment: Array
+
+
+def loads(body: Body, one: Grounded, measured: Array) -> Loads:
+    """Return the loads with the ``measured`` wrench (T, 6) of the ground, NaN where unknown."""
+    joints = sorted(set(sum(leg_chains(body), ())))
+    every, pressed, ahead = _torques(body, one, measured)
+    torque = np.zeros((len(measured), len(body.joints)))
+    torque[:, joints] = every[:, joints]
+    size = np.sqrt(np.mean(torque**2, axis=0))
+    left = np.cross([0.0, 0.0, 1.0], ahead)
+    give = [-np.einsum("ti,ti->t", pressed, axis) for axis in (left, ahead)]
+    moment = np.sqrt(np.mean(np.square(give), axis=1))
+    play = -np.tanh(torque / np.maximum(_TURNS * size, 1e-9))
+    return Loads(-torque, play, give[0][:, None] * left, give[1][:, None] * ahead, size, moment)
+
+
+def angle_changes(body: Body, one: Grounded, angle: Array, shapes: Array, tilts: Array | None = None) -> Array:
+    """Return the change (T / `THINNED`, 6, k) of the needed wrench by changes ``shapes`` (T, n, k) rad of the joint
+    ``angle`` (T, n) rad and ``tilts`` (T, 3, k) rad of the standing sole.
+    """
+    few, time = angle[::THINNED], one.motion.time
+    slow = LowPass(cutoff=_SLOW / float(time[THINNED] - time[0]))
+    before = _needed(body, ground_again(body, one, few, every=THINNED, settings=slow).motion)
+    out = np.empty((*before.shape, shapes.shape[2]))
+    for k in range(shapes.shape[2]):
+        tilt = 0.0 if tilts is None else tilts[::THINNED, :, k]
+        after = ground_again(body, one, few + shapes[::THINNED, :, k], every=THINNED, settings=slow, tilt=tilt)
+        out[:, :, k] = _needed(body, after.motion) - before
+    return out
+
+
+def slow_wrench(body: Body, one: Grounded, angle: Array) -> Array:
+    """Return the wrench (T, 6) that a motion needs, without what is faster than `_QUIET`: faults of a plate are made
+    from it, since neither the encoders' noise nor forces that no motion explains are in it.
+    """
+    return _needed(body, ground_again(body, one, angle, settings=LowPass(cutoff=_QUIET)).motion)
+
+
+def _needed(body: Body, motion: Motion) -> Array:
+    """Return the wrench (T, 6) that a motion needs, about the origin; one vector at a time, ten times faster than by
+    the regressor.
+    """
+    pin = load_pinocchio()
+    model, rows = body.model, np.empty((motion.time.size, 6))
+    data = model.createData()
+    for row, q, v, a in zip(rows, motion.q, motion.v, motion.a, strict=True):
+        row[:] = pin.rnea(model, data, q, v, a)[:6]
+    turn = quaternion_matrix(motion.q[:, 3:7])
+    force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (rows[:, :3], rows[:, 3:]))
+    return np.concatenate([force, moment + cross(motion.q[:, :3], force)], axis=1)
+
+
+def places_of(one: Grounded) -> int:
+    """Return how many columns `place_changes` gives."""
+    return 3 * len(one.supports)
+
+
+def place_changes(wrench: Array, one: Grounded, pick: "slice | np.ndarray" = slice(None)) -> Array:
+    """Return the changes (T, 6, 3 S) of a wrench by one standard deviation of the place along x, y and of the turn: of
+    the whole motion, and of each of the S stances after the first; ``wrench`` at the instants ``pick``.
+    """
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    whole = np.zeros((len(wrench), 6, 3))
+    for k in range(2):
+        whole[:, 3:, k] = cross(PLACE * np.eye(3)[k], force)
+    up = YAW * np.eye(3)[2]
+    whole[:, :3, 2], whole[:, 3:, 2] = cross(up, force), cross(up, moment)
+    stance = one.stance[pick]
+    later = [SLIP * (stance == s)[:, None, None] * whole for s in range(1, len(one.supports))]
+    out = np.concatenate([whole, *later], axis=2)
+    return out / 10 if one.base is not None and one.base.position is not None else out
+
+
+def _torques(body: Body, one: Grounded, measured: Array) -> tuple[Array, Array, Array]:
+    """Return the torques (T, n) N·m under the measured wrench, from the feet upwards, the moment (T, 3) N·m on the
+    standing sole about its middle, and the direction (T, 3) in which it points; a foot whose sole is near the ground
+    bears its share. Accelerations are left out: they would bring in the encoders' noise.
+    """
+    pose = poses(body, one.motion.q)
+    rest = poses(body, np.concatenate([[0.0, 0, 0, 0, 0, 0, 1], np.zeros(len(body.joints))])[None])
+    soles, aheads = [], []
+    for side in SIDES:
+        foot = body.feet[side]
+        middle = foot.outline.mean(axis=0)
+        soles.append(pose.rotation[:, foot.segment] @ middle + pose.position[:, foot.segment])
+        ahead = pose.rotation[:, foot.segment] @ (rest.rotation[0, foot.segment].T @ [1.0, 0.0, 0.0])
+        flat = ahead * [1.0, 1.0, 0.0]
+        aheads.append(flat / np.linalg.norm(flat, axis=1, keepdims=True))
+    height = np.stack([sole[:, 2] for sole in soles], axis=1)
+    down = height < height.min(axis=1, keepdims=True) + _NEAR * np.median(one.motion.q[:, 2])
+    down[np.arange(len(down)), one.foot] = True
+    still = replace(one.motion, v=np.zeros_like(one.motion.v), a=np.zeros_like(one.motion.a))
+    needed = predict_wrench(body, still).value
+    measured = np.where(np.isfinite(measured), measured, needed)
+    wrench = Wrench(still.time, low_pass(measured, still.rate, LowPass(cutoff=_QUIET)))
+    parts = distribute(wrench, soles[0], soles[1], down)
+    names = [body.segments[body.feet[side].segment] for side in SIDES]
+    torque = joint_torques(body, still, dict(zip(names, parts, strict=True))).torque
+    standing = np.arange(len(down))
+    pressed = [wrench_about_point(part.value, sole)[:, 3:] for part, sole in zip(parts, soles, strict=True)]
+    return torque, np.array(pressed)[one.foot, standing], np.array(aheads)[one.foot, standing]

@@ -107,11 +107,7 @@ class Statistics:
 
     def information(self, noise: Noise) -> Information:
         """Return the R factor of the data whitened by ``noise`` (same bands)."""
-        H = self.normal_matrix(noise)
-        scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
-        value, vector = np.linalg.eigh(H / np.outer(scale, scale))
-        rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale
-        return Information(np.asarray(np.linalg.qr(rows, mode="r")), int(self.count.sum()))
+        return Information.of_normal(self.normal_matrix(noise), int(self.count.sum()))
 
     def moments(self, phi: Array, covariance: Array) -> Moments:
         """Return the summed squares of y - W phi per band, plus what the ``covariance`` (p, p) of phi adds

@@ -210,7 +210,7 @@ def decide(search: Search, posterior: Posterior, bare: Diagnosis) -> Inferred:
     findings = _with_look_alikes(named, best, rows)
     told = replace(
         bare,
-        explained=not (unknown or (named and resembled) or open_),
+        explained=not any((unknown, open_, named and resembled)),
         why={**bare.why, **_why(posterior, rows, named=bool(named), unknown=unknown, open_=open_)},
         findings=(*findings, *_habit(best, rows, findings)),
         resembles=tuple(finding for _, finding in resembled),

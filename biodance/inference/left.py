@@ -19,7 +19,7 @@ _TIE = 1e-9
 
 def adequacy(one: Hypothesis, rows: Rows) -> tuple[Adequacy, ...]:
     """Return how far what is left in every band of every channel is from what laboratories leave, in standard
-    deviations of the logarithm of its size, worst first; the worst, and the worst that matters, with its second. Nothing
+    deviations of the logarithm of its size, worst first; the worst, and the worst that matters, with its second; ()
     where no forces were compared with a body.
     """
     if rows.problem is None:

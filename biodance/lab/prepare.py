@@ -15,7 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 from biodance.errors import BiodanceError, TrialRefused
 from biodance.lab.markers.sets import canonical, read_marker_set
 from biodance.lab.markers.signals import Gap, faulty_markers, fill_gaps, report_gaps, without_faults
-from biodance.lab.markers.time_axis import LONGEST_STEP
+from biodance.lab.markers.time_axis import of_postures
 from biodance.records import Array, Markers, Plate, Trial, Wrench, runs
 from biodance.settings import FilterKind, FilterSettings, GapSettings, Settings
 
@@ -156,7 +156,7 @@ def prepare(trial: Trial) -> Trial:
     markers = trial.markers
     try:
         if markers is not None:
-            if markers.time.size > 1 and not _postures(markers.time):
+            if markers.time.size > 1 and not of_postures(markers.time):
                 _design_low_pass(filtering, markers.rate)
             markers, said = _common_time(markers, trial)
             history += said
@@ -172,11 +172,6 @@ def prepare(trial: Trial) -> Trial:
     return replace(
         trial, markers=markers, plates=plates, history=(*trial.history, *history), warnings=(*trial.warnings, *warnings)
     )
-
-
-def _postures(time: Array) -> bool:
-    """Return whether frames lie too far apart to tell a movement between them: there is nothing to filter."""
-    return time.size > 1 and float(np.median(np.diff(time))) > LONGEST_STEP
 
 
 def _common_time(markers: Markers, trial: Trial) -> tuple[Markers, list[str]]:
@@ -237,7 +232,7 @@ def _sentences(gaps: tuple[Gap, ...], time: Array) -> list[str]:
 def at_marker_times(plate: Plate, markers: Markers | None, filtering: LowPass) -> Plate:
     """Return the plate with its wrench filtered and at marker times; the last decision says how."""
     wrench = plate.wrench
-    if _postures(wrench.time):
+    if of_postures(wrench.time):
         how = "not filtered, every row is a posture"
     elif wrench.time.size < 2 or wrench.time.size < filtering.shortest(wrench.rate):
         mean = np.broadcast_to(wrench.value.mean(axis=0), wrench.value.shape)

@@ -2,58 +2,21 @@
 format.
 
 Markers at (0, 0, 0) were not seen, whatever the format: no marker of a person lies on the origin to the last digit.
-Frames that carry the markers of the frame before to the last digit count as unseen, whatever the format: the recording
-hung, or a gap of all markers was filled by holding them. Nobody stands so still, noise alone moves markers more, and
-what hangs begins or ends abruptly: a computed movement that rests comes to it by and by.
+Nor were frames that carry the markers of the frame before to the last digit (`without_frozen`).
 """
 
 import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from biodance.discovery import Chosen
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.markers.sets import MarkerSet, wearing
-from biodance.lab.markers.signals import unseen_at_origin
+from biodance.lab.markers.signals import unseen_at_origin, without_frozen
 from biodance.lab.plates.corners import Told, as_told
 from biodance.lab.readers import Reader, extensions, head_text, readers
 from biodance.library import refuse_special
-from biodance.records import Array, Mask, Role, Trial, any_coordinate, runs
-
-_FEWEST = 4  # Markers that must be seen; fewer may rest on something, or be rounded to the same digits
-_LASTING = 5  # Frames in a row; shorter runs come from a slower camera whose frames were repeated
-_ABRUPT = 0.5
-"""Share of the step beside it (m a frame) that the last step before a rest or the first behind it has at least."""
-_FELT = 1e-5  # m: smaller steps are the last digits of a computed movement
-
-
-def frozen_frames(xyz: Array) -> Mask:
-    """Return (T,) True where all markers ``xyz`` (T, N, 3) m, NaN = unseen, repeat the frame before for at least five
-    frames, into or out of which they move abruptly; nowhere in a recording that never moves, as a posture kept as many
-    equal frames is.
-    """
-    seen = ~any_coordinate(~np.isfinite(xyz))
-    equal = ~any_coordinate(xyz[1:] != xyz[:-1]) | ~(seen[1:] | seen[:-1])
-    repeats = np.zeros(len(xyz), dtype=bool)
-    repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
-    if not repeats.any() or repeats.sum() >= len(repeats) - 1:
-        return np.zeros(len(xyz), dtype=bool)
-    steps = np.zeros(len(xyz))
-    steps[1:] = np.nan_to_num(np.linalg.norm(xyz[1:] - xyz[:-1], axis=2)).max(axis=1)
-    for start, stop in runs(repeats):
-        repeats[start:stop] = stop - start >= _LASTING and _abrupt(steps, start, stop)
-    return repeats
-
-
-def _abrupt(steps: Array, start: int, stop: int) -> bool:
-    """Return whether the movement of ``steps`` (T,) m breaks off at frame ``start`` or sets in at ``stop`` in full."""
-    before, behind = steps[max(start - 2, 0) : start], steps[stop : stop + 2]
-    return any(
-        pair.size == 2 and pair[near] > _FELT and pair[near] >= _ABRUPT * pair[1 - near]
-        for pair, near in ((before, 1), (behind, 0))
-    )
+from biodance.records import Role, Trial
 
 
 def _without_origin(trial: Trial) -> Trial:
@@ -62,22 +25,6 @@ def _without_origin(trial: Trial) -> Trial:
         return trial
     xyz, said = unseen_at_origin(trial.markers.xyz)
     return replace(trial, markers=replace(trial.markers, xyz=xyz), history=(*trial.history, *said)) if said else trial
-
-
-def without_frozen(trial: Trial) -> Trial:
-    """Return the trial with its markers unseen where they are frozen, and a warning that says so."""
-    markers = trial.markers
-    frozen = np.zeros(0, dtype=bool) if markers is None else frozen_frames(markers.xyz)
-    if markers is None or not frozen.any():
-        return trial
-    xyz = np.where(frozen[:, None, None], np.nan, markers.xyz)
-    spans = [f"{markers.time[start]:.2f} to {markers.time[stop - 1]:.2f} s" for start, stop in runs(frozen)]
-    said = ", ".join(spans[:3]) + (f" and {len(spans) - 3} times more" if len(spans) > 3 else "")
-    warning = (
-        f"All markers stand still to the last digit at {said}: the recording hung, or a gap was filled by holding "
-        f"them. These {int(frozen.sum())} frames count as not seen."
-    )
-    return replace(trial, markers=replace(markers, xyz=xyz), warnings=(*trial.warnings, warning))
 
 
 _SUBJECT_DATA = {".mp": "Vicon measurements", ".vsk": "Vicon skeleton", ".enf": "Vicon Eclipse notes"}

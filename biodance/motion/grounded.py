@@ -102,21 +102,23 @@ _AROUND = 0.25
 _SHORT = 0.5  # s: shorter stances are looked over
 RATE = 100.0
 """Hz at which motion and wrench are compared."""
+Lean = NDArray[np.intp] | None
+"""Foot (T,) that stands where joint angles leave that open: 0 right, 1 left, -1 or None the one that stood before."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grounded:
     """The ``motion`` of a robot in the frame of its first standing sole, ``foot`` (T,) which stands (0 right, 1 left),
-    ``use`` (T,) where one certainly does; ``unclear`` whether angles alone leave that open at times, and ``lean`` the
-    foot that was taken to stand then (None: the one that did before); ``base`` what was seen of it beside the joints,
+    ``use`` (T,) where one certainly does; ``unclear`` (T,) where angles alone leave that open, and ``lean`` (T,) the
+    foot that was taken to stand there (None: the one that did before); ``base`` what was seen of it beside the joints,
     ``under`` as in `ground`, and ``tilt`` (T, 3) rad by which the standing sole is not flat.
     """
 
     motion: Motion
     foot: NDArray[np.intp]
     use: NDArray[np.bool_]
-    unclear: bool = False
-    lean: int | None = None
+    unclear: NDArray[np.bool_]
+    lean: Lean = None
     base: BaseSeen | None = None
     under: float = UNDER[0]
     tilt: Array | None = None
@@ -155,15 +157,14 @@ def ground(
     angle: Array,
     *,
     settings: LowPass | None = None,
-    lean: int | None = None,
+    lean: Lean = None,
     base: BaseSeen | None = None,
     under: float = UNDER[0],
 ) -> Grounded:
     """Return the motion of ``body`` with joint ``angle`` (T, n) rad at ``time`` (T,) s, evenly spaced.
 
-    ``settings`` of the low-pass, as for people by default; ``lean`` the foot (0 right, 1 left) that stands where a
-    lifted foot is so tilted that either could, None the one that stood before; ``base`` where it was seen;
-    ``under`` of `UNDER`.
+    ``settings`` of the low-pass, as for people by default; ``lean`` the foot that stands where a lifted one is so
+    tilted that either could; ``base`` where it was seen; ``under`` of `UNDER`.
 
     Raises
     ------
@@ -175,12 +176,12 @@ def ground(
     turn, place, height = _soles(body, angle)
     depth = under * _leg(body)
     stands = height > -depth
-    unclear = stands.all(axis=0) & (height > depth).any(axis=0)
+    unclear = np.asarray(stands.all(axis=0) & (height > depth).any(axis=0))
     if lean is not None:
-        stands[1 - lean] &= ~unclear
+        stands &= ~unclear | (lean < 0) | (lean == [[0], [1]])
     foot, use = _standing(stands, float(1.0 / (time[1] - time[0])))
     q = _q(angle, turn, place, foot, base=base)
-    return Grounded(smooth(body, time, q, settings=settings), foot, use, bool(unclear.any()), lean, base, under)
+    return Grounded(smooth(body, time, q, settings=settings), foot, use, unclear, lean, base, under)
 
 
 def _q(
@@ -216,7 +217,9 @@ def ground_again(
     turn, place, _ = _soles(body, angle)
     q = _q(angle, turn, place, foot, base=base, tilt=lean_over)
     motion = smooth(body, one.motion.time[::every], q, settings=settings)
-    return replace(one, motion=motion, foot=foot, use=one.use[::every], base=base, tilt=lean_over)
+    use, unclear = one.use[::every], one.unclear[::every]
+    lean = None if one.lean is None else one.lean[::every]
+    return replace(one, motion=motion, foot=foot, use=use, unclear=unclear, lean=lean, base=base, tilt=lean_over)
 
 
 def _leg(body: Body) -> float:

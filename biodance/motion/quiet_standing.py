@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from biodance.body.body import Body
 from biodance.lab.markers.sets import landmark, read_marker_set
-from biodance.lab.markers.upright import movement
+from biodance.lab.markers.upright import movement, quiet_run
 from biodance.motion.kinematics import centre_of_mass, in_blocks, poses
-from biodance.records import Array, Markers, Motion, Trial, longest_run
-from biodance.settings import StandingRules
+from biodance.records import Array, Markers, Motion, Trial
 
 _FOOT_LANDMARKS = tuple(
     f"{side}_{place}" for side in ("left", "right") for place in ("heel", "toe", "ankle_lateral", "toe_lateral")
@@ -47,18 +46,6 @@ class QuietStanding:
     feet: Array
     foot_names: tuple[str, ...]
     plates: Array
-
-
-def quiet_run(
-    vertical: Array, used: NDArray[np.bool_], rate: float, rules: StandingRules | None = None
-) -> slice | None:
-    """Return the longest run of ``used`` frames (T,) with a steady ``vertical`` force (T,) N; None if too short."""
-    rules = rules or StandingRules()
-    if not used.any() or np.median(vertical[used]) < rules.force:
-        return None
-    middle = float(np.median(vertical[used]))
-    first, stop = longest_run((np.abs(vertical - middle) <= rules.sway * middle) & used)
-    return slice(first, stop) if stop - first >= rules.shortest * rate else None
 
 
 def facing(body: Body, motion: Motion) -> Array:

@@ -14,7 +14,7 @@ from biodance.body.body import Body
 from biodance.body.parts import UPRIGHT
 from biodance.body.tables.error_sizes import error_size
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.lab.markers.time_axis import LONGEST_STEP
+from biodance.lab.markers.time_axis import of_postures
 from biodance.lab.prepare import USUAL_CUTOFF, LowPass, low_pass, motion_filter
 from biodance.motion.ik.chart import Balls, Chart, Smooth, chart_of, continued
 from biodance.motion.ik.inverse_kinematics import (
@@ -54,7 +54,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     spaced.
 
     ``settings`` None: the default low-pass. A single frame, and each of frames that lie too far apart to tell a
-    movement between them (`LONGEST_STEP`), is a posture at rest: v and a are zero. Joint angles may leave their limits
+    movement between them (`of_postures`), is a posture at rest: v and a are zero. Joint angles may leave their limits
     by what the filter rounds off; in the first and last half period of the cut-off v and a are less certain. Root v and
     a: linear, angular, in the root's own frame, a = dv/dt (Pinocchio's convention).
 
@@ -66,7 +66,7 @@ def smooth(body: Body, time: Array, q: Array, *, settings: LowPass | None = None
     settings = settings or LowPass()
     _check(time, q, settings)
     names = tuple(joint.name for joint in body.joints)
-    if len(time) == 1 or np.median(np.diff(time)) > LONGEST_STEP:
+    if len(time) == 1 or of_postures(time):
         rest = np.zeros((len(time), body.nv))
         return Motion(time, q, rest, rest, joint_names=names)
     chart = chart_of(body)
@@ -133,7 +133,7 @@ def _check(time: Array, q: Array, settings: LowPass) -> None:
     if len(time) < 2:
         return
     steps = np.diff(time)
-    if np.median(steps) > LONGEST_STEP:
+    if of_postures(time):
         return
     if np.ptp(steps) > 0.01 * steps.mean():
         frame = int(np.abs(steps - np.median(steps)).argmax())

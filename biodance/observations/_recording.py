@@ -21,7 +21,7 @@ from biodance.records import Array, Index, Plate, Trial, Wrench, runs
 from biodance.settings import COP_FORCE
 from biodance.spatial import zero_moment_point
 
-DECLARED, GUESSED = 0.01, 0.3
+_DECLARED, _GUESSED = 0.01, 0.3
 """Share of the mass by which careful declarations are wrong (clothes, shoes, another day), and a guess may be."""
 ONSET = 20.0
 """N of vertical force from which a foot counts as down (Zeni et al. 2008, doi:10.1016/j.gaitpost.2007.07.007)."""
@@ -142,7 +142,7 @@ class SeenTrial:
     @property
     def mass_doubt(self) -> float:
         """Standard deviation of the mass, kg."""
-        return (DECLARED if self.declared else GUESSED) * self.mass
+        return (_DECLARED if self.declared else _GUESSED) * self.mass
 
     @property
     def one_clock(self) -> bool:

@@ -21,7 +21,7 @@ from biodance.motion.dynamics import predict_wrench
 from biodance.motion.ik.functional_joints import PLACED, functional_joints
 from biodance.motion.optional_joints import JointGain, with_shown_joints
 from biodance.motion.track import track
-from biodance.pipeline.trial import Prepared, attempt, track_trial
+from biodance.pipeline.trial import attempt, track_trial
 from biodance.pipeline.trial_result import ForceGain, ShownJoints, Step, TrialResult
 from biodance.records import SIDES, Markers, Sip, Subject, Trial
 from biodance.settings import Settings
@@ -35,7 +35,7 @@ _NO_MARKERS = "No trial has markers, so only the plates are reported. Record the
 
 
 def body_of(
-    subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step]
+    subject: Subject, read: tuple[TrialResult, ...], settings: Settings, steps: list[Step]
 ) -> tuple[Body | None, str]:
     """Return the body of the session and one sentence on where it comes from; None without mass, stature or markers,
     with the step refused.
@@ -62,7 +62,7 @@ def body_of(
 
 
 def _without_static(
-    subject: Subject, read: tuple[Prepared, ...], settings: Settings, steps: list[Step], *, had_static: bool
+    subject: Subject, read: tuple[TrialResult, ...], settings: Settings, steps: list[Step], *, had_static: bool
 ) -> tuple[Body | None, str]:
     """Return the better of two bodies: from stature alone, or scaled on one frame of a moving trial with both feet on
     the ground; better is the one whose markers lie nearer in that trial.
@@ -94,7 +94,7 @@ def _distance(body: Body, trial: Trial) -> float:
     return float(np.sqrt(np.nanmean(motion.residual**2))) if motion is not None else math.inf
 
 
-def calibrate_joints(scaling: Scaling, read: tuple[Prepared, ...]) -> Scaling:
+def calibrate_joints(scaling: Scaling, read: tuple[TrialResult, ...]) -> Scaling:
     """Return the scaling with the joints that the trials with role fit show at the places where these show them.
 
     Raises
@@ -155,7 +155,7 @@ _WORDS = {
 }
 
 
-def shown_joints(body: Body, read: tuple[Prepared, ...], steps: list[Step]) -> tuple[Body, ShownJoints]:
+def shown_joints(body: Body, read: tuple[TrialResult, ...], steps: list[Step]) -> tuple[Body, ShownJoints]:
     """Return the body with the joints that the markers of its moving trials show, and what each brings; as it is where
     no static trial placed its markers, or nothing moves.
     """

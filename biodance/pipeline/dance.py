@@ -5,7 +5,7 @@ order.
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,22 +43,6 @@ _OURS = (
 """Files that a dance consists of."""
 
 
-@dataclass(frozen=True)
-class Makers:
-    """Who designs a dance, and who says what will be known after it: others for persons than for robots."""
-
-    design: Callable[..., tuple[Dance, tuple[Margin, ...]]]
-    expect: Callable[[Dance], Expectation]
-
-
-PERSONS = Makers(design, expect)
-
-
-def designed_for(made: DanceResult, subject: Subject) -> DanceResult:
-    """Return ``made`` with its dance knowing for whom it was designed."""
-    return made if made.dance is None else replace(made, dance=replace(made.dance, subject=subject))
-
-
 _LEGAL = {"mass": (30.0, 200.0, "kg"), "stature": (1.2, 2.2, "m")}
 
 
@@ -86,37 +70,39 @@ def make_dance(
     plan: Plan,
     person: PersonLimits,
     *,
+    subject: Subject | None,
     limits: Iterable[Limit | type[Limit]] = (),
     seed: int = 0,
     tell: _Tell = lambda *_: None,
     resume: Path | None = None,
-    makers: Makers = PERSONS,
 ) -> DanceResult:
-    """Design, check and count a dance of ``plan`` for ``body`` with the limits of ``person``; ``resume`` keeps what is
-    finished meanwhile.
+    """Design, check and count a dance of ``plan`` for the ``body`` of a ``subject`` (`dancer`), or of a robot (None;
+    `robot_dancer`), with the limits of ``person``; ``resume`` keeps what is finished meanwhile.
 
     ``limits`` are kept beside those of the plan, or in place of one of the same name (`dance.limits`).
 
     Raises
     ------
     BiodanceError
-        The protocol and the person contradict each other (`fit_to_person`).
+        The protocol and the person contradict each other (`fit_to_person`), or it is not one for robots.
     """
-    started = time.perf_counter()
+    started, robot = time.perf_counter(), subject is None
+    plan = robot_plan(body, plan) if robot else plan
     own, plan, notes = fit_to_person(body, plan.with_limits(limits), person)
+    notes = (*(_robot_notes(body) if robot else ()), *notes)
     reason, margins, dance = "", tuple[Margin, ...](), None
     try:
-        dance, margins = makers.design(own, plan, seed=seed, tell=tell, resume=resume)
+        dance, margins = (design_robot if robot else design)(own, plan, seed=seed, tell=tell, resume=resume)
     except BiodanceError as error:
         reason = str(error)
     counted = expected = freely = None
     if dance is not None:
-        dance = replace(dance, plate=plan.plate)
+        dance = replace(dance, plate=plan.plate, subject=subject)
         tell("counting what the dance tells", 0, 0)
         with ProcessPoolExecutor(1) as aside:
             numbers = aside.submit(dance_metrics, dance, plan)
             free = aside.submit(_freer_expectation, dance, plan)
-            expected, counted, freely = makers.expect(dance), numbers.result(), free.result()
+            expected, counted, freely = (expect_robot if robot else expect)(dance), numbers.result(), free.result()
         reason = " ".join(
             f"The limit on {cause_in_words(m.limit, m.what)} is broken by {-m.worst:.3g} {m.unit} at {m.where_s:.2f} s."
             for m in broken(margins)
@@ -126,6 +112,13 @@ def make_dance(
         dance = counted = expected = freely = None
     spent = time.perf_counter() - started
     return DanceResult(own, plan, dance, margins, counted, expected, reason, notes, spent, person.reason, freely)
+
+
+def _robot_notes(body: Body) -> tuple[str, ...]:
+    """Return what was made of a robot's file, and which of its parts are not kept apart, in sentences."""
+    coarse = pairs_of(body).unchecked
+    words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
+    return (*body.notes, *words)
 
 
 def _freer_expectation(dance: Dance, plan: Plan) -> Expectation | None:
@@ -164,9 +157,6 @@ def dance_folder(out: Path, *, force: bool = False) -> Path:
     return out
 
 
-ROBOTS = Makers(design_robot, expect_robot)
-
-
 def robot_dancer(path: Path, feet: str, *, mend: bool = False) -> Body:
     """Return the robot of a URDF file, in standing frames; ``feet`` the links of its right and left foot, "right,left";
     ``mend`` as in `urdf.read_urdf`.
@@ -185,31 +175,3 @@ def named_feet(feet: str) -> tuple[str, str]:
     if len(names) != 2 or names[0] == names[1] or not all(names):
         raise BiodanceError(f"--feet {feet}: expected the links of the right and the left foot, separated by a comma.")
     return names[0], names[1]
-
-
-def make_robot_dance(
-    body: Body,
-    plan: Plan,
-    person: PersonLimits,
-    *,
-    limits: Iterable[Limit | type[Limit]] = (),
-    seed: int = 0,
-    tell: _Tell = lambda *_: None,
-    resume: Path | None = None,
-) -> DanceResult:
-    """Design, check and count a dance for a robot (`robot_dancer`), with the limits of ``person`` beyond those of its
-    file.
-
-    See `dance.make_dance`.
-
-    Raises
-    ------
-    BiodanceError
-        The protocol is not one for robots.
-    """
-    found = make_dance(
-        body, robot_plan(body, plan), person, limits=limits, seed=seed, tell=tell, resume=resume, makers=ROBOTS
-    )
-    coarse = pairs_of(body).unchecked
-    words = (f"Not kept apart, since their boxes overlap at zero angles: {', '.join(coarse)}.",) if coarse else ()
-    return replace(found, notes=(*body.notes, *words, *found.notes))

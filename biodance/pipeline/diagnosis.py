@@ -3,13 +3,10 @@ and gains elsewhere.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from biodance import display
-from biodance.diagnosis.accept import Residuals
-from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
-from biodance.diagnosis.gain import Gain
+from biodance.diagnosis.diagnosis import Diagnosis
 from biodance.diagnosis.of_family import of_family
 from biodance.diagnosis.own_tolerances import own_tolerances
 from biodance.diagnosis.plate_axes import with_plate_axes
@@ -21,7 +18,6 @@ from biodance.effects import Cause, DiscreteEffect, Effect, causes, check_qualit
 from biodance.effects.body_mass import BodyMass
 from biodance.effects.labels_swapped import LabelsSwapped
 from biodance.errors import BiodanceError, TrialRefused
-from biodance.identification.identification import Identification
 from biodance.identification.unloaded_body import expect_unloaded
 from biodance.inference.decision import Inferred
 from biodance.inference.session import judge, see
@@ -31,13 +27,14 @@ from biodance.pipeline.gains import accepted, with_proven_corrections
 from biodance.pipeline.identification import FITTED_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import all_windows, cases_of, chosen_windows, judged_trials, left_out
 from biodance.pipeline.load import with_load, with_weighed_load
-from biodance.pipeline.results import MendedCopy, SessionResult
+from biodance.pipeline.results import SessionDiagnosis as SessionDiagnosis
+from biodance.pipeline.results import SessionResult
 from biodance.records import Sip
 from biodance.threads import one_thread
 from biodance.uncertainty.tolerances import Tolerances, shipped
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 _ANYWAY = ("standing_twist",)
@@ -46,78 +43,6 @@ _COPY = (
     "What is named first was undone in a copy, and everything else was found in that copy. "
     "The recordings themselves are as they were."
 )
-
-
-@dataclass(frozen=True, eq=False)
-class SessionDiagnosis:
-    """What the simulation of a visit gets wrong, and what accepting it changes.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Verdict and findings.
-    inferred : Inferred or None
-        The posterior; None where there was nothing to judge by.
-    before, accepted : Identification or None
-        What is identified without the findings and once they are accepted; None without findings.
-    left : tuple or None
-        What the body in use leaves of the kept trials, and what is left once the findings are accepted.
-    failures : mapping
-        What could not be computed ("what accepting changes"), with cause and cure.
-    mended : MendedCopy or None
-        The copy without large faults of forces, and with labels exchanged where that was asked for, in which all else
-        was found; None where nothing was undone.
-    gain : Gain or None
-        Of all findings together on the kept trials; each has its own.
-    looked_at : frozenset of str
-        Trials whose forces were compared with a body.
-
-    Examples
-    --------
-    >>> found.verdict
-    'nothing wrong'
-    """
-
-    diagnosis: Diagnosis
-    inferred: Inferred | None = None
-    before: Identification | None = None
-    accepted: Identification | None = None
-    left: tuple[Residuals, Residuals] | None = None
-    failures: Mapping[str, str] = field(default_factory=dict)
-    mended: MendedCopy | None = None
-    gain: Gain | None = None
-    looked_at: frozenset[str] = frozenset()
-
-    def __repr__(self) -> str:
-        return f"SessionDiagnosis({self.diagnosis.told})"
-
-    def _repr_html_(self) -> str:
-        return display.card(repr(self), self.table(), self.diagnosis.notes)
-
-    @property
-    def verdict(self) -> Verdict:
-        """One of "nothing wrong", "named, complete", "named, incomplete", "unexplained"."""
-        return self.diagnosis.verdict
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """The causes named, in the order found."""
-        return self.diagnosis.findings
-
-    def table(self) -> "pd.DataFrame":
-        """Return one row for each parameter of each finding, see `Diagnosis.table`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Empty where nothing is wrong.
-
-        Examples
-        --------
-        >>> len(found.table())
-        0
-        """
-        return self.diagnosis.table()
 
 
 @one_thread()
@@ -279,6 +204,4 @@ def _with_gains(result: SessionResult, found: Inferred) -> SessionDiagnosis:
     before = result.identification.identification if result.identification else None
     if not found.named or before is None:
         return SessionDiagnosis(found.diagnosis, found, before)
-    told = accepted(result, found, before)
-    one = told.inferred
-    return SessionDiagnosis(one.diagnosis, one, before, told.identified, told.left, told.failures, gain=told.gain)
+    return accepted(result, found, before)

@@ -12,14 +12,13 @@ from biodance.effects import DiscreteEffect, Effect, causes
 from biodance.identification.sessions import certain_changes, differences
 from biodance.lab.session.read import read_session
 from biodance.pipeline.body import refuse_another_reference
-from biodance.pipeline.by_paper import by_paper
 from biodance.pipeline.diagnosis import SessionDiagnosis, diagnose_session, diagnosed_and_corrected
 from biodance.pipeline.front_dance import performance_of
 from biodance.pipeline.identification import SessionIdentification, identify_trials
 from biodance.pipeline.lab_file import read_lab
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.saved_results import known_body
-from biodance.pipeline.session import examine, identification_of
+from biodance.pipeline.session import by_paper, examine, identification_of
 from biodance.records import Session
 from biodance.uncertainty.tolerances import Tolerances
 

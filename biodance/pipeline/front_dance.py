@@ -83,13 +83,13 @@ def design_dance(
     """
     from biodance.dance.problem.person import HEALTHY, read_person
     from biodance.dance.problem.plan import read_plan
-    from biodance.pipeline.dance import dancer, designed_for, make_dance
+    from biodance.pipeline.dance import dancer, make_dance
 
     plan = read_plan(protocol)
     plan = plan if plate is None else replace(plan, plate=plate)
     person = read_person(Path(limits)) if limits else HEALTHY
-    made = make_dance(dancer(subject, plan), plan, person, limits=own_limits, seed=seed, tell=tell)
-    return designed_for(made, subject)
+    body = dancer(subject, plan)
+    return make_dance(body, plan, person, subject=subject, limits=own_limits, seed=seed, tell=tell)
 
 
 def verify_dance(

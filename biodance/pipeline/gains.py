@@ -7,7 +7,7 @@ nothing of it.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import compress
 
@@ -31,7 +31,7 @@ from biodance.lab.corrections import PlateCorrection
 from biodance.lab.plates.faults import DELAY, GAIN, OFFSET, PLATE_FAULTS
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES, SessionIdentification
 from biodance.pipeline.judged_trials import cases_of, windows
-from biodance.pipeline.results import MendedCopy, SessionResult
+from biodance.pipeline.results import MendedCopy, SessionDiagnosis, SessionResult
 from biodance.pipeline.session import examine
 from biodance.records import Array, Role, Sip
 
@@ -39,20 +39,6 @@ _Mend = Callable[[Case], Case]
 _Fits = tuple[Fit, ...]
 _SAME = 0.01
 """N, N·m: residuals that differ nowhere by more are the same."""
-
-
-@dataclass(frozen=True, eq=False)
-class Accepted:
-    """A diagnosis whose findings were accepted: ``inferred`` with the gain of each of them, the body ``identified``
-    then (None without findings), what the body in use and this one ``left`` of the data not used, the ``gain`` of all
-    together, and what could not be computed (``failures``).
-    """
-
-    inferred: Inferred
-    identified: Identification | None = None
-    left: tuple[Residuals, Residuals] | None = None
-    gain: Gain | None = None
-    failures: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,23 +115,24 @@ def proven(one: Finding, prior: Mapping[Key, float]) -> bool:
     return bool(one.probability * shares[same].sum() / shares.sum() >= NAMED)
 
 
-def accepted(result: SessionResult, inferred: Inferred, before: Identification) -> Accepted:
-    """Return what accepting the findings changes against the identification ``before``. A finding whose own gain lies
-    wholly at or below zero is taken back, the worst first, and the rest accepted again.
+def accepted(result: SessionResult, inferred: Inferred, before: Identification) -> SessionDiagnosis:
+    """Return the diagnosis with what accepting its findings changes against the identification ``before``. A finding
+    whose own gain lies wholly at or below zero is taken back, the worst first, and the rest accepted again.
     """
     while inferred.diagnosis.findings:
         try:
             found = _accepted(result, inferred, before)
         except TrialRefused as why:  # named in standing, and no movement to identify from
-            return Accepted(noted(inferred, f"What accepting the findings changes is not known. {why}"))
+            inferred = noted(inferred, f"What accepting the findings changes is not known. {why}")
+            break
         except NotSolved as why:
-            return Accepted(inferred, failures={"what accepting changes": str(why)})
-        worst = _worthless(found.inferred.diagnosis.findings)
-        if worst is None:
+            failures = {"what accepting changes": str(why)}
+            return SessionDiagnosis(inferred.diagnosis, inferred, before, failures=failures)
+        worst = _worthless(found.findings)
+        if worst is None or found.inferred is None:
             return found
-        gone = found.inferred.diagnosis.findings[worst]
-        inferred = noted(found.inferred.without(worst), _taken_back_words(gone))
-    return Accepted(inferred)
+        inferred = noted(found.inferred.without(worst), _taken_back_words(found.findings[worst]))
+    return SessionDiagnosis(inferred.diagnosis, inferred, before)
 
 
 def noted(inferred: Inferred, *notes: str) -> Inferred:
@@ -174,7 +161,7 @@ def _taken_back_words(gone: Finding) -> str:
     return f"{name} was taken back: accepting it makes data that were not used {low:.0f} to {high:.0f} % worse."
 
 
-def _accepted(result: SessionResult, inferred: Inferred, before: Identification) -> Accepted:
+def _accepted(result: SessionResult, inferred: Inferred, before: Identification) -> SessionDiagnosis:
     """Return what accepting the findings changes, with all gains."""
     phi, every = _phi(result, inferred), inferred.named
     found = _corrected(result, partial(accept, named=every), phi)
@@ -189,7 +176,8 @@ def _accepted(result: SessionResult, inferred: Inferred, before: Identification)
     findings = tuple(replace(one, gain=gain) for one, gain in zip(findings, (*gains, *habits), strict=True))
     told = replace(inferred, diagnosis=replace(inferred.diagnosis, findings=findings))
     left = (as_is.kept, found.kept) if as_is.kept and found.kept else None
-    return Accepted(told, found.identified, left, gains[0] if single else _gain(as_is, found))
+    gain = gains[0] if single else _gain(as_is, found)
+    return SessionDiagnosis(told.diagnosis, told, before, found.identified, left, gain=gain)
 
 
 def _gain_of_person(result: SessionResult, inferred: Inferred, index: int, before: Identification) -> Gain | None:

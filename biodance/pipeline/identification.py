@@ -17,7 +17,7 @@ from biodance.errors import BiodanceError, NotSolved, TrialRefused
 from biodance.identification.added_mass import LoadSearch, added_mass
 from biodance.identification.identification import Identification, identify_body
 from biodance.identification.knowledge import SIGMAS
-from biodance.identification.load_place import nearest_segment
+from biodance.identification.loads import nearest_segment
 from biodance.identification.sessions import Difference, differences
 from biodance.identification.statistics import Fit, standing_point
 from biodance.identification.torques import Impact, TorqueBands, impacts, torques_on_plates
@@ -273,7 +273,7 @@ def predicted(
         fitted=fitted,
         validations=kept,
         agreements={f.name: compare(f.wrench, predict_wrench(identified, f.motion), f.use) for f in every},
-        gain=_gain(kept, notes),
+        gain=kept_gain(kept, notes),
         shown=_shown(results),
         notes=tuple(notes),
     )
@@ -291,7 +291,8 @@ def fits_of_roles(results: tuple[TrialResult, ...], roles: tuple[Role, ...], *ma
     return tuple(fit for fit in found if fit is not None)
 
 
-def _gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> ResidualRatio | None:
+def kept_gain(kept: tuple[TrialValidation, ...], notes: list[str]) -> ResidualRatio | None:
+    """Return the gain on the trials that were kept; None without any, or, said in ``notes``, without an interval."""
     try:
         return residual_ratio(kept) if kept else None
     except BiodanceError as error:

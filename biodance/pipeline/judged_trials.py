@@ -8,7 +8,7 @@ from biodance.body.body import Body
 from biodance.diagnosis.problem import TrialWindow
 from biodance.diagnosis.spectrum import SHORTEST_RUN
 from biodance.effects import Case, QualityCheck, check_quality
-from biodance.lab.markers.time_axis import LONGEST_STEP
+from biodance.lab.markers.time_axis import of_postures
 from biodance.pipeline.identification import FITTED_ROLES, KEPT_ROLES
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.trial_result import TrialResult
@@ -31,7 +31,7 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
     time; static trials belong to that time only where they are asked for, rows of postures never.
     """
     asked = [one for one in results if one.trial.role != "static" or "static" in roles]
-    moving = [one for one in asked if one.motion is not None and not _of_postures(one)]
+    moving = [one for one in asked if one.motion is not None and not of_postures(one.motion.time)]
     seconds = [float(np.ptp(one.motion.time[[0, -1]])) for one in moving if one.motion is not None]
     ends = np.cumsum(seconds)
     found = []
@@ -40,12 +40,6 @@ def windows(results: tuple[TrialResult, ...], roles: tuple[Role, ...]) -> tuple[
             continue
         found.append(TrialWindow(one.trial, one.motion, one.comparison.used, (end - long) / ends[-1], end / ends[-1]))
     return tuple(found)
-
-
-def _of_postures(one: TrialResult) -> bool:
-    """Return whether the frames of a trial are postures at rest, with no movement between them (`smooth`)."""
-    time = np.empty(0) if one.motion is None else one.motion.time
-    return time.size > 1 and bool(np.median(np.diff(time)) > LONGEST_STEP)
 
 
 def chosen_windows(results: tuple[TrialResult, ...]) -> tuple[TrialWindow, ...]:
@@ -90,7 +84,8 @@ def reasons_left_out(results: tuple[TrialResult, ...]) -> dict[str, str]:
     """Return by name why a trial is not looked at, though it should be."""
     seen = {window.trial.name: window.seconds for window in windows(results, ("static", *FITTED_ROLES))}
     wanted = [one for one in results if one.trial.role in FITTED_ROLES and not seen.get(one.name, 0.0)]
-    why = {one.name: _POSTURES if _of_postures(one) else " ".join(one.reasons) for one in wanted}
+    still = {one.name for one in wanted if one.motion is not None and of_postures(one.motion.time)}
+    why = {one.name: _POSTURES if one.name in still else " ".join(one.reasons) for one in wanted}
     return {one.name: TOO_SHORT if one.name in seen else why[one.name] for one in wanted}
 
 

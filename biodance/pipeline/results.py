@@ -13,8 +13,13 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.diagnosis.accept import Residuals
+from biodance.diagnosis.diagnosis import Diagnosis, Finding, Verdict
+from biodance.diagnosis.gain import Gain
 from biodance.effects import QualityCheck
 from biodance.effects._base.exchange_spans import Pair, Spans
+from biodance.identification.identification import Identification
+from biodance.inference.decision import Inferred
 from biodance.lab.corrections import PlateCorrection
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.identification import SessionIdentification
@@ -197,6 +202,78 @@ class MendedCopy:
     result: SessionResult
     exchanged: Mapping[str, Mapping[Pair, Spans]]
     checks: tuple[QualityCheck, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SessionDiagnosis:
+    """What the simulation of a visit gets wrong, and what accepting it changes.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Verdict and findings.
+    inferred : Inferred or None
+        The posterior; None where there was nothing to judge by.
+    before, accepted : Identification or None
+        What is identified without the findings and once they are accepted; None without findings.
+    left : tuple or None
+        What the body in use leaves of the kept trials, and what is left once the findings are accepted.
+    failures : mapping
+        What could not be computed ("what accepting changes"), with cause and cure.
+    mended : MendedCopy or None
+        The copy without large faults of forces, and with labels exchanged where that was asked for, in which all else
+        was found; None where nothing was undone.
+    gain : Gain or None
+        Of all findings together on the kept trials; each has its own.
+    looked_at : frozenset of str
+        Trials whose forces were compared with a body.
+
+    Examples
+    --------
+    >>> found.verdict
+    'nothing wrong'
+    """
+
+    diagnosis: Diagnosis
+    inferred: Inferred | None = None
+    before: Identification | None = None
+    accepted: Identification | None = None
+    left: tuple[Residuals, Residuals] | None = None
+    failures: Mapping[str, str] = field(default_factory=dict)
+    mended: MendedCopy | None = None
+    gain: Gain | None = None
+    looked_at: frozenset[str] = frozenset()
+
+    def __repr__(self) -> str:
+        return f"SessionDiagnosis({self.diagnosis.told})"
+
+    def _repr_html_(self) -> str:
+        return display.card(repr(self), self.table(), self.diagnosis.notes)
+
+    @property
+    def verdict(self) -> Verdict:
+        """One of "nothing wrong", "named, complete", "named, incomplete", "unexplained"."""
+        return self.diagnosis.verdict
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The causes named, in the order found."""
+        return self.diagnosis.findings
+
+    def table(self) -> "pd.DataFrame":
+        """Return one row for each parameter of each finding, see `Diagnosis.table`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Empty where nothing is wrong.
+
+        Examples
+        --------
+        >>> len(found.table())
+        0
+        """
+        return self.diagnosis.table()
 
 
 def _row(one: TrialResult) -> dict[str, Any]:

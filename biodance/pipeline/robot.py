@@ -2,7 +2,7 @@
 sentence.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,17 +11,17 @@ import numpy as np
 from biodance.body.body import Body
 from biodance.body.robot.urdf import read_urdf
 from biodance.diagnosis.robot import RobotFinding, robot_causes
-from biodance.errors import BiodanceError, TrialRefused
+from biodance.errors import TrialRefused
 from biodance.identification.added_mass import LoadSearch
 from biodance.identification.base_parameters import BaseEstimate
 from biodance.identification.identification import Identification
 from biodance.identification.robot import identify_links
-from biodance.identification.validation import TrialValidation, residual_ratio
+from biodance.identification.validation import TrialValidation
 from biodance.lab.prepare import LowPass, low_pass
 from biodance.lab.robot import RobotRecording, read_robot_recording
 from biodance.motion.dynamics import Agreement, compare, predict_wrench
 from biodance.motion.grounded import RATE, fit_plate, onto_plate
-from biodance.pipeline.identification import SessionIdentification
+from biodance.pipeline.identification import SessionIdentification, kept_gain
 from biodance.pipeline.robot_trials import MatchedTrial, bring_together
 from biodance.pipeline.robot_words import attention_of, cause_words, misweighed, of_file, refusals, weights
 from biodance.records import Wrench
@@ -51,8 +51,8 @@ class RobotResult:
     trials: tuple[MatchedTrial, ...]
     identified: SessionIdentification
     alone: BaseEstimate
-    causes: tuple[RobotFinding, ...]
     in_root: dict[str, tuple[Agreement, Agreement]]
+    causes: tuple[RobotFinding, ...]
     attention: tuple[Attention, ...]
     judged: tuple[Judged, ...]
     verdict: str = "clean"
@@ -113,40 +113,33 @@ def identify_robot(
         reasons = " ".join(refused.values()) or "No trial has the role fit."
         raise TrialRefused(reasons)
     tell("identifying")
-    plain = _identified(body, found.folder.name, fitted, kept)
+    name = found.folder.name
+    plain = _identified(body, name, fitted, kept)
     tell("looking for what is not as drawn")
-    causes, *without = _without_causes(body, fitted, kept)
-    best = _identified(body, found.folder.name, *without) if causes else plain
-    doubtful = bool(causes) and _residual_rms(best.identified) >= _residual_rms(plain.identified)
-    best = plain if doubtful else best
-    wrong = misweighed(best.identified)
-    words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best.identified.identification))
+    causes, mended = robot_causes(body, tuple(fitted), tuple(kept))
+    count = len(fitted)
+    best = _identified(body, name, mended[:count], mended[count:]) if causes else plain
+    doubtful = bool(causes) and _residual_rms(best[0]) >= _residual_rms(plain[0])
+    best, named = (plain, ()) if doubtful else (best, causes)
+    wrong = misweighed(best[0])
+    words = (*cause_words(causes, doubtful=doubtful), *wrong, *weights(best[0].identification))
     said = strongest_first([*of_file(body.notes), *refusals(refused), *attention_of(trials), *words])
-    judged = tuple(Judged(one.recorded.name, float(one.motion.fit.use.sum()) / RATE) for one in trials)
+    judged = tuple(Judged(one.recorded.name, float(one.fit.use.sum()) / RATE) for one in trials)
     lost = tuple(Judged(name, 0.0, why, missed=True) for name, why in refused.items())
-    named = () if doubtful else causes
-    return RobotResult(
-        *(found, Path(urdf), body, tuple(trials), best.identified, best.alone, named, best.in_root),
-        *(said, (*judged, *lost), "named" if named else "unexplained" if doubtful or wrong else "clean"),
-    )
+    verdict = "named" if named else "unexplained" if doubtful or wrong else "clean"
+    return RobotResult(found, Path(urdf), body, tuple(trials), *best, named, said, (*judged, *lost), verdict)
 
 
-@dataclass(frozen=True, eq=False)
-class _Identified:
-    """What some trials give: see `RobotResult`."""
-
-    identified: SessionIdentification
-    alone: BaseEstimate
-    in_root: dict[str, tuple[Agreement, Agreement]]
+_Found = tuple[SessionIdentification, BaseEstimate, dict[str, tuple[Agreement, Agreement]]]
+"""What some trials give: ``identified``, ``alone`` and ``in_root`` of `RobotResult`."""
 
 
-def _identified(body: Body, name: str, fitted: list[MatchedTrial], kept: list[MatchedTrial]) -> _Identified:
+def _identified(body: Body, name: str, fitted: Sequence[MatchedTrial], kept: Sequence[MatchedTrial]) -> _Found:
     """Identify from the ``fitted`` trials, validate on all."""
-    done, alone = identify_links(body, tuple(one.motion for one in fitted))
+    done, alone = identify_links(body, tuple(fitted))
     identified = _validated(name, done, fitted, kept)
     seen = (*identified.fitted, *identified.validations)
-    rooted = {v.name: _in_root(one, v) for one, v in zip((*fitted, *kept)[: len(seen)], seen, strict=True)}
-    return _Identified(identified, alone, rooted)
+    return identified, alone, {v.name: _in_root(one, v) for one, v in zip((*fitted, *kept), seen, strict=bool(seen))}
 
 
 def _residual_rms(one: SessionIdentification) -> float:
@@ -168,29 +161,20 @@ def _fitted_and_kept(trials: list[MatchedTrial]) -> tuple[list[MatchedTrial], li
         return fitted, kept
     first, last = [], []
     for one in fitted:
-        use = np.flatnonzero(one.motion.fit.use)
+        use = np.flatnonzero(one.fit.use)
         cut = use[int((1 - _KEPT) * use.size)] if use.size else 0
-        early = np.arange(one.motion.fit.use.size) < cut
-        first.append(_limited(one, one.motion.fit.use & early))
-        last.append(_limited(one, one.motion.fit.use & ~early))
+        early = np.arange(one.fit.use.size) < cut
+        first.append(_limited(one, one.fit.use & early))
+        last.append(_limited(one, one.fit.use & ~early))
     return first, last
 
 
-def _without_causes(
-    body: Body, fitted: list[MatchedTrial], kept: list[MatchedTrial]
-) -> tuple[tuple[RobotFinding, ...], list[MatchedTrial], list[MatchedTrial]]:
-    """Return what is not as drawn, and the trials without it."""
-    causes, motions = robot_causes(body, tuple(one.motion for one in fitted), tuple(one.motion for one in kept))
-    trials = [replace(one, motion=motion) for one, motion in zip((*fitted, *kept), motions, strict=True)]
-    return causes, trials[: len(fitted)], trials[len(fitted) :]
-
-
 def _limited(one: MatchedTrial, use: "np.ndarray") -> MatchedTrial:
-    return replace(one, motion=replace(one.motion, fit=replace(one.motion.fit, use=use)))
+    return replace(one, fit=replace(one.fit, use=use))
 
 
 def _validated(
-    name: str, done: Identification, fitted: list[MatchedTrial], kept: list[MatchedTrial]
+    name: str, done: Identification, fitted: Sequence[MatchedTrial], kept: Sequence[MatchedTrial]
 ) -> SessionIdentification:
     """Return the identification beside what drawing and identified robot predict of every trial."""
     search = LoadSearch((), float("nan"), "the drawing", doubts=(_NO_SEARCH,))
@@ -199,23 +183,20 @@ def _validated(
             name, done, (), (), {}, None, search, notes=done.notes, failures={"links": done.cause}
         )
     first, last = (tuple(_validation(done, one) for one in some) for some in (fitted, kept))
-    notes, gain = list(done.notes), None
-    try:
-        gain = residual_ratio(last) if last else None
-    except BiodanceError as why:
-        notes.append(str(why))
+    notes = list(done.notes)
+    gain = kept_gain(last, notes)
     agreements = {one.name: one.identified_agreement for one in (*first, *last)}
     return SessionIdentification(name, done, first, last, agreements, gain, search, notes=tuple(notes))
 
 
 def _validation(done: Identification, one: MatchedTrial) -> TrialValidation:
     """Return one trial in the plate's frame; drawing and identified robot stand each where it fits best."""
-    motion, use = one.motion.fit.motion, one.motion.fit.use
-    measured = onto_plate(one.motion.fit.wrench.value, one.plate)
+    motion, use = one.fit.motion, one.fit.use
+    measured = onto_plate(one.fit.wrench.value, one.plate)
     predicted = []
     for body in (done.body, done.identified):
         needed = predict_wrench(body, motion)
-        fit = fit_plate(needed, Wrench(motion.time, measured), one.motion.grounded.use, within=_NEAR)
+        fit = fit_plate(needed, Wrench(motion.time, measured), one.grounded.use, within=_NEAR)
         predicted.append(onto_plate(needed.value, fit))
     point = Wrench(motion.time, measured).cop()[use]
     about = np.nanmean(point, axis=0)
@@ -229,7 +210,7 @@ def _in_root(one: MatchedTrial, seen: TrialValidation) -> tuple[Agreement, Agree
     """Return how well drawing and identified robot agree with a trial's wrench in the axes and about the origin of the
     robot's root, as the paper compares: there gravity turns with the robot, and all channels move.
     """
-    q = one.motion.fit.motion.q
+    q = one.fit.motion.q
     on_plate = elementary_rotation("z", one.plate.yaw)
     turn = on_plate @ quaternion_matrix(q[:, 3:7])
     arm = seen.about - [*one.plate.place, 0.0] - q[:, :3] @ on_plate.T

@@ -2,9 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations
+from functools import partial
+from itertools import combinations, pairwise, product
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
 
 from biodance.body.body import Body
 from biodance.errors import BiodanceError, FileRefused, TrialRefused
@@ -17,6 +20,7 @@ from biodance.motion.grounded import (
     UNDER,
     BaseSeen,
     Grounded,
+    Lean,
     PlateFit,
     base_of_inclinations,
     base_of_markers,
@@ -25,7 +29,7 @@ from biodance.motion.grounded import (
     ground,
     on_motion_clock,
 )
-from biodance.records import Array, Wrench
+from biodance.records import Array, Wrench, runs
 from biodance.spatial import elementary_rotation
 
 _SAME = 0.9
@@ -35,23 +39,22 @@ _SCALES = (0.7, 1.4)
 _WEIGHTS = (0.5, 2.0)
 """Legal weight on the plate over that of the drawing."""
 ODD, _FAITHFUL = 1.6, 0.99
-"""Beyond this surprise, or below this correlation, exchanged columns are looked for."""
+"""Beyond this surprise, or below this correlation, exchanged columns are looked for, and another standing foot."""
 _BETTER = 0.25
 """They are named if, exchanged back, they leave so much of what the correlation lacks to one."""
-_COARSE = 20.0
-"""Hz at which exchanged columns are looked for."""
+_COARSE, _PARTED = 20.0, 0.5
+"""Hz at which exchanged columns and other standing feet are looked for; s by which stretches of these are parted."""
+_SLOW = LowPass(cutoff=0.2 * _COARSE)
 
 
 @dataclass(frozen=True, eq=False)
-class MatchedTrial:
-    """One trial with plate and encoders brought together: ``motion`` to identify from, ``plate`` when and where,
-    ``measured`` wrench, filtered, on the plate's clock, ``innovation`` of the drawing at it.
+class MatchedTrial(RobotMotion):
+    """One trial with plate and encoders brought together: as ``recorded``, ``plate`` when and where, ``innovation`` of
+    the drawing at it.
     """
 
     recorded: RobotTrial
-    motion: RobotMotion
     plate: PlateFit
-    measured: Wrench
     innovation: float
 
 
@@ -84,7 +87,10 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
             f"of this robot, in N, zeroed while empty?"
         )
     base = recording.base
-    grounded, fit = _grounded_motion(body, time, angle, measured, base=_base_from_imu(one, base, time))
+    seen = _base_from_imu(one, base, time)
+    grounded, fit = _grounded_motion(body, time, angle, measured, base=seen)
+    if grounded.unclear.any() and fit.correlation < _FAITHFUL:
+        grounded, fit = _stood_by_plate(body, time, angle, measured, seen)
     if base.markers:
         grounded = _base_from_markers(body, one, base, grounded, angle, fit)
     motion = robot_fit(one.name, grounded, angle, on_motion_clock(measured, time, fit))
@@ -104,7 +110,27 @@ def _matched(body: Body, one: RobotTrial, recording: RobotRecording) -> MatchedT
             f"{fit.scale:.2f}, legal {_SCALES[0]:g} to {_SCALES[1]:g}). Pair the files of one run; else look for a "
             f"wrong sign or zero of an encoder, or hands on the robot."
         )
-    return MatchedTrial(replace(one, encoders=encoders), motion, fit, measured, odd)
+    return MatchedTrial(motion.fit, motion.angle, motion.grounded, replace(one, encoders=encoders), fit, odd)
+
+
+_Placed = tuple[Grounded, PlateFit]
+"""A motion and its place on the plate."""
+
+
+def _placed(
+    body: Body,
+    time: Array,
+    angle: Array,
+    measured: Wrench,
+    *,
+    under: float = UNDER[0],
+    lean: Lean = None,
+    settings: LowPass | None = None,
+    base: BaseSeen | None = None,
+) -> _Placed:
+    """Return the motion with the standing feet of `ground`, and its place on the plate."""
+    found = ground(body, time, angle, settings=settings, lean=lean, base=base, under=under)
+    return found, fit_plate(predict_wrench(body, found.motion), measured, found.use)
 
 
 def _grounded_motion(
@@ -115,15 +141,54 @@ def _grounded_motion(
     *,
     settings: LowPass | None = None,
     base: BaseSeen | None = None,
-) -> tuple[Grounded, PlateFit]:
-    """Return the motion and its place on the plate; where the angles leave open which foot stands, the plate tells."""
-    tried = []
-    for under, lean in ((UNDER[0], None), (UNDER[1], None), (UNDER[0], 0), (UNDER[0], 1)):
-        found = ground(body, time, angle, settings=settings, lean=lean, base=base, under=under)
-        tried.append((found, fit_plate(predict_wrench(body, found.motion), measured, found.use)))
-        if not found.unclear:
+) -> _Placed:
+    """Return the motion and its place on the plate; where the angles leave open which foot stands, the one that stood
+    before, or the same one always: what agrees best with the plate.
+    """
+    placed = partial(_placed, body, time, angle, measured, settings=settings, base=base)
+    usual = placed()
+    if not usual[0].unclear.any():
+        return usual
+    others = (placed(under=UNDER[1]), *(placed(lean=np.full(time.size, side)) for side in (0, 1)))
+    return max((usual, *others), key=_agreement)
+
+
+def _stood_by_plate(body: Body, time: Array, angle: Array, measured: Wrench, base: BaseSeen | None) -> _Placed:
+    """Return the motion and its place on the plate where the plate says which foot stands in every stretch in which the
+    angles leave that open: in one stretch, or from one on, the foot with which both agree best, until they agree or
+    nothing is better. Stretches are told at `_COARSE` instants.
+    """
+    step, found = round(RATE / _COARSE), list[_Placed]()
+    few = None if base is None else base[::step]
+    coarse = partial(_placed, body, *_coarse(time, angle, measured), settings=_SLOW, base=few)
+    for under, side in product(UNDER, (-1, 0, 1)):
+        lean = _best_lean(partial(coarse, under=under), side)
+        fine = np.repeat(lean, step)[: time.size]
+        found.append(_placed(body, time, angle, measured, under=under, lean=fine, base=base))
+        if _agreement(found[-1]) >= _FAITHFUL:
             break
-    return max(tried, key=lambda pair: pair[1].correlation)
+    return max(found, key=_agreement)
+
+
+def _best_lean(placed: Callable[..., _Placed], side: int) -> NDArray[np.intp]:
+    """Return the feet with which what is ``placed`` agrees best, beginning with one ``side`` everywhere."""
+    unclear = placed(lean=None)[0].unclear
+    starts = [start for start, stop in runs(binary_closing(unclear, iterations=round(_PARTED * _COARSE)))]
+    lean, before = np.full(unclear.size, side), -1.0
+    agreed = _agreement(placed(lean=lean))
+    while _FAITHFUL > agreed > before:
+        before = agreed
+        for start, stop in pairwise([*starts, unclear.size]):
+            for foot, end in product((0, 1), {stop, unclear.size}):
+                other = lean.copy()
+                other[start:end] = foot
+                if (size := _agreement(placed(lean=other))) > agreed:
+                    lean, agreed = other, size
+    return lean
+
+
+def _agreement(one: _Placed) -> float:
+    return one[1].correlation
 
 
 def _base_from_imu(one: RobotTrial, base: BaseSensors, time: Array) -> BaseSeen | None:
@@ -164,9 +229,7 @@ def _exchanged(
     body: Body, time: Array, angle: Array, measured: Wrench, limits: tuple[Array, Array]
 ) -> tuple[str, str] | None:
     """Return the two joints whose exchange lets the plate follow from the encoders; None if no exchange does."""
-    step, slow = round(RATE / _COARSE), LowPass(cutoff=0.2 * _COARSE)
-    measured = Wrench(measured.time, low_pass(measured.value, measured.rate, slow))
-    coarse, few = time[::step], angle[::step]
+    coarse, few, measured = _coarse(time, angle, measured)
     low, high = limits[0] - 0.35, limits[1] + 0.35
     inside = (few.min(axis=0)[:, None] >= low) & (few.max(axis=0)[:, None] <= high)
     moving = few.std(axis=0) > 0.01
@@ -180,6 +243,12 @@ def _exchanged(
         if size < best:
             best, pair = size, (body.joints[i].name, body.joints[j].name)
     return pair
+
+
+def _coarse(time: Array, angle: Array, measured: Wrench) -> tuple[Array, Array, Wrench]:
+    """Return times and angles at `_COARSE` Hz, and the measured wrench without what is too fast for it."""
+    step = round(RATE / _COARSE)
+    return time[::step], angle[::step], Wrench(measured.time, low_pass(measured.value, measured.rate, _SLOW))
 
 
 def _explains(body: Body, time: Array, angle: Array, measured: Wrench, pair: tuple[str, str]) -> bool:
@@ -199,7 +268,7 @@ def _explains(body: Body, time: Array, angle: Array, measured: Wrench, pair: tup
 def _correlation_deficit(body: Body, time: Array, angle: Array, measured: Wrench) -> float:
     """Return what the correlation at a coarse motion lacks to one; infinite where nothing fits."""
     try:
-        found, fit = _grounded_motion(body, time, angle, measured, settings=LowPass(cutoff=0.2 * _COARSE))
+        found, fit = _grounded_motion(body, time, angle, measured, settings=_SLOW)
         legal = _SCALES[0] < fit.scale < _SCALES[1] and found.use.any()
         return 1 - fit.correlation if legal else np.inf
     except BiodanceError:

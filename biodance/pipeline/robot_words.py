@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from biodance.diagnosis.robot import RobotFinding
-from biodance.diagnosis.robot_columns import RobotCause
+from biodance.diagnosis.robot import RobotCause, RobotFinding
 from biodance.display import cause_in_words
 from biodance.effects.plate_crosstalk import PlateCrosstalk
 from biodance.effects.plate_gain import PlateGain

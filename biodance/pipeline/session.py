@@ -6,16 +6,24 @@ from functools import partial
 
 from biodance.body.body import Body
 from biodance.body.tables.choice import reference as reference_person
-from biodance.errors import SessionRefused
+from biodance.errors import SessionRefused, TrialRefused
 from biodance.identification.limbs import with_declared_limbs
+from biodance.identification.paper_programme import identify_as_paper
 from biodance.lab.corrections import PlateCorrection, corrected_trial
 from biodance.motion.quiet_standing import QuietStanding
 from biodance.pipeline.body import body_of, refuse_another_reference, shown_joints, starting_from, with_forces
 from biodance.pipeline.checks import mass_check, standing_check, trial_checks, weigh, with_weighed_mass
-from biodance.pipeline.identification import SessionIdentification, can_identify, identify_trials
+from biodance.pipeline.identification import (
+    FITTED_ROLES,
+    SessionIdentification,
+    can_identify,
+    fits_of_roles,
+    identify_trials,
+    predicted,
+)
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.still import load_still, still_of, worst_still
-from biodance.pipeline.trial import Prepared, attempt, examine_trial, prepare_trial
+from biodance.pipeline.trial import attempt, examine_trial, prepare_trial
 from biodance.pipeline.trial_result import ShownJoints, Step, Still, TrialResult
 from biodance.records import Session
 from biodance.threads import one_thread
@@ -30,7 +38,7 @@ def _stop(what: str) -> Step:
     return Step("stop", "refused", f"Not done: the run was stopped by Ctrl-C before {what}.")
 
 
-def _prepared(session: Session, tell: Callable[[str], None]) -> tuple[Prepared, ...]:
+def _prepared(session: Session, tell: Callable[[str], None]) -> tuple[TrialResult, ...]:
     """Return the trials prepared, static ones first."""
     read = []
     for k, trial in enumerate(sorted(session.trials, key=lambda trial: trial.role != "static"), 1):
@@ -40,7 +48,7 @@ def _prepared(session: Session, tell: Callable[[str], None]) -> tuple[Prepared, 
 
 
 def _examined(
-    read: tuple[Prepared, ...], body: Body | None, mass: float, tell: Callable[[str], None]
+    read: tuple[TrialResult, ...], body: Body | None, mass: float, tell: Callable[[str], None]
 ) -> tuple[TrialResult, ...]:
     """Return the trials tracked and compared, with their checks; those that Ctrl-C left undone say so."""
     results: list[TrialResult] = []
@@ -49,7 +57,7 @@ def _examined(
             tell(f"tracking {one.trial.name}, {k} of {len(read)}")
             results.append(examine_trial(one, body, mass=mass))
     except KeyboardInterrupt:
-        results += [TrialResult(one.trial, (*one.steps, _stop("this trial")), one.gaps) for one in read[len(results) :]]
+        results += [replace(one, steps=(*one.steps, _stop("this trial"))) for one in read[len(results) :]]
     return tuple(replace(result, checks=tuple(trial_checks(result, mass))) for result in results)
 
 
@@ -202,3 +210,26 @@ def identification_of(result: SessionResult) -> SessionIdentification:
     outside = [f"{c.what}, {c.where}: {c.value} ({c.limit})." for c in result.checks if fits and not c.inside]
     also = f"Outside the limit: {' '.join(outside)}" if outside else ""
     raise SessionRefused(" ".join(filter(None, (f"{folder}: nothing can be identified, {why}", also, reasons))))
+
+
+def by_paper(result: SessionResult) -> SessionResult:
+    """Return an identified session with the parameters of the paper's programme (eq. 8) from the same trials, validated
+    on the same kept ones; its posterior stays beside it (``identification.posterior``), with loads and changes, which
+    the programme does not know. As it is where nothing was identified.
+    """
+    beside = result.identification
+    if beside is None:
+        return result
+    fits = fits_of_roles(result.trials, FITTED_ROLES, *result.corrections)
+    try:
+        found = identify_as_paper(beside.identification, fits)
+    except TrialRefused:
+        return result
+    one = replace(
+        beside, identification=found, posterior=beside, notes=found.notes, fitted=(), validations=(), gain=None
+    )
+    if found.status == "failed":
+        one = replace(one, failures={**beside.failures, "segments": found.cause}, agreements={}, shown=None)
+    else:
+        one = replace(predicted(one, result.trials, result.weighed), shown=None)
+    return replace(result, identification=one)

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -57,23 +57,6 @@ def attempt(steps: list[Step], name: str, work: Callable[[], T]) -> T | None:
     return value
 
 
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A trial after preparing (as read where that was refused), the steps so far, the gaps as recorded, and the trial
-    as ``recorded``.
-    """
-
-    trial: Trial
-    steps: tuple[Step, ...]
-    gaps: tuple[MarkerGaps, ...]
-    recorded: Trial
-
-    @property
-    def usable(self) -> bool:
-        """Whether preparing was done."""
-        return all(step.status == "done" for step in self.steps)
-
-
 def gaps_of(trial: Trial) -> tuple[MarkerGaps, ...]:
     """Return the gaps of the trial's own marker set, as recorded; of all markers where no set is known."""
     if trial.markers is None:
@@ -82,19 +65,19 @@ def gaps_of(trial: Trial) -> tuple[MarkerGaps, ...]:
     return report_gaps(markers)
 
 
-def prepare_trial(trial: Trial) -> Prepared:
-    """Prepare one trial; a refusal is a step, and the trial stays as it was read."""
+def prepare_trial(trial: Trial) -> TrialResult:
+    """Return one trial prepared; a refusal is a step, and the trial stays as it was read."""
     steps: list[Step] = []
     done = attempt(steps, "prepare", lambda: prepare(trial))
-    return Prepared(done or trial, tuple(steps), gaps_of(trial), trial)
+    return TrialResult(done or trial, tuple(steps), gaps_of(trial), recorded=trial)
 
 
-def filtered_as_it_asks(read: Prepared, body: Body | None) -> Trial:
+def filtered_as_it_asks(read: TrialResult, body: Body | None) -> Trial:
     """Return a prepared trial whose forces and joint coordinates have the cut-off that its own markers ask for under
     ``body``; as it is where they ask for none, see `with_own_cutoff`.
     """
     trial = read.trial
-    if body is None or trial.markers is None or not trial.marker_set:
+    if body is None or trial.markers is None or not trial.marker_set or read.recorded is None:
         return trial
     asked = with_own_cutoff(read.recorded, body, trial.markers)
     return trial if asked is read.recorded else prepare(asked)
@@ -185,15 +168,14 @@ def track_trial(trial: Trial, body: Body | None) -> Motion:
     return track(body, trial)
 
 
-def examine_trial(read: Prepared, body: Body | None, *, mass: float) -> TrialResult:
-    """Take a prepared trial through the remaining steps; ``mass`` kg of the body, NaN = unknown.
+def examine_trial(read: TrialResult, body: Body | None, *, mass: float) -> TrialResult:
+    """Take a prepared trial (`prepare_trial`) through the remaining steps; ``mass`` kg of the body, NaN = unknown.
 
     What has no markers or no body is not tracked, what has no plates is not compared: each is a step with its reason.
     """
-    trial, steps = read.trial, list(read.steps)
     if not read.usable:
-        return TrialResult(trial, read.steps, read.gaps)
-    trial = filtered_as_it_asks(read, body)
+        return read
+    trial, steps = filtered_as_it_asks(read, body), list(read.steps)
     motion = attempt(steps, "track", lambda: track_trial(trial, body))
     groups = dict(zip(body.markers.names, marker_groups(body), strict=True)) if body else {}
     fit = marker_fit(motion, groups) if motion else None

@@ -164,8 +164,9 @@ class ShownJoints:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """One trial after all steps: ``trial`` prepared (as read where preparing was refused); ``gaps`` as recorded, before
-    any was filled; ``contact`` of the feet with the ground by the tracked body.
+    """One trial after the ``steps`` so far: ``trial`` prepared (as read where preparing was refused); ``gaps`` as
+    recorded, before any was filled; ``contact`` of the feet with the ground by the tracked body; ``recorded`` as read,
+    until it is tracked.
 
     None where the data could not carry a result.
     """
@@ -180,6 +181,7 @@ class TrialResult:
     checks: tuple[Check, ...] = ()
     contact: Contact | None = None
     left_out: Mapping[LeftOut, float] = field(default_factory=dict)
+    recorded: Trial | None = None
 
     def __repr__(self) -> str:
         close = f", markers {1000 * self.fit.total_rms:.1f} mm from the body" if self.fit else ""
@@ -192,6 +194,11 @@ class TrialResult:
     def name(self) -> str:
         """Name of the trial."""
         return self.trial.name
+
+    @property
+    def usable(self) -> bool:
+        """Whether all steps so far were done."""
+        return all(step.status == "done" for step in self.steps)
 
     @property
     def compared_s(self) -> float:

@@ -17,9 +17,7 @@ from biodance.pipeline.load import as_diagnosed
 from biodance.pipeline.movement import SessionMovement, session_movement
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine, identification_of
-from biodance.pipeline.visit_cycles import cycle_quantities
-from biodance.pipeline.visit_masses import mass_quantities
-from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
+from biodance.pipeline.visit_quantities import ComparedQuantity, Untested, cycle_quantities, mass_quantities
 from biodance.records import Session
 from biodance.records.attention import Attention
 from biodance.uncertainty.visits import FEWEST_STRIDES, beyond_chance

@@ -37,7 +37,7 @@ _MATCHED = Schema(
     "trial=recorded.name role=recorded.role encoders=recorded.files.0.name plate=recorded.files.1.name "
     "encoders_hz=recorded.encoders.rate plate_hz=recorded.wrench.rate delay_s=plate.delay place_m=plate.place "
     "yaw_rad=plate.yaw correlation=plate.correlation scale=plate.scale surprise=innovation history=recorded.history",
-    {"standing": Schema("foot=0 start_s=1 end_s=2").at("motion.grounded.supports")},
+    {"standing": Schema("foot=0 start_s=1 end_s=2").at("grounded.supports")},
     "trial: {trial} | role: {role} | delay (s): {delay_s:+.3f} | x, y (mm): {place_m:mm0} | "
     "turn (deg): {yaw_rad:deg1} | correlation: {correlation:.3f} | foot, until (s): {feet}",
 )

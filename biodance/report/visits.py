@@ -14,7 +14,7 @@ from biodance.cycles.curves import ANGLE_PANELS, LOAD_PANELS, CurveGroup
 from biodance.cycles.cut import PERCENT
 from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.provenance import now, provenance
-from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
+from biodance.pipeline.visit_quantities import ComparedQuantity, Untested
 from biodance.pipeline.visits import VisitComparison
 from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.files import for_spreadsheets, write_files

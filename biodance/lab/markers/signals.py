@@ -3,13 +3,13 @@ three frames. Such frames count as not seen; gaps are reported and filled.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.records import Array, Markers, Mask, longest_run, runs
+from biodance.records import Array, Markers, Mask, Trial, any_coordinate, longest_run, runs
 from biodance.spatial import rigid_fit
 
 _REPEATS = 5
@@ -98,6 +98,47 @@ def without_faults(markers: Markers, faults: tuple[FaultyMarker, ...]) -> Marker
             xyz[start:stop, markers.names.index(one.label)] = np.nan
     xyz.setflags(write=False)  # the record keeps it without a copy
     return Markers(markers.names, markers.time, xyz)
+
+
+_FEWEST = 4  # Markers that must be seen; fewer may rest on something, or be rounded to the same digits
+
+
+def frozen_frames(xyz: Array) -> Mask:
+    """Return (T,) True where all markers ``xyz`` (T, N, 3) m, NaN = unseen, repeat the frame before for at least five
+    frames, into or out of which they move abruptly; nowhere in a recording that never moves, as a posture kept as many
+    equal frames is.
+
+    The recording hung, or a gap of all markers was filled by holding them. Nobody stands so still, noise alone moves
+    markers more, and what hangs begins or ends abruptly: a computed movement that rests comes to it by and by. Shorter
+    runs come from a slower camera whose frames were repeated.
+    """
+    seen = ~any_coordinate(~np.isfinite(xyz))
+    equal = ~any_coordinate(xyz[1:] != xyz[:-1]) | ~(seen[1:] | seen[:-1])
+    repeats = np.zeros(len(xyz), dtype=bool)
+    repeats[1:] = equal.all(axis=1) & (seen[1:].sum(axis=1) >= _FEWEST)
+    if not repeats.any() or repeats.sum() >= len(repeats) - 1:
+        return np.zeros(len(xyz), dtype=bool)
+    steps = np.zeros(len(xyz))
+    steps[1:] = np.nan_to_num(np.linalg.norm(xyz[1:] - xyz[:-1], axis=2)).max(axis=1)
+    for start, stop in runs(repeats):
+        repeats[start:stop] = stop - start >= _REPEATS and _breaks_off(steps, start, stop)
+    return repeats
+
+
+def without_frozen(trial: Trial) -> Trial:
+    """Return the trial with its markers unseen where they are frozen, and a warning that says so."""
+    markers = trial.markers
+    frozen = np.zeros(0, dtype=bool) if markers is None else frozen_frames(markers.xyz)
+    if markers is None or not frozen.any():
+        return trial
+    xyz = np.where(frozen[:, None, None], np.nan, markers.xyz)
+    spans = [f"{markers.time[start]:.2f} to {markers.time[stop - 1]:.2f} s" for start, stop in runs(frozen)]
+    said = ", ".join(spans[:3]) + (f" and {len(spans) - 3} times more" if len(spans) > 3 else "")
+    warning = (
+        f"All markers stand still to the last digit at {said}: the recording hung, or a gap was filled by holding "
+        f"them. These {int(frozen.sum())} frames count as not seen."
+    )
+    return replace(trial, markers=replace(markers, xyz=xyz), warnings=(*trial.warnings, warning))
 
 
 def _faulty(label: str, fault: MarkerFault, frames: Mask, size: float) -> FaultyMarker:

@@ -24,6 +24,11 @@ body, cannot be told (Nyquist).
 """
 
 
+def of_postures(time: Array) -> bool:
+    """Return whether frames at ``time`` (T,) s lie too far apart to tell a movement between them: postures at rest."""
+    return time.size > 1 and bool(np.median(np.diff(time)) > LONGEST_STEP)
+
+
 @dataclass(frozen=True, eq=False)
 class TimeAxis:
     """``stamps`` (S,) s as recorded; ``time`` (T,) s with equal steps on which the recording is given; ``sampled``

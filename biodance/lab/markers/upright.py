@@ -93,17 +93,21 @@ def steady_mass(
     vertical = wrench.force[:, 2]
     size = max(1, round(_BLOCK * wrench.rate)) if np.isfinite(wrench.rate) else 1
     count = vertical.size // size
-    quiet = _longest_steady(vertical[: count * size].reshape(count, size).mean(axis=1), rules or StandingRules())
-    return float(quiet.mean() / gravity) if quiet is not None else None
+    blocks = vertical[: count * size].reshape(count, size).mean(axis=1)
+    quiet = quiet_run(blocks, np.isfinite(blocks), 1 / _BLOCK, rules)
+    return float(blocks[quiet].mean() / gravity) if quiet is not None else None
 
 
-def _longest_steady(blocks: Array, rules: StandingRules) -> Array | None:
-    """Return the longest run of blocks within the sway of their median; None if too short, or of nobody."""
-    middle = float(np.nanmedian(blocks)) if np.isfinite(blocks).any() else 0.0
-    if not middle >= rules.force:
+def quiet_run(vertical: Array, used: Mask, rate: float, rules: StandingRules | None = None) -> slice | None:
+    """Return the longest run of ``used`` samples (T,) with a steady ``vertical`` force (T,) N, within the sway of its
+    median; None if it is too short, or nobody stands there.
+    """
+    rules = rules or StandingRules()
+    middle = float(np.median(vertical[used])) if used.any() else 0.0
+    if middle < rules.force:
         return None
-    run = blocks[slice(*longest_run(np.abs(blocks - middle) <= rules.sway * middle))]
-    return run if run.size and run.size * _BLOCK >= rules.shortest - 1e-9 else None
+    first, stop = longest_run((np.abs(vertical - middle) <= rules.sway * middle) & used)
+    return slice(first, stop) if stop - first >= rules.shortest * rate - 1e-9 else None
 
 
 def _quietest(markers: Markers) -> Mask:

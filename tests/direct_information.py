@@ -1,0 +1,20 @@
+"""What one trial says of a body by the direct route: whitened rows, folded block by block. Statistics must equal it."""
+
+import numpy as np
+
+from biodance.body.body import Body
+from biodance.identification.information import Information, fold
+from biodance.motion.dynamics import regressor
+from biodance.records import Motion, Wrench
+from biodance.uncertainty.noise import Noise
+
+
+def information(body: Body, motion: Motion, wrench: Wrench, noise: Noise) -> Information:
+    """Return what all frames of a trial say about the 10N parameters of ``body``."""
+    used, R, count = np.ones(motion.time.size, dtype=bool), None, 0
+    for pick in noise.bands.runs(used, motion.rate):
+        both = np.concatenate([regressor(body, motion.at(pick)), wrench.value[pick][:, :, None]], axis=2)
+        rows = noise.at(motion.rate).whiten(both)
+        R, count = fold(rows.reshape(-1, rows.shape[2]), R), count + len(rows)
+    assert R is not None
+    return Information(R, count)
