@@ -9,6 +9,7 @@ from squatting import BODY as SQUATTER
 from squatting import squat
 
 from biodance.body.human.human import human
+from biodance.cycles.beside import compare_angles, compare_events
 from biodance.cycles.curves import (
     CycleCurve,
     angle_curves,
@@ -23,15 +24,12 @@ from biodance.cycles.cut import (
     Cycle,
     FootEvent,
     agreement_of_events,
-    compare_angles,
-    compare_events,
     gait_cycles,
     joined_events,
     kinematic_events,
-    mean_values,
     repetitions,
-    strides,
 )
+from biodance.cycles.strides import mean_values, strides
 from biodance.lab.c3d.subject import FileEvent, FileOutputs
 from biodance.motion.dynamics import joint_torques
 from biodance.motion.kinematics import poses

@@ -1,14 +1,17 @@
 """What moved in a visit: every trial's events, cycles and curves, with the parameters that the visit identified."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.cycles.curves import NormalCurve
-from biodance.cycles.cut import STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.scores import DeviationReference, GaitScores, scores_of
+from biodance.cycles.strides import STRIDE_UNITS
+from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.pipeline.lab_file import read_lab
@@ -41,6 +44,8 @@ class SessionMovement:
         Trial -> why nothing is told of its movement.
     normal : tuple of NormalCurve
         Bands of the laboratory's own people to be shown behind (`learn_laboratory`).
+    deviation : DeviationReference or None
+        What the gait deviation index is told against.
 
     Examples
     --------
@@ -54,6 +59,7 @@ class SessionMovement:
     mass: float
     left_out: dict[str, str]
     normal: tuple[NormalCurve, ...] = ()
+    deviation: DeviationReference | None = None
 
     def __repr__(self) -> str:
         said = ", ".join(f"{one.trial} {one.told}" for one in self.trials if one.cycles)
@@ -68,6 +74,22 @@ class SessionMovement:
 
     def __iter__(self) -> Iterator[TrialMovement]:
         return iter(self.trials)
+
+    @cached_property
+    def repetitions(self) -> Mapping[str, Repetitions]:
+        """All good repetitions over all trials, by kind ("gait", "squat", "sit_to_stand"), the kinds that there are."""
+        kinds = dict.fromkeys(cycle.kind for one in self.trials for cycle in one.cycles)
+        return {kind: repetitions_of(kind, self.trials) for kind in kinds}
+
+    @property
+    def gait(self) -> Repetitions | None:
+        """All good gait cycles; None where nobody walks."""
+        return self.repetitions.get("gait")
+
+    @cached_property
+    def scores(self) -> tuple[GaitScores | None, GaitScores | None]:
+        """Gait scores of our angles and of those in the files; None without a reference."""
+        return scores_of(self.gait, self.normal, self.deviation) if self.gait else (None, None)
 
     def table(self) -> "pd.DataFrame":
         """Return mean and sd of every curve of every trial.
@@ -162,7 +184,8 @@ def describe_movement(
     if not isinstance(session, SessionResult):
         read = session if isinstance(session, Session) else read_session(session, tell=tell)
         session = examine(read, tell=tell)
-    return replace(session_movement(session, tell=tell), normal=read_lab(lab).normal)
+    known = read_lab(lab)
+    return replace(session_movement(session, tell=tell), normal=known.normal, deviation=known.deviation)
 
 
 @one_thread()

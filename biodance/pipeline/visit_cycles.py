@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from biodance.cycles.curves import KeyValue, key_values, leading_foot, stride_values
+from biodance.cycles.keys import KeyValue, key_values, leading_foot, stride_values
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.visit_quantity import ComparedQuantity, Untested
 from biodance.uncertainty.visits import (

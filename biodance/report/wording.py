@@ -126,3 +126,8 @@ def trial_and_subject(one: Attention) -> str:
         return one.trial if about else f"Trial {one.trial}"
     place = f", {one.trial}" if one.trial else ""
     return f"{about[:1].upper()}{about[1:]}{place}" or "Session"
+
+
+def first_upper(text: str) -> str:
+    """Return ``text`` with a capital first letter and nothing else changed."""
+    return text[:1].upper() + text[1:]

@@ -30,6 +30,7 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
+from biodance.report.tables.gait import gait_document
 from biodance.report.tables.identification import corrected_document, identification_document
 from biodance.report.tables.schema import plain_values, to_text
 from biodance.report.tables.session import PROVENANCE_ROW, filter_document, movement_document, results_document
@@ -57,6 +58,7 @@ def write_report(
         "attention": ATTENTION_ROW.rows(first),
         "judged": JUDGED_ROW.rows(judged),
         "movement": movement_document(movement),
+        "gait": gait_document(movement),
     }
     found: dict[str, Any] = plain_values(numbers)
     files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
@@ -104,6 +106,7 @@ def write_identification(
         "corrected": corrected_document(found),
         "filter": filter_document(result),
         "movement": movement_document(movement),
+        "gait": gait_document(movement),
         "provenance": PROVENANCE_ROW.row(made),
     }
     told: dict[str, Any] = plain_values(numbers)
@@ -134,6 +137,7 @@ def write_diagnosis(
         **diagnosis_document(found),
         "filter": filter_document(result),
         "movement": movement_document(movement),
+        "gait": gait_document(movement),
         "failures": failures,
         "provenance": PROVENANCE_ROW.row(made),
     }
