@@ -1,6 +1,6 @@
 """Angles and events beside those that another program wrote into the same file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,9 @@ _PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
 """Our angle -> the label (with L or R before it) and component of plug-in gait's, where both have the same positive
 sense. Its knee has two more angles, which ours has not; the turn of its foot is that of a line, not of a body.
 """
+_AGAINST_LAB = ("PelvisAngles", "FootProgressAngles")
+"""What plug-in gait tells against the laboratory's axes."""
+_OBLIQUE = 6.0  # deg
 _NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
 _FEWEST = 20  # Frames without which nothing is compared
 
@@ -90,9 +93,20 @@ def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple
     return tuple(comparisons)
 
 
-def file_curves(cycle: Cycle, outputs: FileOutputs, time: Array) -> Iterator[CycleCurve]:
-    """Yield plug-in gait's own angles over a gait cycle, under our names, at the frames' ``time`` (T,) s."""
+def file_curves(cycle: Cycle, outputs: FileOutputs, time: Array, ours: Sequence[CycleCurve]) -> Iterator[CycleCurve]:
+    """Yield plug-in gait's own angles over a gait cycle, under our names, at the frames' ``time`` (T,) s.
+
+    Its pelvis and the turn of its foot are told against one axis of the laboratory, ours against the way that the
+    person goes. Where the pelvis of ``ours``, the curves of the same cycle, is turned otherwise by more than
+    `_OBLIQUE` on average, they are no curves of the same thing and are left out.
+    """
+    if cycle.kind != "gait":
+        return
+    found = []
     for quantity, (label, axis) in _PLUG_IN_GAIT.items():
         theirs = outputs.angles.get(f"{cycle.side[:1].upper()}{label}")
-        if cycle.kind == "gait" and theirs is not None and len(theirs) == time.size:
-            yield over_cycle(cycle, quantity, cycle.side, "deg", time, theirs[:, axis])
+        if theirs is not None and len(theirs) == time.size:
+            found.append(over_cycle(cycle, quantity, cycle.side, "deg", time, (theirs[:, axis] + 180) % 360 - 180))
+    turned = [[one.value for one in some if one.quantity == "pelvis_rotation"] for some in (ours, found)]
+    oblique = not all(turned) or not abs(np.nanmean(turned[1][0] - turned[0][0])) < _OBLIQUE
+    yield from (one for one in found if not (oblique and _PLUG_IN_GAIT[one.quantity][0] in _AGAINST_LAB))

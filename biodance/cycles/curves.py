@@ -199,11 +199,11 @@ def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCur
     return tuple(bands)
 
 
-def normal_toml(bands: Sequence[NormalCurve]) -> list[str]:
-    """Return the lines of ``[normal]`` in lab.toml: every fifth per cent; NaN where less than two are known."""
+def normal_toml(bands: Sequence[NormalCurve], table: str = "normal") -> list[str]:
+    """Return the lines of a ``table`` in lab.toml: every fifth per cent; NaN where less than two are known."""
     lines = []
     for one in bands:
-        lines += [f'[normal."{one.kind} {one.quantity}"]', f'unit = "{one.unit}"', f"people = {one.people}"]
+        lines += [f'[{table}."{one.kind} {one.quantity}"]', f'unit = "{one.unit}"', f"people = {one.people}"]
         for name, values in (("mean", one.mean), ("sd", one.sd)):
             row = [f"{v:.4g}" for v in values[::_EVERY]]
             half = len(row) // 2

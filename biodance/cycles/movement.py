@@ -210,9 +210,11 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
     cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
-    curves: list[CycleCurve] = []
+    curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
-        curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
+        own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
+        curves += own
+        theirs += file_curves(cycle, outputs, motion.time, own) if outputs else ()
         if contact is not None and feet is not None:
             known = contact.told & ~_shared(contact)[:, None] if cycle.kind == "gait" else contact.told
             curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
@@ -226,7 +228,7 @@ def trial_movement(
         agreement_of_events(force, markers),
         compare_angles(body, motion, outputs) if outputs else (),
         compare_events(events, outputs) if outputs else (),
-        tuple(one for cycle in cycles if outputs for one in file_curves(cycle, outputs, motion.time)),
+        tuple(theirs),
         tuple(
             one for one in cycles if one.kind == "gait" and contact and (_shared(contact) & _inside(one, contact)).any()
         ),

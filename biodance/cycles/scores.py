@@ -8,7 +8,7 @@ import numpy as np
 
 from biodance.cycles.curves import CycleCurve, NormalCurve
 from biodance.cycles.cut import Cycle
-from biodance.cycles.summary import Repetitions, Spread, spread
+from biodance.cycles.summary import Spread, spread
 from biodance.errors import BiodanceError
 from biodance.records import SIDES, Array, freeze
 
@@ -174,11 +174,3 @@ def _overall(seen: Mapping[str, Array]) -> float:
         return float("nan")
     right, left = (seen[side].mean(axis=0) for side in SIDES)
     return float(np.sqrt(np.mean(np.concatenate([left, right[_PELVIS:]]) ** 2)))
-
-
-def scores_of(
-    walked: Repetitions, normal: Sequence[NormalCurve], deviation: DeviationReference | None = None
-) -> tuple[GaitScores | None, GaitScores | None]:
-    """Return the scores of our own angles and of those that another program wrote, of the same cycles."""
-    ours = gait_scores(walked.curves, normal, deviation)
-    return ours, gait_scores(walked.file_curves, normal, deviation)

@@ -25,17 +25,21 @@ from biodance.uncertainty.tolerances import Tolerances, shipped, tolerances_of
 
 LAB = "lab.toml"
 """Name under which it is written."""
+PLUG_IN_GAIT = "normal_plug_in_gait"
+"""Its table of the bands of plug-in gait's own angles."""
 
 
 @dataclass(frozen=True, eq=False)
 class LabFile:
     """What a lab.toml says: ``corrections`` of the plates, ``tolerances`` of the laboratory's own or None, and the
-    ``normal`` bands of its people, and what the gait deviation index is told against, or None.
+    ``normal`` bands of its people, those of plug-in gait's angles ``beside``, and what the gait deviation index is told
+    against, or None.
     """
 
     corrections: tuple[PlateCorrection, ...] = ()
     tolerances: Tolerances | None = None
     normal: tuple[NormalCurve, ...] = ()
+    beside: tuple[NormalCurve, ...] = ()
     deviation: DeviationReference | None = None
 
     def corrected(self, session: Session) -> Session:
@@ -65,8 +69,9 @@ def read_lab(path: str | Path | None) -> LabFile:
         norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}
         where = "tolerances"
         known, where = replace(tolerances_of(raw), norms=norms) if raw else None, "normal"
-        normal, where = normal_of(whole.get("normal", {})), "gait_deviation_index"
-        return LabFile(corrections, known, normal, deviation_of(whole.get("gait_deviation_index")))
+        normal, where = normal_of(whole.get("normal", {})), PLUG_IN_GAIT
+        beside, where = normal_of(whole.get(PLUG_IN_GAIT, {})), "gait_deviation_index"
+        return LabFile(corrections, known, normal, beside, deviation_of(whole.get("gait_deviation_index")))
     except (KeyError, TypeError, ValueError, BiodanceError) as error:
         raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error
 
@@ -151,6 +156,7 @@ class LabContents(_Table):
     tolerances: _Tolerances | None = None
     norms: dict[str, _Norm] = {}
     normal: dict[str, _Band] = {}
+    normal_plug_in_gait: dict[str, _Band] = {}
     gait_deviation_index: _Deviation | None = None
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from biodance import display
 from biodance.cycles.curves import NormalCurve
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.scores import DeviationReference, GaitScores, scores_of
+from biodance.cycles.scores import DeviationReference, GaitScores, gait_scores
 from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
@@ -44,6 +44,8 @@ class SessionMovement:
         Trial -> why nothing is told of its movement.
     normal : tuple of NormalCurve
         Bands of the laboratory's own people to be shown behind (`learn_laboratory`).
+    normal_beside : tuple of NormalCurve
+        The same of plug-in gait's own angles: its scores are told against these.
     deviation : DeviationReference or None
         What the gait deviation index is told against.
 
@@ -59,6 +61,7 @@ class SessionMovement:
     mass: float
     left_out: dict[str, str]
     normal: tuple[NormalCurve, ...] = ()
+    normal_beside: tuple[NormalCurve, ...] = ()
     deviation: DeviationReference | None = None
 
     def __repr__(self) -> str:
@@ -89,7 +92,10 @@ class SessionMovement:
     @cached_property
     def scores(self) -> tuple[GaitScores | None, GaitScores | None]:
         """Gait scores of our angles and of those in the files; None without a reference."""
-        return scores_of(self.gait, self.normal, self.deviation) if self.gait else (None, None)
+        if self.gait is None:
+            return None, None
+        ours = gait_scores(self.gait.curves, self.normal, self.deviation)
+        return ours, gait_scores(self.gait.file_curves, self.normal_beside)
 
     def table(self) -> "pd.DataFrame":
         """Return mean and sd of every curve of every trial.
@@ -185,7 +191,8 @@ def describe_movement(
         read = session if isinstance(session, Session) else read_session(session, tell=tell)
         session = examine(read, tell=tell)
     known = read_lab(lab)
-    return replace(session_movement(session, tell=tell), normal=known.normal, deviation=known.deviation)
+    moved = session_movement(session, tell=tell)
+    return replace(moved, normal=known.normal, normal_beside=known.beside, deviation=known.deviation)
 
 
 @one_thread()

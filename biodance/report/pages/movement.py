@@ -177,7 +177,7 @@ def _profile(ours: GaitScores | None, theirs: GaitScores | None) -> list[Row]:
         return []
     rows = [_score("gait profile score", ours.gps)]
     if theirs is not None:
-        rows.append(_score("the same of plug-in gait's angles", theirs.gps))
+        rows.append(_score("the same of plug-in gait's angles, against its own reference", theirs.gps))
     if ours.gdi:
         rows.append(_score("gait deviation index (100 = healthy)", ours.gdi))
     by_side = [(name, {side: told for (n, side), told in ours.variables.items() if n == name}) for name in SCORE_ANGLES]
