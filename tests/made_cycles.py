@@ -27,5 +27,5 @@ def level_gait(of: Cycle, **angles: float) -> list[CycleCurve]:
 def trial(name: str, curves: list[CycleCurve], *, shared: tuple[Cycle, ...] = ()) -> TrialMovement:
     """A trial with these curves and the cycles they are of, each a stride of 1.2 m/s."""
     cycles = tuple(dict.fromkeys(one.cycle for one in curves))
-    strides = tuple(Stride(one, {"speed": 1.2}) for one in cycles)
+    strides = tuple(Stride(one, {"speed": 1.2, "cadence": 120.0}) for one in cycles)
     return TrialMovement(name, (), cycles, tuple(curves), strides, (np.empty(0), np.empty(0)), shared=shared)

@@ -62,7 +62,7 @@ _KEYS = Schema(
     "", shown="value: {value} | right: {right} | left: {left} | right less left: {apart} | symmetry (%): {symmetry}"
 )
 _FILE_KEYS = Schema("", shown=f"{_KEYS.shown} | plug-in gait right: {{file_right}} | left there: {{file_left}}")
-_PROFILE = Schema("", shown="score (deg): {value} | right: {right} | left: {left}")
+_PROFILE = Schema("", shown="score: {value} | right: {right} | left: {left}")
 
 
 def movement_section(moved: SessionMovement) -> str:
@@ -82,8 +82,7 @@ def movement_section(moved: SessionMovement) -> str:
             "profile": _PROFILE,
         },
         parts=parts,
-        profile=_profile(*moved.scores),
-        scores=moved.scores[0],
+        **_scores(*moved.scores),
         compared=compared,
         file_angles=[row for one in compared for row in FILE_ANGLE_ROW.rows(one.file_angles, trial=one.trial)],
         notes=list(dict.fromkeys(note for one in moved if one.cycles for note in one.notes)),
@@ -171,17 +170,18 @@ def _said(found: Spread | None, unit: str) -> str:
     return f"{_number(found.mean, unit)} ({about})"
 
 
-def _profile(ours: GaitScores | None, theirs: GaitScores | None) -> list[Row]:
-    """Return the scores of both sides as rows of text; [] without a reference."""
+def _scores(ours: GaitScores | None, theirs: GaitScores | None) -> dict[str, object]:
+    """Return the scores of both sides and the profile as rows of text, none without a reference."""
     if ours is None:
-        return []
-    rows = [_score("gait profile score", ours.gps)]
+        return {"scores": ()}
+    rows = [_score("gait profile score (deg)", ours.gps)]
     if theirs is not None:
         rows.append(_score("the same of plug-in gait's angles, against its own reference", theirs.gps))
     if ours.gdi:
         rows.append(_score("gait deviation index (100 = healthy)", ours.gdi))
     by_side = [(name, {side: told for (n, side), told in ours.variables.items() if n == name}) for name in SCORE_ANGLES]
-    return [*rows, *(_score(spaced(name), told) for name, told in by_side)]
+    profile = [_score(spaced(name), told) for name, told in by_side]
+    return {"scores": rows, "profile": profile, "people": ours.people, "overall": ours.overall}
 
 
 def _score(name: str, found: Mapping[str, Spread]) -> Row:
