@@ -28,7 +28,7 @@ _INSTANTS: Mapping[str, tuple[str, str]] = {
     "sit_to_stand": ("at_start", "at_seat_off"),
 }
 """What the beginning and ``Cycle.off`` of each kind of cycle are called."""
-_OF_A_FOOT = ("step_length", "step_time", "stance")
+_OF_A_FOOT = ("step_length", "step_time", "stance", "margin_aside", "margin_ahead", "contact_time")
 """Spatio-temporal values that each foot has of its own; all others are told of the person."""
 _TURNS: Mapping[str, str] = {"ankle": "ankle_dorsiflexion"}
 """Joint -> the angle that tells how fast it turns, where it is not its flexion."""

@@ -27,6 +27,7 @@ from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
+from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
 from biodance.records import Array, Mask, Motion, Sip, Trial
 
@@ -224,7 +225,7 @@ def trial_movement(
         events,
         cycles,
         tuple(curves),
-        strides(cycles, events, body, soles),
+        strides(cycles, events, body, soles, centre_of_mass(body, motion)),
         agreement_of_events(force, markers),
         compare_angles(body, motion, outputs) if outputs else (),
         compare_events(events, outputs) if outputs else (),

@@ -1,4 +1,6 @@
-"""The spatio-temporal values of walking: cadence, speed, stride and step length, step width, stance, double support."""
+"""The spatio-temporal values of walking and running: cadence, speed, lengths and times of steps, contact and flight,
+margin of stability, vertical stiffness.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +11,7 @@ from biodance.body.body import Body
 from biodance.cycles.cut import Cycle, FootEvent, heel_and_toe
 from biodance.motion.soles import Soles
 from biodance.records import SIDES, Array
+from biodance.settings import STANDARD_GRAVITY
 
 _BELT = 0.15  # m/s of a standing foot from which the ground is a belt
 _FLAT = (20.0, 40.0)  # % of a cycle in which the foot stands flat and tells how fast the ground moves
@@ -22,6 +25,11 @@ STRIDE_UNITS: Mapping[str, str] = {
     "step_width": "m",
     "stance": "%",
     "double_support": "%",
+    "margin_aside": "m",
+    "margin_ahead": "m",
+    "contact_time": "s",
+    "flight_time": "s",
+    "vertical_stiffness": "kN/m",
 }
 """Spatio-temporal quantity -> unit."""
 
@@ -34,16 +42,64 @@ class Stride:
     values: Mapping[str, float]
 
 
-def strides(cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, soles: Soles) -> tuple[Stride, ...]:
-    """Return the values of all gait cycles.
+def strides(
+    cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, soles: Soles, centre: Array
+) -> tuple[Stride, ...]:
+    """Return the values of all gait cycles; ``centre`` (T, 3) m of mass at the times of the soles.
 
     Lengths are horizontal: a stride from a heel's place at one strike to its next, relative to the ground, which on a
     treadmill is as fast as the foot that stands on it. A step goes from the other foot's strike to this foot's, its
-    length along the stride, its width across it, negative where the feet cross.
+    length along the stride, its width across it, negative where the feet cross. Margins: `_margins`. Flight, from
+    leaving the ground to the other foot's strike, and stiffness (`vertical_stiffness`) are of running.
     """
-    heel = heel_and_toe(body, soles.outline)[0][..., :2]
-    gait = [one for one in cycles if one.kind == "gait"]
-    return tuple(Stride(one, _values(one, *_other_foot(one, events), heel, soles.time)) for one in gait)
+    heel, mass, found = heel_and_toe(body, soles.outline)[0][..., :2], float(body.sip.mass.sum()), []
+    for one in (one for one in cycles if one.kind == "gait"):
+        other_off, other_strike = _other_foot(one, events)
+        values = _values(one, other_off, other_strike, heel, soles.time)
+        values |= _margins(one, other_off, other_strike, heel, soles, centre)
+        contact, flight = one.off - one.start, other_strike - one.off
+        if flight > 0:
+            stiffness = 1e-3 * vertical_stiffness(mass, contact, flight)
+            values |= {"contact_time": contact, "flight_time": flight, "vertical_stiffness": stiffness}
+        found.append(Stride(one, values))
+    return tuple(found)
+
+
+def vertical_stiffness(mass: float, contact: float, flight: float) -> float:
+    """Return the stiffness, N/m, of the spring on which a runner of ``mass`` kg bounces who is on the ground for
+    ``contact`` s and in the air for ``flight`` s: a half sine of force, over the way that the body goes down in it
+    (Morin et al. 2005, doi:10.1123/jab.21.2.167).
+    """
+    largest = mass * STANDARD_GRAVITY * np.pi / 2 * (flight / contact + 1)
+    down = largest * contact**2 / (mass * np.pi**2) - STANDARD_GRAVITY * contact**2 / 8
+    return float(largest / down)
+
+
+def _margins(
+    cycle: Cycle, other_off: float, other_strike: float, heel: Array, soles: Soles, centre: Array
+) -> dict[str, float]:
+    """Return by how much the sole reaches beyond the extrapolated centre of mass, m (Hof et al. 2005,
+    doi:10.1016/j.jbiomech.2004.03.025): ``margin_aside`` outwards, the least of single support; ``margin_ahead`` along
+    the stride, at the strike.
+
+    The extrapolated centre is where centre + velocity / root(g / l) lies over the ground, with l the mean distance of
+    the centre of mass from the heel while the foot stands; velocity is relative to the ground.
+    """
+    foot, time = SIDES.index(cycle.side), soles.time
+    ground = _ground(cycle, heel[:, foot], time)
+    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
+    stride, stands = end - start - ground * cycle.duration, (time >= cycle.start) & (time <= cycle.off)
+    if not stands.any() or not np.linalg.norm(stride) > 0:
+        return {}
+    along = stride / np.linalg.norm(stride)
+    outwards = np.array([along[1], -along[0]]) * (1.0 if cycle.side == "right" else -1.0)
+    from_heel = centre[stands] - np.column_stack([heel[stands, foot], soles.outline[stands, foot, :, 2].min(axis=1)])
+    pendulum = np.sqrt(np.linalg.norm(from_heel, axis=1).mean() / STANDARD_GRAVITY)
+    beyond = centre[:, :2] + pendulum * (np.gradient(centre[:, :2], time, axis=0) - ground)
+    aside, ahead = ((soles.outline[:, foot, :, :2] @ way).max(axis=1) - beyond @ way for way in (outwards, along))
+    margins = {"margin_ahead": float(np.interp(cycle.start, time, ahead))}
+    single = (time >= other_off) & (time <= other_strike)
+    return margins | ({"margin_aside": float(aside[single].min())} if single.any() else {})
 
 
 def mean_values(strides: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:

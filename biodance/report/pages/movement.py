@@ -6,6 +6,7 @@ All good repetitions of all trials together, one part for each kind; the window 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ _BECAUSE = {
     LeftOutBecause.SPIKE: "{n} with a spike left out",
     LeftOutBecause.TURN: "{n} left out because the person turned",
 }
-_DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2}
+_DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2, "kN/m": 1}
 _FIRST = (
     *("hip_flexion_maximum", "hip_flexion_minimum", "hip_adduction_maximum"),
     *("knee_flexion_at_strike", "knee_flexion_maximum", "knee_flexion_range"),
@@ -170,7 +171,7 @@ def _said(found: Spread | None, unit: str) -> str:
     return f"{_number(found.mean, unit)} ({about})"
 
 
-def _scores(ours: GaitScores | None, theirs: GaitScores | None) -> dict[str, object]:
+def _scores(ours: GaitScores | None, theirs: GaitScores | None) -> dict[str, Any]:
     """Return the scores of both sides and the profile as rows of text, none without a reference."""
     if ours is None:
         return {"scores": ()}
