@@ -193,6 +193,15 @@ def bent(time, hip, knee, lean=0.0):
     return replace(moved, q=q)
 
 
+def test_of_two_leavings_the_one_that_a_plate_saw_is_believed():
+    strikes = (FootEvent(0.0, "right", True), FootEvent(0.5, "left", True), FootEvent(1.0, "right", True))
+    offs = (FootEvent(0.62, "right", False), FootEvent(0.75, "right", False, "markers"))
+    (one,) = gait_cycles("walk", (*strikes, *offs))
+    assert one.off == 0.62
+    (unsure,) = gait_cycles("walk", (*strikes, *offs[1:], FootEvent(0.6, "right", False, "markers")))
+    assert np.isnan(unsure.off)
+
+
 def test_squats_are_counted_from_standing_to_standing():
     time = np.arange(0, 9, 1 / RATE)
     depth = np.where((time > 1) & (time < 7), 0.5 - 0.5 * np.cos(np.pi * (time - 1)), 0.0)

@@ -1,5 +1,7 @@
 """All good repetitions of a session together: which count, their means, sides beside each other, and the ground."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_cycles import curve, cycle, trial
@@ -7,6 +9,7 @@ from made_cycles import curve, cycle, trial
 from biodance.body.human.human import human
 from biodance.cycles.cut import Cycle
 from biodance.cycles.ground import ground_curves
+from biodance.cycles.strides import Stride
 from biodance.cycles.summary import LeftOutBecause, repetitions_of, symmetry_index
 from biodance.motion.soles import soles_from_body
 from biodance.records import Motion, Subject, Wrench
@@ -53,6 +56,16 @@ def test_a_turn_leaves_out_the_whole_cycle_also_over_the_seam() -> None:
     found = repetitions_of("gait", [trial("walk", [straight, turning, seam])])
     assert [(one.because, one.cycle) for one in found.left_out] == [(LeftOutBecause.TURN, cycle(1))]
     assert len(found.good) == len(found.strides) == 2
+
+
+def test_trials_of_different_speeds_are_told() -> None:
+    slow, fast = ([curve(cycle(k, trial=name), SHAPE) for k in range(2)] for name in ("slow", "fast"))
+    walked = [
+        trial("slow", slow),
+        replace(trial("fast", fast), strides=(Stride(cycle(0, trial="fast"), {"speed": 1.6}),)),
+    ]
+    assert repetitions_of("gait", walked).speeds == (1.2, 1.6)
+    assert repetitions_of("gait", walked[:1]).speeds is None
 
 
 def test_a_shared_plate_is_flagged() -> None:

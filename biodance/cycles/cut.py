@@ -221,8 +221,9 @@ def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:
         for start, end in pairwise(strikes):
             if not _SHORTEST_STRIDE < end - start < _LONGEST_STRIDE or not any(start < one < end for one in others):
                 continue
-            off = [e.time for e in events if not e.down and e.side == side and start < e.time < end]
-            cycles.append(Cycle(trial, "gait", side, start, end, off[0] if len(off) == 1 else float("nan")))
+            offs = [e for e in events if not e.down and e.side == side and start < e.time < end]
+            seen = [e for e in offs if e.source == "force"] or offs  # what a plate saw is no guess
+            cycles.append(Cycle(trial, "gait", side, start, end, seen[0].time if len(seen) == 1 else float("nan")))
     return tuple(sorted(cycles, key=lambda cycle: cycle.start))
 
 

@@ -14,7 +14,8 @@ from biodance.records import SIDES, Array
 from biodance.settings import STANDARD_GRAVITY
 
 _BELT = 0.15  # m/s of a standing foot from which the ground is a belt
-_FLAT = (20.0, 40.0)  # % of a cycle in which the foot stands flat and tells how fast the ground moves
+_FLAT = (10.0, 25.0)
+"""% of a cycle in which the foot stands flat, of runners too, and tells how fast the ground moves."""
 STRIDE_UNITS: Mapping[str, str] = {
     "cadence": "steps/min",
     "speed": "m/s",

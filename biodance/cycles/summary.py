@@ -17,6 +17,8 @@ from biodance.uncertainty.visits import change_of_mean, visit_mean
 
 _TURNS = 20.0
 """deg that the pelvis turns from the beginning of a gait cycle to its end from which this is no straight walking."""
+_MIXED = 1.2
+"""Times the slowest trial's speed beyond which the curves of the fastest one are of another way of walking."""
 _FEWEST = 4
 """Repetitions of a curve without which none of them stands out."""
 _FAR = 4.0
@@ -133,6 +135,20 @@ class Repetitions:
         """The key values of both sides beside each other."""
         ours, theirs = _by_name(self.key_values), _by_name(key_values(self.file_curves))
         return tuple(_summary(some, theirs.get(about, ())) for about, some in ours.items())
+
+    @property
+    def runs(self) -> bool:
+        """Whether most strides have a flight."""
+        return 2 * sum("flight_time" in one.values for one in self.strides) > len(self.strides)
+
+    @cached_property
+    def speeds(self) -> tuple[float, float] | None:
+        """The slowest and the fastest trial's mean speed, m/s, where they are too far apart for one mean to be of both;
+        else None.
+        """
+        values = [mean_values([s for s in self.strides if s.cycle.trial == trial]) for trial in self.trials]
+        speeds = [one["speed"][0] for one in values if "speed" in one]
+        return (min(speeds), max(speeds)) if speeds and max(speeds) > _MIXED * min(speeds) else None
 
     def off(self, side: str) -> Spread | None:
         """Return when the foot of a ``side`` leaves the ground, % of its gait cycle; of other kinds `Cycle.off`."""

@@ -92,7 +92,7 @@ def movement_section(moved: SessionMovement) -> str:
 
 
 def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
-    title = CYCLE_KINDS[found.kind]
+    title = "Running" if found.runs else CYCLE_KINDS[found.kind]
     rows = {one.name: _key(one) for one in found.keys}
     first = _FIRST if found.kind == "gait" else tuple(name for name in rows if name.endswith("_range"))
     ground = repetitions_figure(found, GROUND_PANELS, f"{title}: ground reaction, left beside right", normal)
@@ -140,6 +140,9 @@ def _flags(found: Repetitions) -> list[str]:
         if some:
             trials = ", ".join(dict.fromkeys(one.cycle.trial for one in some))
             told.append(f"{said.format(n=len(some))}: {trials}")
+    if found.speeds:
+        slow, fast = (format_number(one, 1) for one in found.speeds)
+        told.append(f"the trials differ in speed ({slow} to {fast} m/s), so that one mean of them is of neither")
     return told
 
 

@@ -27,7 +27,7 @@ _KEY = Schema(
 def gait_document(moved: SessionMovement | None) -> Row | None:
     """Return the gait of a session; None where nobody walks.
 
-    ``cycles`` how many count, by side; ``left_out`` what counts in no mean, and because of what ("shared_plate",
+    ``runs`` whether most strides have a flight; ``cycles`` how many count, by side; ``left_out`` what counts in no mean, and because of what ("shared_plate",
     "spike", "turn"; ``quantity`` "" = all of the cycle, "loads" = its moments, powers and ground reaction);
     ``curves`` (101 values at 0 to 100 %) mean and sd between cycles, of angles (deg), moments (N·m/kg), powers (W/kg),
     ground reaction (% of body weight), centre of pressure on the sole (m); ``beside`` plug-in gait's own where the
@@ -37,6 +37,7 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
         return None
     found = moved.gait
     return {
+        "runs": found.runs,
         "cycles": {side: sum(one.side == side for one in found.good) for side in SIDES},
         "trials": found.trials,
         "parameters": moved.parameters,
