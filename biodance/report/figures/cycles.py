@@ -26,7 +26,7 @@ from biodance.report.figures.vector import (
 )
 from biodance.report.wording import format_number
 
-_LOOKS = {"left": LEFT_SIDE, "right": RIGHT_SIDE, "middle": MIDDLE_SIDE}
+_LOOKS = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "middle": MIDDLE_SIDE}
 _NORMAL = Stroke(GREY, "1 3", 0.8)
 _THIN, _MOST = 0.4, 12
 """px of one repetition, and repetitions of a side that are drawn; the mean is over all."""
@@ -67,7 +67,7 @@ def repetitions_figure(
     groups = [one for one in found.groups if np.isfinite(one.mean).any()]
     cells = []
     for quantity in quantities:
-        same = [one for one in groups if one.quantity == quantity]
+        same = sorted((one for one in groups if one.quantity == quantity), key=lambda one: list(_LOOKS).index(one.side))
         if same:
             behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
             usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]

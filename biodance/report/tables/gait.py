@@ -27,11 +27,12 @@ _KEY = Schema(
 def gait_document(moved: SessionMovement | None) -> Row | None:
     """Return the gait of a session; None where nobody walks.
 
-    ``runs`` whether most strides have a flight; ``cycles`` how many count, by side; ``left_out`` what counts in no mean, and because of what ("shared_plate",
-    "spike", "turn"; ``quantity`` "" = all of the cycle, "loads" = its moments, powers and ground reaction);
-    ``curves`` (101 values at 0 to 100 %) mean and sd between cycles, of angles (deg), moments (N·m/kg), powers (W/kg),
-    ground reaction (% of body weight), centre of pressure on the sole (m); ``beside`` plug-in gait's own where the
-    files hold it; ``difference`` right less left; ``scores`` null without a healthy reference.
+    ``runs`` whether most strides have a flight; ``cycles`` how many count, by side; ``left_out`` what counts in no
+    mean, and because of what ("shared_plate", "spike", "turn"; ``quantity`` "" = all of the cycle, "loads" = its
+    moments, powers and ground reaction); ``curves`` (101 values at 0 to 100 %) mean and sd between cycles, of angles
+    (deg), moments (N·m/kg), powers (W/kg), ground reaction (% of body weight), centre of pressure on the sole (m);
+    ``beside`` plug-in gait's own where the files hold it; ``difference`` right less left; ``scores`` null without a
+    healthy reference.
     """
     if moved is None or moved.gait is None:
         return None
