@@ -77,9 +77,15 @@ def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
     return {BODY_FILE if fit is not None else SCALED: body_text(*body_of_result(result))}
 
 
-def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
+def write_subject_page(
+    result: SessionResult,
+    folder: Path,
+    *,
+    diagnosis: SessionDiagnosis | None = None,
+    movement: SessionMovement | None = None,
+) -> Path:
     """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path."""
-    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis))})
+    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis, movement))})
     return folder / SUBJECT_PAGE
 
 
