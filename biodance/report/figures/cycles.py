@@ -78,9 +78,8 @@ def repetitions_figure(
             )
     if not cells:
         return ""
-    band = "± 1 sd between cycles" + (
-        "; grey: ± 1 sd between people" if any(n.kind == found.kind for n in normal) else ""
-    )
+    people = "; grey: between people" if any(n.kind == found.kind for n in normal) else ""
+    band = f"one sd between cycles{people}"
     return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
 
 

@@ -155,7 +155,7 @@ def torque_figure(bands: TorqueBands) -> str:
             curves.append(Curve(f"{side or 'trunk'} identified", torque, look, half))
             curves.append(Curve(f"{side or 'trunk'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
         cells.append([Strip(f"{title} (N·m)", curves, 4.0)])
-    about = "Torques of the large joints; the largest values are in the table below"
+    about = "Moments of the large joints; the largest values are in the table below"
     filled = bands.state == AngleState.FILLED
     return CurveFigure(bands.time, cells, about, bands.use, bands.trial, filled=filled).html()
 
