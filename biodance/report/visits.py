@@ -166,7 +166,7 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
     if not cells:
         return ""
     about = f"{CYCLE_KINDS[kind]}, {side} side, all visits on one plot"
-    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="± 1 sd between cycles").html()
+    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
 
 
 def _counts(some: Sequence[CurveGroup | None]) -> str:
