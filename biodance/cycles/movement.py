@@ -23,6 +23,7 @@ from biodance.cycles.cut import (
     repetitions,
 )
 from biodance.cycles.ground import ground_curves
+from biodance.cycles.lifts import lift
 from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import FileOutputs
@@ -30,6 +31,7 @@ from biodance.motion.contact import Contact, foot_wrenches
 from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
 from biodance.records import Array, Mask, Motion, Sip, Trial
+from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,6 +62,8 @@ class TrialMovement:
         Ours beside those that another program wrote into the same file.
     file_curves : tuple of CycleCurve
         Plug-in gait's own angles over the gait cycles.
+    lifts : tuple of Stride
+        Depth, force share of the feet and rise of the force of every squat and rise.
     shared : tuple of Cycle
         Gait cycles in which both feet stood on one plate: there the loads of the leg are not known.
     notes : tuple of str
@@ -80,6 +84,7 @@ class TrialMovement:
     file_angles: tuple[AngleComparison, ...] = ()
     file_events: tuple[EventComparison, ...] = ()
     file_curves: tuple[CycleCurve, ...] = ()
+    lifts: tuple[Stride, ...] = ()
     shared: tuple[Cycle, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -211,6 +216,8 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
     cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
+    centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
+    sure = np.zeros(motion.time.size, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
     curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
         own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
@@ -225,11 +232,12 @@ def trial_movement(
         events,
         cycles,
         tuple(curves),
-        strides(cycles, events, body, soles, centre_of_mass(body, motion)),
+        strides(cycles, events, body, soles, centre),
         agreement_of_events(force, markers),
         compare_angles(body, motion, outputs) if outputs else (),
         compare_events(events, outputs) if outputs else (),
         tuple(theirs),
+        tuple(lift(one, centre, motion.time, weight, feet, sure) for one in cycles if one.kind != "gait"),
         tuple(
             one for one in cycles if one.kind == "gait" and contact and (_shared(contact) & _inside(one, contact)).any()
         ),

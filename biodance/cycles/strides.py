@@ -103,10 +103,12 @@ def _margins(
     return margins | ({"margin_aside": float(aside[single].min())} if single.any() else {})
 
 
-def mean_values(strides: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:
-    """Return mean, standard deviation (NaN for one stride) and number of every value that the strides have."""
+def mean_values(
+    strides: Sequence[Stride], side: str = "both", *, units: Mapping[str, str] = STRIDE_UNITS
+) -> dict[str, tuple[float, float, int]]:
+    """Return mean, standard deviation (NaN for one stride) and number of every value of ``units`` that they have."""
     out = {}
-    for name in STRIDE_UNITS:
+    for name in units:
         some = [s.values[name] for s in strides if name in s.values and side in ("both", s.cycle.side)]
         if some:
             out[name] = (float(np.mean(some)), float(np.std(some, ddof=1)) if len(some) > 1 else np.nan, len(some))

@@ -10,8 +10,9 @@ import numpy as np
 from biodance.cycles.curves import CurveGroup, CycleCurve, group_curves
 from biodance.cycles.cut import Cycle
 from biodance.cycles.keys import KeyValue, key_values
+from biodance.cycles.lifts import LIFT_UNITS
 from biodance.cycles.movement import TrialMovement
-from biodance.cycles.strides import Stride, mean_values
+from biodance.cycles.strides import STRIDE_UNITS, Stride, mean_values
 from biodance.records import SIDES, Array
 from biodance.uncertainty.visits import change_of_mean, visit_mean
 
@@ -137,6 +138,11 @@ class Repetitions:
         return tuple(_summary(some, theirs.get(about, ())) for about, some in ours.items())
 
     @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of every value of its strides, squats or rises."""
+        return STRIDE_UNITS if self.kind == "gait" else LIFT_UNITS
+
+    @property
     def runs(self) -> bool:
         """Whether most strides have a flight."""
         return 2 * sum("flight_time" in one.values for one in self.strides) > len(self.strides)
@@ -155,8 +161,8 @@ class Repetitions:
         return spread([one.off_percent for one in self.good if one.side in (side, "both")])
 
     def spatiotemporal(self, side: str = "both") -> dict[str, Spread]:
-        """Return the spatio-temporal values by name, in the units of `cycles.strides.STRIDE_UNITS`."""
-        return {name: Spread(*values) for name, values in mean_values(self.strides, side).items()}
+        """Return the values of strides, or of squats and rises, by name, in ``units``."""
+        return {name: Spread(*values) for name, values in mean_values(self.strides, side, units=self.units).items()}
 
 
 def spread(values: Iterable[float]) -> Spread | None:
@@ -204,7 +210,12 @@ def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:
         kind,
         cycles,
         tuple(one for one in straight if one not in spikes),
-        tuple(one for trial in trials for one in trial.strides if one.cycle.kind == kind and one.cycle not in turned),
+        tuple(
+            one
+            for trial in trials
+            for one in (*trial.strides, *trial.lifts)
+            if one.cycle.kind == kind and one.cycle not in turned
+        ),
         (
             *(LeftOutCurve(one, "", LeftOutBecause.TURN) for one in turned),
             *(LeftOutCurve(one, "loads", LeftOutBecause.SHARED_PLATE) for one in shared),

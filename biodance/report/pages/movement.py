@@ -13,7 +13,6 @@ import numpy as np
 from biodance.cycles.curves import NormalCurve
 from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
 from biodance.cycles.scores import SCORE_ANGLES, GaitScores
-from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import KeySummary, LeftOutBecause, Repetitions, Spread
 from biodance.display import spaced
 from biodance.pipeline.movement import SessionMovement
@@ -31,7 +30,7 @@ _BECAUSE = {
     LeftOutBecause.SPIKE: "{n} with a spike left out",
     LeftOutBecause.TURN: "{n} left out because the person turned",
 }
-_DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2, "kN/m": 1}
+_DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2, "kN/m": 1, "%/s": 0}
 _FIRST = (
     *("hip_flexion_maximum", "hip_flexion_minimum", "hip_adduction_maximum"),
     *("knee_flexion_at_strike", "knee_flexion_maximum", "knee_flexion_range"),
@@ -47,6 +46,7 @@ class MovementPart:
 
     title: str
     told: str
+    counted: str
     flags: Sequence[str]
     angles: str
     loads: str
@@ -100,12 +100,13 @@ def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
     values = [
         {"value": f"{spaced(name)} ({unit})"}
         | {side: _said(some.get(name), unit) for side, some in (("left", left), ("right", right), ("both", both))}
-        for name, unit in STRIDE_UNITS.items()
+        for name, unit in found.units.items()
         if name in both
     ]
     return MovementPart(
         title,
         _told(found, both),
+        f"{'Steps and strides' if found.kind == 'gait' else title}: mean (standard deviation; number).",
         _flags(found),
         repetitions_figure(found, ANGLE_PANELS, f"{title}: joint angles, left beside right", normal),
         repetitions_figure(found, LOAD_PANELS, f"{title}: moments and powers, left beside right", normal),

@@ -6,6 +6,7 @@ from biodance.effects import Cause, DiscreteEffect
 from biodance.report.tables.schema import Row, Schema
 from biodance.virtual_lab.faults.causes import CAUSES
 
+_PARAMETER = Schema("name unit typical")
 CAUSE_ROW = Schema(
     "effect=name what=about.what",
     {
@@ -14,7 +15,6 @@ CAUSE_ROW = Schema(
     },
     "effect: {effect} | parameters: {told} | simulate: {simulated} | what it is: {what}",
 )
-_PARAMETER = Schema("name unit typical")
 
 
 def causes_document(causes: Iterable[Cause]) -> list[Row]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 from biodance.cycles.curves import CurveGroup
 from biodance.cycles.scores import GaitScores
-from biodance.cycles.strides import STRIDE_UNITS
 from biodance.cycles.summary import Repetitions, Spread
 from biodance.pipeline.movement import SessionMovement
 from biodance.records import SIDES
@@ -55,7 +54,7 @@ def gait_document(moved: SessionMovement | None) -> Row | None:
 
 def _spatiotemporal(found: Repetitions) -> list[Row]:
     return [
-        {"quantity": name, "unit": STRIDE_UNITS[name], "side": side, **_SPREAD.row(told)}
+        {"quantity": name, "unit": found.units[name], "side": side, **_SPREAD.row(told)}
         for side in ("both", *SIDES)
         for name, told in found.spatiotemporal(side).items()
     ]
