@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.display import BLACK, BLUE, GREY, RED
+from biodance.display import BLACK, BLUE, GREEN, GREY, RED
 from biodance.records import Array, runs
 from biodance.report.wording import format_number
 
@@ -40,7 +40,8 @@ class Stroke:
         return f'stroke="{self.colour}" stroke-width="{self.width:g}"{dash}'
 
 
-MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(BLUE, "6 3"), Stroke(RED, "2 2", 1.6)
+MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(GREY, "6 3"), Stroke(GREEN, "2 2", 1.6)
+"""No side of the body: blue is right, red left alone."""
 LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
 
 
