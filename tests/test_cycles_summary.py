@@ -7,6 +7,7 @@ import pytest
 from made_cycles import curve, cycle, trial
 
 from biodance.body.human.human import human
+from biodance.cycles.curves import CycleCurve
 from biodance.cycles.cut import Cycle
 from biodance.cycles.ground import ground_curves
 from biodance.cycles.strides import Stride
@@ -88,6 +89,15 @@ def test_sides_stand_beside_each_other_with_the_interval_of_their_difference() -
     assert keys["maximum"].ci95 == pytest.approx((10 - half, 10 + half), abs=1e-3)
     assert keys["range"].symmetry == pytest.approx(100 * 10 / 57)
     assert np.isnan(keys["maximum"].symmetry)  # the zero of an angle is no amount
+
+
+def test_what_both_sides_share_stands_in_the_middle() -> None:
+    one = Cycle("squats", "squat", "both", 0.0, 2.0, 1.0)
+    bent = CycleCurve(one, "trunk_flexion", "middle", "deg", 30.0 * SHAPE, np.full(101, np.nan))
+    keys = {key.key: key for key in repetitions_of("squat", [trial("squats", [bent])]).keys}
+    assert keys["maximum"].middle is not None
+    assert keys["maximum"].middle.mean == pytest.approx(30.0)
+    assert keys["maximum"].right is None
 
 
 def test_symmetry_means_nothing_where_the_sides_differ_in_sign() -> None:

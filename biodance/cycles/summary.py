@@ -64,7 +64,7 @@ class KeySummary:
     """A key value of both sides: its ``quantity``, which ``key`` of it, ``unit``; ``right`` and ``left`` over all good
     repetitions (None = no value); ``difference`` right less left with its 95 % interval ``ci95`` by the scatter between
     repetitions (None for fewer than three); ``symmetry`` %, see `symmetry_index` (NaN where it means nothing);
-    ``beside`` the same by side as another program has it.
+    ``beside`` the same by side as another program has it; ``middle`` of trunk and pelvis where both sides move alike.
     """
 
     quantity: str
@@ -76,6 +76,7 @@ class KeySummary:
     ci95: tuple[float, float] | None
     symmetry: float
     beside: Mapping[str, Spread]
+    middle: Spread | None = None
 
     @property
     def name(self) -> str:
@@ -190,7 +191,8 @@ def _summary(some: Sequence[KeyValue], theirs: Sequence[KeyValue]) -> KeySummary
         difference, ci95 = change.value, change.interval
         symmetry = symmetry_index(right.mean, left.mean) if first.unit != "deg" or first.key == "range" else np.nan
     beside = {side: found for side in SIDES if (found := spread(one.value for one in theirs if one.side == side))}
-    return KeySummary(first.quantity, first.key, first.unit, right, left, difference, ci95, symmetry, beside)
+    middle = spread(one.value for one in some if one.side == "middle")
+    return KeySummary(first.quantity, first.key, first.unit, right, left, difference, ci95, symmetry, beside, middle)
 
 
 def repetitions_of(kind: str, trials: Sequence[TrialMovement]) -> Repetitions:

@@ -24,6 +24,7 @@ from biodance.report.tables.session import FILE_ANGLE_ROW
 from biodance.report.wording import first_upper, format_number
 
 CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair"}
+_UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat"}
 _COUNTED = {"gait": "gait cycles", "squat": "squats", "sit_to_stand": "rises"}
 _BECAUSE = {
     LeftOutBecause.SHARED_PLATE: "in {n} both feet were on one plate for a part, which has no loads",
@@ -46,6 +47,7 @@ class MovementPart:
 
     title: str
     told: str
+    upright: str
     counted: str
     flags: Sequence[str]
     angles: str
@@ -94,7 +96,11 @@ def movement_section(moved: SessionMovement) -> str:
 def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
     title = "Running" if found.runs else CYCLE_KINDS[found.kind]
     rows = {one.name: _key(one) for one in found.keys}
-    first = _FIRST if found.kind == "gait" else tuple(name for name in rows if name.endswith("_range"))
+    first = (
+        _FIRST
+        if found.kind == "gait"
+        else tuple(one.name for one in found.keys if one.key == "range" and not one.middle)
+    )
     ground = repetitions_figure(found, GROUND_PANELS, f"{title}: ground reaction, left beside right", normal)
     both, left, right = (found.spatiotemporal(side) for side in ("both", "left", "right"))
     values = [
@@ -106,6 +112,7 @@ def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
     return MovementPart(
         title,
         _told(found, both),
+        _UPRIGHT[found.kind],
         f"{'Steps and strides' if found.kind == 'gait' else title}: mean (standard deviation; number).",
         _flags(found),
         repetitions_figure(found, ANGLE_PANELS, f"{title}: joint angles, left beside right", normal),
@@ -140,7 +147,8 @@ def _flags(found: Repetitions) -> list[str]:
         some = [one for one in found.left_out if one.because is because]
         if some:
             trials = ", ".join(dict.fromkeys(one.cycle.trial for one in some))
-            told.append(f"{said.format(n=len(some))}: {trials}")
+            what = ", ".join(dict.fromkeys(spaced(one.quantity) for one in some if because is LeftOutBecause.SPIKE))
+            told.append(f"{said.format(n=len(some))}{f' ({what})' if what else ''}: {trials}")
     if found.speeds:
         slow, fast = (format_number(one, 1) for one in found.speeds)
         told.append(f"the trials differ in speed ({slow} to {fast} m/s), so that one mean of them is of neither")
@@ -154,9 +162,9 @@ def _key(one: KeySummary) -> Row:
         apart = _number(one.difference, one.unit)
         apart += f" ± {_number((one.ci95[1] - one.ci95[0]) / 2, one.unit)}" if one.ci95 else ""
     return {
-        "value": f"{spaced(one.name)} ({one.unit})",
-        "right": _said(one.right, one.unit),
-        "left": _said(one.left, one.unit),
+        "value": f"{spaced(one.name)} ({one.unit}{', middle' * (one.middle is not None)})",
+        "right": _said(one.middle or one.right, one.unit),
+        "left": _said(one.middle or one.left, one.unit),
         "apart": apart,
         "symmetry": format_number(one.symmetry, 0) if np.isfinite(one.symmetry) else "–",
         **{f"file_{side}": _number(one.beside[side].mean, one.unit) if side in one.beside else "–" for side in SIDES},

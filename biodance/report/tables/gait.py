@@ -16,6 +16,7 @@ _LEFT_OUT = Schema(
 _KEY = Schema(
     "quantity key unit difference difference_ci95=ci95 symmetry_percent=symmetry",
     {
+        "middle": _SPREAD,
         "right": _SPREAD,
         "left": _SPREAD,
         "beside": lambda one: {side: _SPREAD.row(told) for side, told in one.beside.items()},
