@@ -117,7 +117,7 @@ def side_by_side(
     for channel, title in enumerate(titles):
         axes = grid[channel % 3, channel // 3]
         axes.plot(time, measured[:, channel], color=BLACK, label="measured")
-        axes.plot(time, simulated[:, channel], color=RED, linestyle=(0, (4, 2)), label="simulated")
+        axes.plot(time, simulated[:, channel], color=GREEN, linestyle=(0, (4, 2)), label="simulated")
         axes.fill_between(time, 0, 1, where=~used, transform=axes.get_xaxis_transform(), color="#EDEDED")
         axes.set_ylabel(title)
     grid[0, 0].legend()
@@ -135,9 +135,11 @@ def intervals(rows: Sequence[Interval], *, axes: "Axes | None" = None) -> "Axes"
     for y, row in zip(place, rows, strict=True):
         drawn.plot(row.before[1:], [y + 0.17] * 2, color=GREY, linewidth=1.0)
         drawn.plot(row.before[0], y + 0.17, marker="s", color=GREY, markersize=4, markerfacecolor="white")
-        drawn.plot(row.after[1:], [y - 0.17] * 2, color=RED if row.known != "cannot be known" else BLACK, linewidth=1.8)
-        inside = {"known": RED, "partly known": "#F2B08A", "cannot be known": "white"}[row.known]
-        edge = BLACK if row.known == "cannot be known" else RED
+        drawn.plot(
+            row.after[1:], [y - 0.17] * 2, color=GREEN if row.known != "cannot be known" else BLACK, linewidth=1.8
+        )
+        inside = {"known": GREEN, "partly known": "#8FD1B9", "cannot be known": "white"}[row.known]
+        edge = BLACK if row.known == "cannot be known" else GREEN
         drawn.plot(row.after[0], y - 0.17, marker="o", color=edge, markersize=5.5, markerfacecolor=inside)
     drawn.set_yticks(place, [row.name.replace("_", " ") for row in rows])
     drawn.set_ylim(-0.7, len(rows) - 0.3)

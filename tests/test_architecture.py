@@ -42,8 +42,6 @@ ONE_ALGORITHM = {
     "body/human/scan.py": "a closed surface, cut at the joints into segments",
     "body/robot/urdf_file.py": "what a URDF file says of links, joints and soles",
     "body/tables/choice.py": "every published table evaluated for one subject, chosen by its name",
-    "cycles/cut.py": "events of the feet and the cycles between them",
-    "cycles/curves.py": "curves over a cycle and the key values read from them",
     "lab/c3d/raw.py": "the bytes of a C3D file to points and analog values in known units",
     "lab/markers/guess.py": "one assignment of labels to landmarks, by name, side, height and neighbours",
     "lab/markers/names.py": "the spellings of a label and what they mean",

@@ -264,3 +264,15 @@ def test_a_fault_of_biodance_is_named_as_such(tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("BIODANCE_TRACEBACK", raising=False)
     assert run(["report", str(tmp_path), "--out", str(tmp_path / "out")]) == NOT_DONE
     assert "ZeroDivisionError: oops" in capsys.readouterr().err
+
+
+def test_the_causes_are_listed_with_parameters_and_units_and_a_slip_is_answered(capsys):
+    assert run(["effects", "added_mass", "--json"]) == DONE
+    (one,) = json.loads(capsys.readouterr().out)
+    assert [(p["name"], p["unit"]) for p in one["parameters"][:2]] == [("mass", "kg"), ("place_x", "m")]
+    assert one["can_be_simulated"]
+    assert run(["effects", "--json"]) == DONE
+    rows = {row["effect"]: row for row in json.loads(capsys.readouterr().out)}
+    assert rows["labels_swapped"]["parameters"] == []
+    assert run(["effects", "aded_mass"]) == NOT_DONE
+    assert "Did you mean 'added_mass'?" in capsys.readouterr().err

@@ -14,9 +14,11 @@ from browser import Page
 from scipy.stats import t as student
 
 from biodance.cli import run
-from biodance.cycles.curves import CycleCurve, key_values, leading_foot, stride_values
-from biodance.cycles.cut import PERCENT, Cycle, Stride
+from biodance.cycles.curves import CycleCurve
+from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.keys import key_values, leading_foot, stride_values
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.strides import Stride
 from biodance.errors import SessionRefused
 from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.visit_quantities import Untested, cycle_quantities

@@ -9,6 +9,7 @@ from squatting import BODY as SQUATTER
 from squatting import squat
 
 from biodance.body.human.human import human
+from biodance.cycles.beside import compare_angles, compare_events
 from biodance.cycles.curves import (
     CycleCurve,
     angle_curves,
@@ -23,18 +24,15 @@ from biodance.cycles.cut import (
     Cycle,
     FootEvent,
     agreement_of_events,
-    compare_angles,
-    compare_events,
     gait_cycles,
     joined_events,
     kinematic_events,
-    mean_values,
     repetitions,
-    strides,
 )
+from biodance.cycles.strides import mean_values, strides, vertical_stiffness
 from biodance.lab.c3d.subject import FileEvent, FileOutputs
 from biodance.motion.dynamics import joint_torques
-from biodance.motion.kinematics import poses
+from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import soles_from_body
 from biodance.pipeline.trial import movement_of
 from biodance.records import Motion, Subject, Wrench
@@ -103,7 +101,8 @@ def test_strides_have_the_speed_length_cadence_and_width_that_were_walked():
     moved, _ = walk()
     events = kinematic_events(BODY, moved)
     cycles, soles = gait_cycles("walk", events), soles_from_body(BODY, moved)
-    found = mean_values(strides(cycles, events, BODY, soles))
+    centre = centre_of_mass(BODY, moved)
+    found = mean_values(strides(cycles, events, BODY, soles, centre))
     hips = 2 * BODY.joints[BODY.joint_index("right_hip_flexion")].translation[2]
     expected = {
         "cadence": (120 / STRIDE, 1.0),
@@ -118,10 +117,47 @@ def test_strides_have_the_speed_length_cadence_and_width_that_were_walked():
         assert found[name][0] == pytest.approx(value, abs=within), name
 
 
+@pytest.mark.parametrize("belt", [0.0, SPEED])
+def test_the_margin_of_stability_is_what_the_sole_reaches_beyond_the_extrapolated_centre_of_mass(belt):
+    """The centre of mass goes straight ahead, on a belt too, so that nothing is added to it sideways."""
+    moved, _ = walk(belt=belt)
+    events, soles, centre = kinematic_events(BODY, moved), soles_from_body(BODY, moved), centre_of_mass(BODY, moved)
+    cycles = gait_cycles("walk", events)
+    found = strides(cycles, events, BODY, soles, centre)
+    for one in found[1:-1]:
+        foot = 0 if one.cycle.side == "right" else 1
+        outer = np.abs(soles.outline[150, foot, :, 1]).max()
+        assert one.values["margin_aside"] == pytest.approx(outer, abs=0.015)
+        frame = round(one.cycle.start * RATE)
+        tip, height = soles.outline[frame, foot, :, 0].max(), centre[frame, 2]
+        speed = (centre[frame + 2, 0] - centre[frame - 2, 0]) / (4 / RATE) + belt
+        beyond = centre[frame, 0] + speed * np.sqrt(height / 9.81)
+        assert one.values["margin_ahead"] == pytest.approx(tip - beyond, abs=0.03)
+
+
+def test_the_vertical_stiffness_of_a_runner_is_the_one_computed_by_hand():
+    """60 kg, 0.25 s on the ground, 0.10 s in the air: 1293.96 N over 59.95 mm."""
+    assert vertical_stiffness(60.0, 0.25, 0.10) == pytest.approx(21582, rel=1e-3)
+
+
+def test_contact_and_flight_are_told_where_the_other_foot_strikes_after_this_one_has_left():
+    moved, _ = walk()
+    soles, centre = soles_from_body(BODY, moved), centre_of_mass(BODY, moved)
+    steps = [(1.0, "right", True), (1.25, "right", False), (1.35, "left", True), (1.6, "left", False)]
+    events = tuple(FootEvent(*one) for one in (*steps, (1.7, "right", True)))
+    (one,) = strides(gait_cycles("run", events), events, BODY, soles, centre)
+    assert (one.values["contact_time"], one.values["flight_time"]) == pytest.approx((0.25, 0.10))
+    expected = vertical_stiffness(float(BODY.sip.mass.sum()), 0.25, 0.10) / 1000
+    assert one.values["vertical_stiffness"] == pytest.approx(expected)
+    assert "double_support" not in one.values
+
+
 def test_on_a_treadmill_the_belt_s_way_is_walked():
     moved, _ = walk(belt=SPEED)
     events = kinematic_events(BODY, moved)
-    found = mean_values(strides(gait_cycles("walk", events), events, BODY, soles_from_body(BODY, moved)))
+    found = mean_values(
+        strides(gait_cycles("walk", events), events, BODY, soles_from_body(BODY, moved), centre_of_mass(BODY, moved))
+    )
     assert found["speed"][0] == pytest.approx(SPEED, abs=0.05)
 
 
@@ -155,6 +191,15 @@ def bent(time, hip, knee, lean=0.0):
     q = moved.q.copy()
     q[:, :3] = foot[:1] * [1, 1, 0] - foot + [0, 0, 0.08] + [0.0, 0.0, 0.0]
     return replace(moved, q=q)
+
+
+def test_of_two_leavings_the_one_that_a_plate_saw_is_believed():
+    strikes = (FootEvent(0.0, "right", True), FootEvent(0.5, "left", True), FootEvent(1.0, "right", True))
+    offs = (FootEvent(0.62, "right", False), FootEvent(0.75, "right", False, "markers"))
+    (one,) = gait_cycles("walk", (*strikes, *offs))
+    assert one.off == 0.62
+    (unsure,) = gait_cycles("walk", (*strikes, *offs[1:], FootEvent(0.6, "right", False, "markers")))
+    assert np.isnan(unsure.off)
 
 
 def test_squats_are_counted_from_standing_to_standing():

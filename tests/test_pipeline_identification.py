@@ -157,6 +157,6 @@ def test_joint_torques_of_the_kept_trial_are_told_with_their_band():
     assert rows["left_elbow_flexion"]["peak_Nm"] == pytest.approx(max(bands.torque[bands.use, elbow], key=abs))
     low, high = rows["left_elbow_flexion"]["peak_ci95_Nm"]
     assert low < rows["left_elbow_flexion"]["peak_Nm"] < high
-    assert "Joint torques" in identification_section(one)
+    assert "Joint moments" in identification_section(one)
     assert session_result().identification.torques is None
     assert identification_document(session_result().identification)["joint_torques"] is None

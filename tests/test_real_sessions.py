@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from biodance.diagnosis.diagnosis import ABOUT
@@ -139,3 +140,21 @@ def test_a_real_recording_without_fault_gets_no_name(name: str, recording: Recor
 def test_identify_finds_the_exchanged_wrist_that_the_diagnosis_finds(recording: Recording) -> None:
     checks = failed_checks(recording("biomechzoo/HC030A"))
     assert [(one.effect, one.target) for one in checks] == [("labels_swapped", "LWRA/LWRB")]
+
+
+def test_knee_and_hip_of_five_real_walks_are_within_two_degrees_of_plug_in_gait(recording: Recording) -> None:
+    moved = describe_movement(recording("c3d_parser_Sydney"))
+    assert moved.gait is not None
+    assert {side: sum(one.side == side for one in moved.gait.good) for side in ("right", "left")} == {
+        "right": 5,
+        "left": 5,
+    }
+    keys = [one for one in moved.gait.keys if one.quantity in ("hip_flexion", "knee_flexion")]
+    assert len(keys) == 10
+    for one in keys:
+        for side, ours in (("right", one.right), ("left", one.left)):
+            assert ours is not None
+            assert abs(ours.mean - one.beside[side].mean) < 2.0, (one.name, side)
+    assert {one.because.value for one in moved.gait.left_out} == {"shared_plate"}
+    loads = next(one for one in moved.gait.groups if (one.quantity, one.side) == ("hip_flexion_moment", "right"))
+    assert np.nanmax(np.abs(loads.values)) < 2.0  # N·m/kg: no spikes from the shares of a plate under both feet

@@ -6,14 +6,18 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from identified_sessions import session_result
+from made_cycles import curve, cycle, trial
 
 from biodance.cli import run
 from biodance.cli.app import DONE, NEEDS_A_PERSON
+from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.pipeline.for_subject import account_for
 from biodance.pipeline.trial_result import Check
 from biodance.report.pages.subject import PLAIN_NAMES, subject_page
+from biodance.report.pages.subject_movement import plain_movement
 
 JARGON = ("segment", "inertia", "interval", "marker", "prior", "posterior", "regress", "diagnos", "wrench", "95 %")
 VISIT = '[session]\nlab = "Gait Lab"\noperator = "Ana Ruiz"\ndate = 2026-11-22\n'
@@ -105,6 +109,37 @@ def test_a_failed_check_gives_no_mass(result, what):
     assert " kg" not in html
     assert "data:image" not in html
     assert grade(html) <= 7
+
+
+def knees(right: float, left: float, count: int = 4) -> Repetitions:
+    shape = np.sin(np.linspace(0, np.pi, 101))
+    curves = [curve(cycle(k), (right + k) * shape) for k in range(count)]
+    curves += [curve(cycle(k, "left"), (left + k) * shape) for k in range(count)]
+    return repetitions_of("gait", [trial("walk", curves)])
+
+
+def test_who_walked_is_told_how_before_any_mass_also_where_no_mass_is_said(result):
+    for one in (result, replace(result, identification=None)):
+        html = subject_page(replace(account_for(one), moved=knees(60.0, 50.0)))
+        assert "You walked 1.2 metres in a second. That is 4.3 kilometres an hour." in html
+        assert "You made 120 steps in a minute." in html
+        assert "Your right knee bends 10 degrees more than the other one." in html
+        assert html.index("How you walked") < html.index("What your body parts weigh</h2>")
+        assert '<svg class="panel"' in html
+        assert "Gait Lab" in html[html.index("What this is not") :]
+        assert grade(html) <= 7
+
+
+@pytest.mark.parametrize(
+    ("right", "left", "count", "said"),
+    [
+        (60.0, 59.9, 4, "Your two knees bend equally far, as well as we can tell."),
+        (50.0, 60.0, 4, "Your left knee bends 10 degrees more"),
+        (60.0, 50.0, 2, "too few of them to say"),
+    ],
+)
+def test_a_difference_of_the_knees_is_told_where_it_is_sure(right, left, count, said):
+    assert said in " ".join(plain_movement(knees(right, left, count)).said)
 
 
 def test_a_session_without_identification_says_so(result):

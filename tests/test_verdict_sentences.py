@@ -139,7 +139,7 @@ def test_a_size_that_is_hardly_known_says_so() -> None:
 @pytest.mark.parametrize(("late", "told"), [(0.034, "forces late"), (-0.034, "forces early")])
 def test_a_delay_says_in_words_which_way_it_goes(late: float, told: str) -> None:
     delayed = Finding("time_delay", "", (Estimate("delay", late, 0.004, "s"),), (Alias("time_delay", "", 80.0),), 0.9)
-    assert in_words(delayed) == f"time delay (delay {1000 * late:.0f} ± 4 ms; {told})"
+    assert in_words(delayed) == f"time delay (delay {1000 * late:.0f} ± 8 ms; {told})"
     unsure = replace(delayed, parameters=(Estimate("delay", late, 0.03, "s"),))
     assert told not in in_words(unsure)
 

@@ -99,6 +99,10 @@ def learn_command(
     archive: Path,
     *,
     out: Annotated[Path, Parameter(name="--out", help="Output file, lab.toml; an existing file is never overwritten.")],
+    healthy: Annotated[
+        str,
+        Parameter(name="--healthy", help="Sessions of healthy people, as S01,S02,S03: normal bands, GPS and GDI."),
+    ] = "",
     json: JsonOption = False,
 ) -> int:
     """Estimate a laboratory's own tolerances, the usual sizes of errors that are not faults, from fault-free sessions.
@@ -116,7 +120,8 @@ def learn_command(
     refuse_present(out)
     refuse_missing_folder(out)
     with progress() as tell:
-        found = learn_laboratory(archive, tell=tell)
+        named = [one.strip() for one in healthy.split(",") if one.strip()]
+        found = learn_laboratory(archive, healthy=named, tell=tell)
         write_whole(out, lab_file_text(found).encode())
     show(learned_document(found), print_learned, json=json, path=out)
     return NEEDS_A_PERSON if found.left_out else DONE

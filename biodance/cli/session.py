@@ -64,7 +64,7 @@ def report_session(
     tell("writing the page")
     tabled(result, tables, found.diagnosis if found else None, movement=moved)
     if for_subject:
-        write_subject_page(result, folder, diagnosis=found)
+        write_subject_page(result, folder, diagnosis=found, movement=moved)
     return result, write_report(result, folder, diagnosis=found, movement=moved)
 
 

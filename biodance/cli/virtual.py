@@ -12,11 +12,13 @@ from biodance.cli.app import (
     DONE,
     NOBODY,
     ForceOption,
+    JsonOption,
     OutOption,
     PersonFacts,
     app,
     not_negative,
     progress,
+    show,
     show_place,
     whole,
 )
@@ -92,6 +94,24 @@ def simulate_command(
             lab_seed=drawn.lab_seed,
         )  # fmt: skip
     show_place(out)
+    return DONE
+
+
+@app.command(name="effects")
+def effects_command(name: str | None = None, *, json: JsonOption = False) -> int:
+    """List the causes of disagreement that are looked for: parameters with units, and which can be simulated.
+
+    Parameters
+    ----------
+    name
+        One cause only, e.g. added_mass. The values of one are written --effect NAME:target=WHERE,parameter=value.
+    """
+    from biodance.effects import causes
+    from biodance.report.tables.causes import CAUSE_ROW, causes_document, causes_shown
+    from biodance.report.terminal import print_table
+
+    document = causes_document(causes(None if name is None else [name]).values())
+    show(document, lambda rows, console: print_table(CAUSE_ROW, causes_shown(rows), console), json=json)
     return DONE
 
 

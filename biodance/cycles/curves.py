@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.cycles.cut import PERCENT, STRIDE_UNITS, Cycle, Stride, heel_and_toe, place_at
+from biodance.cycles.cut import PERCENT, Cycle
+from biodance.cycles.strides import place_at
 from biodance.identification.torques import ground_torques, torque_regressor_of_links
 from biodance.motion.kinematics import Poses, centre_of_mass, chains, poses
 from biodance.motion.soles import Soles
@@ -58,7 +59,7 @@ class CurveGroup:
         return f"CurveGroup({self.quantity} {self.side}, {count}, {self.unit})"
 
 
-def _over_cycle(
+def over_cycle(
     cycle: Cycle, quantity: str, side: str, unit: str, time: Array, value: Array, sd: Array | None = None
 ) -> CycleCurve:
     """Return a quantity (T,) of a trial over one of its cycles; NaN beside frames in which it is NaN."""
@@ -75,12 +76,12 @@ def group_curves(curves: Sequence[CycleCurve]) -> tuple[CurveGroup, ...]:
     groups = []
     for (kind, quantity, side), some in same.items():
         values = np.stack([one.value for one in some])
-        parameters_sd, _ = _mean_and_sd(np.stack([one.sd for one in some]))
-        groups.append(CurveGroup(kind, quantity, side, some[0].unit, values, *_mean_and_sd(values), parameters_sd))
+        parameters_sd, _ = mean_and_sd(np.stack([one.sd for one in some]))
+        groups.append(CurveGroup(kind, quantity, side, some[0].unit, values, *mean_and_sd(values), parameters_sd))
     return tuple(groups)
 
 
-def _mean_and_sd(values: Array) -> tuple[Array, Array]:
+def mean_and_sd(values: Array) -> tuple[Array, Array]:
     """Return mean and standard deviation (101,) over the rows (n, 101) that are known; NaN for fewer than one, two."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
@@ -101,7 +102,7 @@ def angle_curves(cycle: Cycle, body: Body, motion: Motion) -> Iterator[CycleCurv
     for j, joint in enumerate(body.joints):
         if (seen := _seen_from(cycle, joint.name)) is not None:
             side, quantity, sign = seen
-            yield _over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
+            yield over_cycle(cycle, quantity, side, "deg", motion.time, sign * angle[:, j])
 
 
 def _seen_from(cycle: Cycle, joint: str) -> tuple[str, str, float] | None:
@@ -120,11 +121,12 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
 
     The pelvis in the frame of the way it goes (of the way it faces on average where it goes nowhere), in the order
     rotation, obliquity, tilt (Baker 2001, doi:10.1016/S0966-6362(00)00083-7): forward tilt, the cycle's own side up,
-    its own side forward are positive. Foot progression, while the foot stands: toes inwards are positive. The centre of
-    mass: m ahead of where the cycle began, to the side of the foot, over the ground.
+    its own side forward are positive. Foot progression is the rotation of the foot in the same order, toes inwards
+    positive: what is left of it when the heel rises is no matter of the toes' line, which then points down. The centre
+    of mass: m ahead of where the cycle began, to the side of the foot, over the ground.
     """
     pose, time = poses(body, motion.q), motion.time
-    x, y = _direction(cycle, pose, time)
+    x, y = direction_of(cycle, pose, time)
     frame = np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
     middle, mirror = "middle" if cycle.side == "both" else cycle.side, -1.0 if cycle.side == "left" else 1.0
     known = np.where(motion.determined, 1.0, np.nan)
@@ -137,23 +139,21 @@ def lab_curves(cycle: Cycle, body: Body, motion: Motion, soles: Soles) -> Iterat
         (-np.degrees(tilt), -mirror * np.degrees(over), mirror * np.degrees(turn)),
         strict=True,
     ):
-        yield _over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
-    heel, toe = heel_and_toe(body, soles.outline)
-    for foot, side in enumerate(SIDES):
+        yield over_cycle(cycle, f"pelvis_{name}", middle, "deg", time, known * angle)
+    for side in SIDES:
         if cycle.side in (side, "both"):
-            ahead, aside = ((toe - heel)[:, foot] @ frame[k] for k in (0, 2))
-            inwards = -np.degrees(np.arctan2(aside, ahead)) * (-1.0 if side == "left" else 1.0)
-            stands = np.where((time > cycle.off) & (cycle.side == side), np.nan, known)
-            yield _over_cycle(cycle, "foot_progression", side, "deg", time, stands * inwards)
+            across = frame @ pose.rotation[:, body.sip.segments.index(f"{side}_foot"), :, 2, None]
+            inwards = np.degrees(np.arctan2(across[:, 0, 0], across[:, 2, 0])) * (-1.0 if side == "left" else 1.0)
+            yield over_cycle(cycle, "foot_progression", side, "deg", time, known * inwards)
     centre = centre_of_mass(body, motion)
     began = place_at(centre, time, cycle.start) * np.array([1.0, 1.0, 0.0])
     ground = float(np.percentile(soles.outline[..., 2].min(axis=(1, 2)), 5))
     for name, axis, sign, zero in (("ahead", 0, 1.0, 0.0), ("aside", 2, mirror, 0.0), ("height", 1, 1.0, ground)):
         path = sign * ((centre - began) @ frame[axis]) - zero
-        yield _over_cycle(cycle, f"centre_of_mass_{name}", middle, "m", time, known * path)
+        yield over_cycle(cycle, f"centre_of_mass_{name}", middle, "m", time, known * path)
 
 
-def _direction(cycle: Cycle, pose: Poses, time: Array) -> Array:
+def direction_of(cycle: Cycle, pose: Poses, time: Array) -> Array:
     """Return the horizontal unit vector (2,) in which a cycle goes, or in which the pelvis faces on average."""
     inside = (time >= cycle.start) & (time <= cycle.end)
     faces = pose.rotation[inside, 0, :2, 0].mean(axis=0)
@@ -193,17 +193,17 @@ def normal_curves(people: Mapping[str, Sequence[CurveGroup]]) -> tuple[NormalCur
             means.setdefault((one.kind, one.quantity, one.unit), {}).setdefault(name, []).append(one.mean)
     bands = []
     for (kind, quantity, unit), own in means.items():
-        whole = [mean for some in own.values() if np.isfinite(mean := _mean_and_sd(np.stack(some))[0]).mean() > 0.9]
+        whole = [mean for some in own.values() if np.isfinite(mean := mean_and_sd(np.stack(some))[0]).mean() > 0.9]
         if len(whole) >= _FEWEST_PEOPLE:
-            bands.append(NormalCurve(kind, quantity, unit, len(whole), *_mean_and_sd(np.stack(whole))))
+            bands.append(NormalCurve(kind, quantity, unit, len(whole), *mean_and_sd(np.stack(whole))))
     return tuple(bands)
 
 
-def normal_toml(bands: Sequence[NormalCurve]) -> list[str]:
-    """Return the lines of ``[normal]`` in lab.toml: every fifth per cent; NaN where less than two are known."""
+def normal_toml(bands: Sequence[NormalCurve], table: str = "normal") -> list[str]:
+    """Return the lines of a ``table`` in lab.toml: every fifth per cent; NaN where less than two are known."""
     lines = []
     for one in bands:
-        lines += [f'[normal."{one.kind} {one.quantity}"]', f'unit = "{one.unit}"', f"people = {one.people}"]
+        lines += [f'[{table}."{one.kind} {one.quantity}"]', f'unit = "{one.unit}"', f"people = {one.people}"]
         for name, values in (("mean", one.mean), ("sd", one.sd)):
             row = [f"{v:.4g}" for v in values[::_EVERY]]
             half = len(row) // 2
@@ -267,7 +267,7 @@ def load_curves(
         shown, sign = np.where(use, 1.0, np.nan), sign if kind == "moment" else 1.0
         unit = "N·m/kg" if kind == "moment" else "W/kg"
         curves = sign * shown * value[:, column], shown * sd[:, column]
-        one = _over_cycle(cycle, f"{joint}_{kind}", side, unit, motion.time, *curves)
+        one = over_cycle(cycle, f"{joint}_{kind}", side, unit, motion.time, *curves)
         if np.isfinite(one.value).mean() > _ENOUGH:
             yield one
 
@@ -284,144 +284,3 @@ def _moments_and_powers(
     names += [(body.joints[axes[-1]].name.rpartition("_")[0], "power") for axes in groups]
     stacked = np.concatenate([regressor, np.stack(rows, axis=1)], axis=1)
     return names, stacked, np.concatenate([given, np.stack(work, axis=1)], axis=1)
-
-
-ANGLE_PANELS = (
-    *("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation", "hip_flexion", "hip_adduction", "hip_rotation"),
-    *("knee_flexion", "ankle_dorsiflexion", "foot_progression", "trunk_flexion", "trunk_bending", "trunk_rotation"),
-)
-"""Angles that are shown and of which key values are told."""
-LOAD_PANELS = (
-    *("hip_flexion_moment", "knee_flexion_moment", "ankle_dorsiflexion_moment", "hip_adduction_moment"),
-    *("hip_power", "knee_power", "ankle_power"),
-)
-"""The same of moments and powers."""
-_KNOWN = 0.8  # Share of a cycle that must be known for its peaks
-_OF_STANCE = "foot_progression"  # Known while the foot stands only: its mean is told
-_INSTANTS: Mapping[str, tuple[str, str]] = {
-    "gait": ("at_strike", "at_off"),
-    "squat": ("at_start", "at_lowest"),
-    "sit_to_stand": ("at_start", "at_seat_off"),
-}
-"""What the beginning and ``Cycle.off`` of each kind of cycle are called."""
-_OF_A_FOOT = ("step_length", "step_time", "stance")
-"""Spatio-temporal values that each foot has of its own; all others are told of the person."""
-_TURNS: Mapping[str, str] = {"ankle": "ankle_dorsiflexion"}
-"""Joint -> the angle that tells how fast it turns, where it is not its flexion."""
-
-
-_Curve = tuple[Cycle, str, str]  # Cycle, side and quantity of a curve
-
-
-@dataclass(frozen=True)
-class KeyValue:
-    """One number of one ``cycle``: its ``quantity``, which ``key`` of it ("maximum", "minimum", "range", "mean", or the
-    instant; "" where the quantity is a number), ``side``, ``value`` in ``unit``; ``sd`` what the inertial parameters
-    leave uncertain in it; ``rate`` 1/s: how fast the joint turns there (rad/s, powers), or one over the cycle's
-    duration (spatio-temporal values); of an angle ``span`` deg that it goes through in the cycle, and ``beside`` deg,
-    the root of the sum of squares of what the other angles of its joint go through.
-    """
-
-    cycle: Cycle
-    quantity: str
-    key: str
-    side: str
-    unit: str
-    value: float
-    sd: float = 0.0
-    rate: float = 0.0
-    span: float = 0.0
-    beside: float = 0.0
-
-    @property
-    def name(self) -> str:
-        """``knee_flexion_maximum``, or the quantity alone."""
-        return f"{self.quantity}_{self.key}" if self.key else self.quantity
-
-
-def key_values(curves: Sequence[CycleCurve]) -> tuple[KeyValue, ...]:
-    """Return the key values of all cycles: of angles (deg) maximum, minimum, range and the values at both instants of
-    the cycle; of moments (N·m/kg) and powers (W/kg) maximum and minimum.
-
-    A curve of which less than `_KNOWN` is known has none.
-    """
-    angles = {(one.cycle, one.side, one.quantity): one for one in curves if one.unit == "deg"}
-    spans = {about: _span(one) for about, one in angles.items()}
-    found: list[KeyValue] = []
-    for one in curves:
-        if one.quantity == _OF_STANCE:
-            if np.isfinite(one.value).any():
-                found.append(_key(one, "mean", float(np.nanmean(one.value))))
-        elif np.isfinite(one.value).mean() <= _KNOWN:
-            continue
-        elif one.quantity in ANGLE_PANELS:
-            found += _of_angle(one, spans)
-        elif one.quantity in LOAD_PANELS:
-            found += _of_load(one, angles)
-    return tuple(found)
-
-
-def _key(one: CycleCurve, key: str, value: float, **more: float) -> KeyValue:
-    return KeyValue(one.cycle, one.quantity, key, one.side, one.unit, value, **more)
-
-
-def _span(one: CycleCurve) -> float:
-    """Return what a curve goes through in its cycle; 0 where nothing of it is known."""
-    known = one.value[np.isfinite(one.value)]
-    return float(np.ptp(known)) if known.size else 0.0
-
-
-def _of_angle(one: CycleCurve, spans: Mapping[_Curve, float]) -> Iterator[KeyValue]:
-    joint, span = one.quantity.partition("_")[0], _span(one)
-    others = [
-        size
-        for (cycle, side, name), size in spans.items()
-        if (cycle, side) == (one.cycle, one.side) and name != one.quantity and name.partition("_")[0] == joint
-    ]
-    beside = float(np.linalg.norm(others))
-    found = {"maximum": float(np.nanmax(one.value)), "minimum": float(np.nanmin(one.value)), "range": span}
-    for key, at in zip(_INSTANTS[one.cycle.kind], (0.0, one.cycle.off_percent), strict=True):
-        found[key] = float(np.interp(at, PERCENT, one.value))
-    yield from (_key(one, key, value, span=span, beside=beside) for key, value in found.items() if np.isfinite(value))
-
-
-def _of_load(one: CycleCurve, angles: Mapping[_Curve, CycleCurve]) -> Iterator[KeyValue]:
-    """Yield both extremes with their uncertainty, and how fast the joint turns there if it is a power."""
-    joint = one.quantity.partition("_")[0]
-    turn = angles.get((one.cycle, one.side, _TURNS.get(joint, f"{joint}_flexion")))
-    for key, at in (("maximum", int(np.nanargmax(one.value))), ("minimum", int(np.nanargmin(one.value)))):
-        rate = float(_turning(turn)[at]) if turn is not None and one.unit == "W/kg" else 0.0
-        sd, rate = np.nan_to_num([one.sd[at], rate]).tolist()
-        yield _key(one, key, float(one.value[at]), sd=sd, rate=rate)
-
-
-def _turning(one: CycleCurve) -> Array:
-    """Return how fast (101,) rad/s a joint turns over its cycle."""
-    return np.abs(np.gradient(np.radians(one.value), one.cycle.times()))
-
-
-def stride_values(strides: Sequence[Stride], *, leading: str) -> tuple[KeyValue, ...]:
-    """Return the spatio-temporal values of all strides: step length, step time and stance of each foot; all others
-    once, under the side "both", from the strides of the ``leading`` foot: those of the other one share their time and
-    would count twice.
-    """
-    return tuple(
-        KeyValue(
-            one.cycle,
-            name,
-            "",
-            one.cycle.side if name in _OF_A_FOOT else "both",
-            STRIDE_UNITS[name],
-            value,
-            rate=1 / one.cycle.duration,
-        )
-        for one in strides
-        for name, value in one.values.items()
-        if name in _OF_A_FOOT or one.cycle.side == leading
-    )
-
-
-def leading_foot(visits: Sequence[Sequence[Stride]]) -> str:
-    """Return the side, "right" or "left", of which the visit with fewest strides has most."""
-    least = {side: min(sum(one.cycle.side == side for one in some) for some in visits) for side in SIDES}
-    return max(SIDES, key=least.__getitem__)

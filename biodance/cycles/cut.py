@@ -1,8 +1,6 @@
-"""A trial cut into what repeats: gait cycles of each foot, squats, rises from a chair; and the spatio-temporal values
-of walking: cadence, speed, stride and step length, step width, stance and double support.
-"""
+"""A trial cut into what repeats: events of the feet, gait cycles of each foot, squats, rises from a chair."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -11,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biodance.body.body import Body
-from biodance.lab.c3d.subject import FileEvent, FileOutputs
+from biodance.lab.c3d.subject import FileEvent
 from biodance.motion.contact import Contact
 from biodance.motion.kinematics import centre_of_mass, poses
 from biodance.motion.soles import Soles, soles_from_body
@@ -124,12 +122,12 @@ def heel_and_toe(body: Body, outline: Array) -> tuple[Array, Array]:
 
 def agreement_of_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[Array, Array]:
     """Return by how much strikes and leavings (n,) s come later by markers than by forces, both seen."""
-    late = [(event.down, _delay_of_nearest(markers, event)) for event in force]
+    late = [(event.down, delay_of_nearest(markers, event)) for event in force]
     strikes, leavings = ([s for d, s in late if d is down and abs(s) < _TOGETHER] for down in (True, False))
     return np.array(strikes), np.array(leavings)
 
 
-def _delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent) -> float:
+def delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent) -> float:
     """Return by how many s the nearest of ``events`` of this kind and foot comes later; infinity without."""
     kind = event.side, event.down
     return min((one.time - event.time for one in events if (one.side, one.down) == kind), key=abs, default=np.inf)
@@ -137,7 +135,7 @@ def _delay_of_nearest(events: Iterable[FootEvent], event: FootEvent | FileEvent)
 
 def joined_events(force: tuple[FootEvent, ...], markers: tuple[FootEvent, ...]) -> tuple[FootEvent, ...]:
     """Return the events of both, in the order of time: the force's where a plate saw it, else the markers'."""
-    kept = [event for event in markers if not abs(_delay_of_nearest(force, event)) < _TOGETHER]
+    kept = [event for event in markers if not abs(delay_of_nearest(force, event)) < _TOGETHER]
     return tuple(sorted((*force, *kept), key=lambda event: event.time))
 
 
@@ -167,81 +165,6 @@ def _turning_points(path: Array, motion: Motion, *, down: bool, prominence: floa
         share = (speed[before] - level) / (speed[before] - speed[here]) if speed[here] <= level else 1.0
         times.append(float(motion.time[before] + step * share / rate))
     return times
-
-
-_PLUG_IN_GAIT: Mapping[str, tuple[str, int]] = {
-    "hip_flexion": ("HipAngles", 0),
-    "hip_adduction": ("HipAngles", 1),
-    "hip_rotation": ("HipAngles", 2),
-    "knee_flexion": ("KneeAngles", 0),
-    "ankle_dorsiflexion": ("AnkleAngles", 0),
-}
-"""Our angle -> the label (with L or R before it) and component of plug-in gait's, where both have the same positive
-sense. Its knee has two more angles, which ours has not; the turn of its foot is that of a line, not of a body.
-"""
-_NEAR_EVENT = 0.15  # s within which an event of ours and one of the file are the same
-_FEWEST = 20  # Frames without which nothing is compared
-
-
-@dataclass(frozen=True)
-class AngleComparison:
-    """One joint angle beside that of the file: ``offset`` deg the mean of ours less the file's, ``sd`` deg of the
-    difference about it, ``correlation`` (NaN where one does not move), over ``frames``.
-    """
-
-    joint: str
-    label: str
-    offset: float
-    sd: float
-    correlation: float
-    frames: int
-
-
-@dataclass(frozen=True)
-class EventComparison:
-    """Our strikes (``down``) or leavings beside the file's: ``late`` s, the mean of ours less the file's, ``sd`` s over
-    ``count`` events; ``missed`` events of the file without one of ours.
-    """
-
-    down: bool
-    late: float
-    sd: float
-    count: int
-    missed: int
-
-
-def compare_angles(body: Body, motion: Motion, outputs: FileOutputs) -> tuple[AngleComparison, ...]:
-    """Return every angle that both have, over the frames in which both are known."""
-    comparisons = []
-    for j, joint in enumerate(body.joints):
-        side, _, name = joint.name.partition("_")
-        label, axis = _PLUG_IN_GAIT.get(name, ("", 0))
-        label = f"{side[:1].upper()}{label}"
-        theirs = outputs.angles.get(label)
-        if name not in _PLUG_IN_GAIT or theirs is None or len(theirs) != motion.time.size:
-            continue
-        known = motion.determined & np.isfinite(theirs).all(axis=1)
-        ours, other = motion.angles[known, j], theirs[known, axis]
-        if ours.size < _FEWEST:
-            continue
-        moves = np.ptp(ours) > 1.0 and np.ptp(other) > 1.0
-        correlation = float(np.corrcoef(ours, other)[0, 1]) if moves else float("nan")
-        apart, label = ours - other, f"{label} {'xyz'[axis]}"
-        mean, sd = float(apart.mean()), float(apart.std())
-        comparisons.append(AngleComparison(joint.name, label, mean, sd, correlation, ours.size))
-    return tuple(comparisons)
-
-
-def compare_events(events: tuple[FootEvent, ...], outputs: FileOutputs) -> tuple[EventComparison, ...]:
-    """Return how our events lie beside those that the file holds; () where it holds none."""
-    comparisons = []
-    for down in (True, False):
-        delays = [_delay_of_nearest(events, one) for one in outputs.events if one.down is down]
-        late = [delay for delay in delays if abs(delay) < _NEAR_EVENT]
-        if delays:
-            mean, sd = (float(np.mean(late)), float(np.std(late))) if late else (np.nan, np.nan)
-            comparisons.append(EventComparison(down, mean, sd, len(late), len(delays) - len(late)))
-    return tuple(comparisons)
 
 
 _CycleKind = Literal["gait", "squat", "sit_to_stand"]
@@ -298,8 +221,9 @@ def gait_cycles(trial: str, events: tuple[FootEvent, ...]) -> tuple[Cycle, ...]:
         for start, end in pairwise(strikes):
             if not _SHORTEST_STRIDE < end - start < _LONGEST_STRIDE or not any(start < one < end for one in others):
                 continue
-            off = [e.time for e in events if not e.down and e.side == side and start < e.time < end]
-            cycles.append(Cycle(trial, "gait", side, start, end, off[0] if len(off) == 1 else float("nan")))
+            offs = [e for e in events if not e.down and e.side == side and start < e.time < end]
+            seen = [e for e in offs if e.source == "force"] or offs  # what a plate saw is no guess
+            cycles.append(Cycle(trial, "gait", side, start, end, seen[0].time if len(seen) == 1 else float("nan")))
     return tuple(sorted(cycles, key=lambda cycle: cycle.start))
 
 
@@ -339,95 +263,3 @@ def _seated(body: Body, soles: Soles, centre: Array) -> NDArray[np.bool_]:
     ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
     behind = np.einsum("tfk,tk->tf", heel - centre[:, None, :2], ahead).min(axis=1)
     return np.asarray(behind > _SEATED)
-
-
-_BELT = 0.15  # m/s of a standing foot from which the ground is a belt
-_FLAT = (20.0, 40.0)  # % of a cycle in which the foot stands flat and tells how fast the ground moves
-STRIDE_UNITS: Mapping[str, str] = {
-    "cadence": "steps/min",
-    "speed": "m/s",
-    "stride_length": "m",
-    "stride_time": "s",
-    "step_length": "m",
-    "step_time": "s",
-    "step_width": "m",
-    "stance": "%",
-    "double_support": "%",
-}
-"""Spatio-temporal quantity -> unit."""
-
-
-@dataclass(frozen=True)
-class Stride:
-    """The spatio-temporal values of one gait ``cycle`` by name (`STRIDE_UNITS`); one that is not known is missing."""
-
-    cycle: Cycle
-    values: Mapping[str, float]
-
-
-def strides(cycles: Sequence[Cycle], events: Sequence[FootEvent], body: Body, soles: Soles) -> tuple[Stride, ...]:
-    """Return the values of all gait cycles.
-
-    Lengths are horizontal: a stride from a heel's place at one strike to its next, relative to the ground, which on a
-    treadmill is as fast as the foot that stands on it. A step goes from the other foot's strike to this foot's, its
-    length along the stride, its width across it, negative where the feet cross.
-    """
-    heel = heel_and_toe(body, soles.outline)[0][..., :2]
-    gait = [one for one in cycles if one.kind == "gait"]
-    return tuple(Stride(one, _values(one, *_other_foot(one, events), heel, soles.time)) for one in gait)
-
-
-def mean_values(strides: Sequence[Stride], side: str = "both") -> dict[str, tuple[float, float, int]]:
-    """Return mean, standard deviation (NaN for one stride) and number of every value that the strides have."""
-    out = {}
-    for name in STRIDE_UNITS:
-        some = [s.values[name] for s in strides if name in s.values and side in ("both", s.cycle.side)]
-        if some:
-            out[name] = (float(np.mean(some)), float(np.std(some, ddof=1)) if len(some) > 1 else np.nan, len(some))
-    return out
-
-
-def _other_foot(cycle: Cycle, events: Sequence[FootEvent]) -> tuple[float, float]:
-    """Return when, s, the other foot leaves and strikes the ground in a cycle; NaN = not known."""
-    inside = [one for one in events if one.side != cycle.side and cycle.start < one.time < cycle.end]
-    strikes, offs = ([one.time for one in inside if one.down is down] for down in (True, False))
-    strike = strikes[0] if len(strikes) == 1 else np.nan
-    before = [time for time in offs if time < strike]
-    return before[0] if len(before) == 1 else np.nan, strike
-
-
-def _values(cycle: Cycle, other_off: float, other_strike: float, heel: Array, time: Array) -> dict[str, float]:
-    foot = SIDES.index(cycle.side)
-    ground = _ground(cycle, heel[:, foot], time)
-    start, end = (place_at(heel[:, foot], time, t) for t in (cycle.start, cycle.end))
-    stride = end - start - ground * cycle.duration
-    length = float(np.linalg.norm(stride))
-    values = {
-        "cadence": 120.0 / cycle.duration,
-        "speed": length / cycle.duration,
-        "stride_length": length,
-        "stride_time": cycle.duration,
-    }
-    if np.isfinite(cycle.off):
-        values["stance"] = cycle.off_percent
-    if np.isfinite(other_strike) and length > 0:
-        across = end - place_at(heel[:, 1 - foot], time, other_strike) - ground * (cycle.end - other_strike)
-        along = stride / length
-        values["step_time"] = cycle.end - other_strike
-        values["step_length"] = float(across @ along)
-        to_right = float(across[0] * along[1] - across[1] * along[0])
-        values["step_width"] = to_right if cycle.side == "right" else -to_right
-    double = other_off - cycle.start + max(0.0, cycle.off - other_strike)
-    return values | ({"double_support": 100 * double / cycle.duration} if np.isfinite(double) else {})
-
-
-def _ground(cycle: Cycle, heel: Array, time: Array) -> Array:
-    """Return the velocity (2,) m/s of what the foot stands on; zero for a floor."""
-    first, last = (cycle.start + share / 100 * cycle.duration for share in _FLAT)
-    velocity = (place_at(heel, time, last) - place_at(heel, time, first)) / (last - first)
-    return velocity if np.linalg.norm(velocity) > _BELT else np.zeros(2)
-
-
-def place_at(path: Array, time: Array, when: float) -> Array:
-    """Return the place (k,) at an instant s of a path (T, k)."""
-    return np.array([np.interp(when, time, column) for column in path.T])

@@ -9,30 +9,29 @@ import numpy as np
 
 from biodance import display
 from biodance.body.body import Body
+from biodance.cycles.beside import AngleComparison, EventComparison, compare_angles, compare_events, file_curves
 from biodance.cycles.curves import CurveGroup, CycleCurve, angle_curves, group_curves, lab_curves, load_curves
 from biodance.cycles.cut import (
     PERCENT,
-    AngleComparison,
     Cycle,
-    EventComparison,
     FootEvent,
-    Stride,
     agreement_of_events,
-    compare_angles,
-    compare_events,
     foot_events,
     gait_cycles,
     joined_events,
     kinematic_events,
-    mean_values,
     repetitions,
-    strides,
 )
+from biodance.cycles.ground import ground_curves
+from biodance.cycles.lifts import lift
+from biodance.cycles.strides import Stride, mean_values, strides
 from biodance.errors import TrialRefused, UnknownName
 from biodance.lab.c3d.subject import FileOutputs
 from biodance.motion.contact import Contact, foot_wrenches
+from biodance.motion.kinematics import centre_of_mass
 from biodance.motion.soles import soles_from_body
-from biodance.records import Array, Motion, Sip, Trial
+from biodance.records import Array, Mask, Motion, Sip, Trial
+from biodance.settings import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,6 +60,12 @@ class TrialMovement:
         (n,) s arrays for strikes and leavings: how much later the markers tell them than the plates.
     file_angles, file_events : tuple
         Ours beside those that another program wrote into the same file.
+    file_curves : tuple of CycleCurve
+        Plug-in gait's own angles over the gait cycles.
+    lifts : tuple of Stride
+        Depth, force share of the feet and rise of the force of every squat and rise.
+    shared : tuple of Cycle
+        Gait cycles in which both feet stood on one plate: there the loads of the leg are not known.
     notes : tuple of str
         What a person should know.
 
@@ -78,6 +83,9 @@ class TrialMovement:
     late: tuple[Array, Array]
     file_angles: tuple[AngleComparison, ...] = ()
     file_events: tuple[EventComparison, ...] = ()
+    file_curves: tuple[CycleCurve, ...] = ()
+    lifts: tuple[Stride, ...] = ()
+    shared: tuple[Cycle, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -170,7 +178,7 @@ class TrialMovement:
         Returns
         -------
         dict
-            Name -> (mean, sd, count) in the units of `cycles.cut.STRIDE_UNITS`; {} where nobody walks.
+            Name -> (mean, sd, count) in the units of `cycles.strides.STRIDE_UNITS`; {} where nobody walks.
 
         Examples
         --------
@@ -208,22 +216,42 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
     cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
-    curves: list[CycleCurve] = []
+    centre, weight = centre_of_mass(body, motion), STANDARD_GRAVITY * float(body.sip.mass.sum())
+    sure = np.zeros(motion.time.size, dtype=bool) if contact is None else contact.told.all(axis=1) & ~_shared(contact)
+    curves, theirs = list[CycleCurve](), list[CycleCurve]()
     for cycle in cycles:
-        curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
+        own = [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]
+        curves += own
+        theirs += file_curves(cycle, outputs, motion.time, own) if outputs else ()
         if contact is not None and feet is not None:
-            curves += load_curves(cycle, body, sip or body.sip, motion, feet, contact.told)
+            known = contact.told & ~_shared(contact)[:, None] if cycle.kind == "gait" else contact.told
+            curves += load_curves(cycle, body, sip or body.sip, motion, feet, known)
+            curves += ground_curves(cycle, body, motion, soles, feet, known)
     return TrialMovement(
         trial.name,
         events,
         cycles,
         tuple(curves),
-        strides(cycles, events, body, soles),
+        strides(cycles, events, body, soles, centre),
         agreement_of_events(force, markers),
         compare_angles(body, motion, outputs) if outputs else (),
         compare_events(events, outputs) if outputs else (),
+        tuple(theirs),
+        tuple(lift(one, centre, motion.time, weight, feet, sure) for one in cycles if one.kind != "gait"),
+        tuple(
+            one for one in cycles if one.kind == "gait" and contact and (_shared(contact) & _inside(one, contact)).any()
+        ),
         _notes(cycles, contact),
     )
+
+
+def _shared(contact: Contact) -> Mask:
+    """Return (T,) where both feet are on one plate."""
+    return np.asarray(np.all(contact.on_plate, axis=1).any(axis=1))
+
+
+def _inside(cycle: Cycle, contact: Contact) -> Mask:
+    return np.asarray((contact.time >= cycle.start) & (contact.time <= cycle.end))
 
 
 def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
@@ -231,8 +259,8 @@ def _notes(cycles: Sequence[Cycle], contact: Contact | None) -> tuple[str, ...]:
         return ("No step, no squat and no rise from a chair was found, so there are no cycles.",)
     if contact is None:
         return ("No force plate tells what the ground does, so there are no moments and powers.",)
-    inside = np.any([(contact.time >= one.start) & (contact.time <= one.end) for one in cycles], axis=0)
-    if np.any(np.all(contact.on_plate[inside], axis=1)):
+    standing = [_inside(one, contact) for one in cycles if one.kind != "gait"]
+    if standing and np.any(_shared(contact) & np.any(standing, axis=0)):
         return (
             "Both feet stood on one plate: what each of them carried is an estimate from the centre of pressure, so a "
             "difference between left and right moments is not measured.",

@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from biodance.body.body import Body
+from biodance.cycles.summary import Repetitions
 from biodance.identification.knowledge import SIGMAS, Known, known_together
 from biodance.lab.session.file import VisitEntry, read_session_file
 from biodance.pipeline.diagnosis import SessionDiagnosis
+from biodance.pipeline.movement import SessionMovement
 from biodance.pipeline.results import SessionResult
 from biodance.records import Subject
 
@@ -40,7 +42,8 @@ class PartMass:
 
 @dataclass(frozen=True, eq=False)
 class SubjectAccount:
-    """All that the subject's page shows: ``subject`` and ``visit`` as declared; ``weight`` kg, a 95 % interval of the
+    """All that the subject's page shows: ``subject`` and ``visit`` as declared; ``moved`` all good repetitions of what
+    was done most, or None; ``weight`` kg, a 95 % interval of the
     whole body on the plates (NaN = not told); ``parts`` in the body's order, () where masses are withheld; ``together``
     of parts that are known only as a sum; ``withheld`` why no mass is said, () where they are; ``body`` to draw.
     """
@@ -52,10 +55,13 @@ class SubjectAccount:
     together: PartMass | None = None
     withheld: tuple[str, ...] = ()
     body: Body | None = field(default=None)
+    moved: Repetitions | None = None
 
 
-def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None) -> SubjectAccount:
-    """Return what the subject may be told of a session, and of its ``diagnosis`` where one was made.
+def account_for(
+    result: SessionResult, diagnosis: SessionDiagnosis | None = None, movement: SessionMovement | None = None
+) -> SubjectAccount:
+    """Return what the subject may be told of a session, of its ``diagnosis`` and its ``movement`` where they were made.
 
     Raises
     ------
@@ -63,9 +69,10 @@ def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None
         ``session.toml`` cannot be read.
     """
     visit = read_session_file(result.session.folder).visit
-    withheld = _withheld(result, diagnosis)
+    withheld, kinds = _withheld(result, diagnosis), movement.repetitions.values() if movement else ()
+    moved = max((one for one in kinds if one.good), key=lambda one: len(one.good), default=None)
     if withheld or result.identification is None:
-        return SubjectAccount(result.subject, visit, withheld=withheld, body=result.body)
+        return SubjectAccount(result.subject, visit, withheld=withheld, body=result.body, moved=moved)
     one, standing = result.identification.identification, result.standing
     masses = tuple(_part(known) for known in one.known if known.quantity == "mass")
     reach = SIGMAS * standing.mass_sd if standing else 0.0
@@ -75,7 +82,7 @@ def account_for(result: SessionResult, diagnosis: SessionDiagnosis | None = None
     if sums and not masses[0].measured:
         pair, reach = sums[0], SIGMAS * sums[0].sd
         together = PartMass(pair.segments, pair.mass - reach, pair.mass + reach)
-    return SubjectAccount(result.subject, visit, weight, masses, together, body=result.body)
+    return SubjectAccount(result.subject, visit, weight, masses, together, body=result.body, moved=moved)
 
 
 def _withheld(result: SessionResult, diagnosis: SessionDiagnosis | None) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from biodance.cycles.curves import NormalCurve, normal_of
+from biodance.cycles.scores import DeviationReference, deviation_of
 from biodance.effects import FAMILY
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.corrections import (
@@ -24,17 +25,22 @@ from biodance.uncertainty.tolerances import Tolerances, shipped, tolerances_of
 
 LAB = "lab.toml"
 """Name under which it is written."""
+PLUG_IN_GAIT = "normal_plug_in_gait"
+"""Its table of the bands of plug-in gait's own angles."""
 
 
 @dataclass(frozen=True, eq=False)
 class LabFile:
     """What a lab.toml says: ``corrections`` of the plates, ``tolerances`` of the laboratory's own or None, and the
-    ``normal`` bands of its people.
+    ``normal`` bands of its people, those of plug-in gait's angles ``beside``, and what the gait deviation index is told
+    against, or None.
     """
 
     corrections: tuple[PlateCorrection, ...] = ()
     tolerances: Tolerances | None = None
     normal: tuple[NormalCurve, ...] = ()
+    beside: tuple[NormalCurve, ...] = ()
+    deviation: DeviationReference | None = None
 
     def corrected(self, session: Session) -> Session:
         """Return a session as read, corrected."""
@@ -63,7 +69,9 @@ def read_lab(path: str | Path | None) -> LabFile:
         norms = {name: (float(one["value"]), float(one["sd"])) for name, one in whole.get("norms", {}).items()}
         where = "tolerances"
         known, where = replace(tolerances_of(raw), norms=norms) if raw else None, "normal"
-        return LabFile(corrections, known, normal_of(whole.get("normal", {})))
+        normal, where = normal_of(whole.get("normal", {})), PLUG_IN_GAIT
+        beside, where = normal_of(whole.get(PLUG_IN_GAIT, {})), "gait_deviation_index"
+        return LabFile(corrections, known, normal, beside, deviation_of(whole.get("gait_deviation_index")))
     except (KeyError, TypeError, ValueError, BiodanceError) as error:
         raise FileRefused(f"{path}: [{where}] is not what `biodance learn` writes ({error}).") from error
 
@@ -125,6 +133,15 @@ class _Band(_Table):
     sd: _PerCent
 
 
+class _Deviation(_Table):
+    """Of the gait deviation index: features (k, 459), the healthy (k,), mean and sd of their distance's logarithm."""
+
+    basis: Annotated[list[Annotated[list[Finite], Field(min_length=459, max_length=459)]], Field(max_length=459)]
+    control: Annotated[list[Finite], Field(max_length=459)]
+    mean: Finite
+    sd: Positive
+
+
 class _Laboratory(_Table):
     learned_utc: Any = None
     archive: str = ""
@@ -139,6 +156,8 @@ class LabContents(_Table):
     tolerances: _Tolerances | None = None
     norms: dict[str, _Norm] = {}
     normal: dict[str, _Band] = {}
+    normal_plug_in_gait: dict[str, _Band] = {}
+    gait_deviation_index: _Deviation | None = None
 
 
 def lab_fault(raw: dict[str, Any]) -> str:

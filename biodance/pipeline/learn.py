@@ -1,11 +1,10 @@
 """A laboratory learns from its own sessions without fault how large everything is that is no fault."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from biodance import display
-from biodance.cycles.curves import CurveGroup, NormalCurve, normal_curves
 from biodance.diagnosis.archive.norms import (
     Norm,
     SeenValue,
@@ -20,14 +19,14 @@ from biodance.diagnosis.learning import Null, learn_tolerances, null_of, shown_b
 from biodance.diagnosis.own_tolerances import skin_of, soft_tissue
 from biodance.diagnosis.problem import problem
 from biodance.effects import check_quality
-from biodance.errors import SessionRefused
+from biodance.errors import SessionRefused, UnknownName
 from biodance.lab.session.archive import archive_folders
 from biodance.lab.session.read import read_session
 from biodance.lab.session.recordings import recordings_in
 from biodance.pipeline.judged_trials import cases_of, chosen_windows
-from biodance.pipeline.movement import session_movement
 from biodance.pipeline.plates import told_failure
 from biodance.pipeline.provenance import now
+from biodance.pipeline.reference import HealthyReference, MeasuredWalk, healthy_reference, measured_walk
 from biodance.pipeline.results import SessionResult
 from biodance.pipeline.session import examine
 from biodance.uncertainty.tolerances import InstrumentNoise, Tolerances, shipped, without_habits
@@ -37,19 +36,18 @@ _WORTH = 5.0
 FEWEST = 3
 """Sessions without which nothing is learned."""
 ROUNDS = 10
+NO_REFERENCE = HealthyReference()
 _Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedSession:
-    """What one session teaches: its ``null``, ``instruments``, numbers ``seen``, and the ``curves`` of a ``person``."""
+    """What one session teaches: its ``null``, ``instruments``, and numbers ``seen``."""
 
     name: str
     null: Null
     instruments: InstrumentNoise
     seen: tuple[SeenValue, ...]
-    person: str = ""
-    curves: tuple[CurveGroup, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +60,8 @@ class LearnedLaboratory:
         Its folder.
     created : str
         UTC time, ISO 8601.
-    tolerances : Tolerances
-        For `diagnose`.
+    tolerances : Tolerances or None
+        For `diagnose`; None where too few sessions are without fault.
     norms : tuple of Norm
         What is usual of instruments, people and witnesses.
     sessions : tuple of str
@@ -72,18 +70,19 @@ class LearnedLaboratory:
         Key of a size -> how many coefficients the sessions show of it; 0 = as shipped.
     left_out : mapping
         Session -> why nothing was learned from it.
-    normal : tuple of NormalCurve
-        Bands of joint angles, moments and powers over its people; () for fewer than three.
+    healthy : HealthyReference
+        Bands of joint angles, moments and powers over its people, none for fewer than three; and what the gait
+        deviation index is told against.
     """
 
     archive: Path
     created: str
-    tolerances: Tolerances
+    tolerances: Tolerances | None
     norms: tuple[Norm, ...]
     sessions: tuple[str, ...]
     shown: Mapping[str, float] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
-    normal: tuple[NormalCurve, ...] = ()
+    healthy: HealthyReference = NO_REFERENCE
 
     def __repr__(self) -> str:
         return f"LearnedLaboratory({self.archive.name!r}, {len(self.sessions)} sessions, {self.created})"
@@ -95,13 +94,18 @@ class LearnedLaboratory:
 _BESIDE = "recordings beside the session folders belong to none of them and are left out"
 
 
-def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> LearnedLaboratory:
+def learn_laboratory(
+    archive: str | Path, *, healthy: Sequence[str] = (), tell: _Tell = lambda _: None
+) -> LearnedLaboratory:
     """Return the tolerances and norms of a laboratory, from all its sessions without fault.
 
     Parameters
     ----------
     archive : str or pathlib.Path
         Folder with session folders at any depth. A session in which a check fails teaches nothing.
+    healthy : sequence of str
+        Sessions of healthy people, by their place below ``archive``: normal bands and scores rest on these, also where
+        a check fails in one; by default on all sessions without fault.
     tell : callable, optional
         Called with what is being done, in words.
 
@@ -113,7 +117,10 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
     Raises
     ------
     SessionRefused
-        Fewer than three sessions can be learned from; the message says why of each.
+        Fewer than three sessions can be learned from, and ``healthy`` names fewer than three people; the message says
+        why of each.
+    UnknownName
+        ``healthy`` names a session that is not there.
 
     See Also
     --------
@@ -131,7 +138,7 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
     biodance.errors.SessionRefused: visit: holds 1 session, at least 3 are needed to learn from.
     """
     folder = Path(archive)
-    found, left_out = [], {}
+    found, left_out, walks = dict[str, LearnedSession](), dict[str, str](), list[MeasuredWalk]()
     sessions = [path for path in archive_folders(folder)[0] if path != folder]
     if not sessions:
         sessions = [folder]
@@ -140,14 +147,21 @@ def learn_laboratory(archive: str | Path, *, tell: _Tell = lambda _: None) -> Le
     if len(sessions) < FEWEST:
         held = f"{len(sessions)} session{'s' * (len(sessions) != 1)}"
         raise SessionRefused(f"{folder}: holds {held}, at least {FEWEST} are needed to learn from.")
-    for k, path in enumerate(sessions, 1):
+    names = {path: path.relative_to(folder).as_posix() for path in sessions}
+    for name in healthy:
+        if name not in names.values():
+            raise UnknownName.of(f"session below {folder}", name, tuple(names.values()))
+    for k, (path, name) in enumerate(names.items(), 1):
         tell(f"examining {path.name}, {k} of {len(sessions)}")
         try:
-            found.append(learned_session(examine(read_session(path))))
+            result = examine(read_session(path))
+            walks.append(measured_walk(result, name))
+            found[name] = learned_session(result)
         except Exception as why:
-            left_out[path.relative_to(folder).as_posix()] = told_failure(why)
+            left_out[name] = told_failure(why)
     tell("learning")
-    return learned_together(folder, found, left_out)
+    chosen = [one for one in walks if one.session in (healthy or found)]
+    return learned_together(folder, list(found.values()), left_out, healthy_reference(chosen, walks))
 
 
 def learned_session(result: SessionResult) -> LearnedSession:
@@ -175,9 +189,7 @@ def learned_session(result: SessionResult) -> LearnedSession:
     seen = [SeenValue("camera_noise", name, own.camera, "m"), SeenValue("plate_noise_fz", name, own.plate[2], "N/rtHz")]
     if result.standing is not None:
         seen += _standing(result, name)
-    curves = tuple(group for one in session_movement(result) for group in one.groups)
-    person = session.subject.name or name
-    return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)), person, curves)
+    return LearnedSession(name, null, own, (*seen, *seen_by_witnesses(session.trials, name, mass)))
 
 
 def _standing(result: SessionResult, name: str) -> list[SeenValue]:
@@ -195,10 +207,24 @@ def _standing(result: SessionResult, name: str) -> list[SeenValue]:
     return found
 
 
-def learned_together(archive: Path, sessions: list[LearnedSession], left_out: Mapping[str, str]) -> LearnedLaboratory:
-    """Return what the sessions teach together; SessionRefused with fewer than three."""
+def learned_together(
+    archive: Path,
+    sessions: list[LearnedSession],
+    left_out: Mapping[str, str],
+    healthy: HealthyReference = NO_REFERENCE,
+) -> LearnedLaboratory:
+    """Return what the sessions teach together, beside the ``healthy`` reference.
+
+    Raises
+    ------
+    SessionRefused
+        Fewer than three sessions, and no band of healthy people.
+    """
+    names, seen = tuple(one.name for one in sessions), norms([row for one in sessions for row in one.seen])
     if len(sessions) < FEWEST:
         why = " ".join(f"{name}: {reason}" for name, reason in list(left_out.items())[:FEWEST])
+        if healthy.normal:
+            return LearnedLaboratory(archive, now(), None, seen, names, {}, dict(left_out), healthy)
         raise SessionRefused(
             f"{archive}: {len(sessions)} of {len(sessions) + len(left_out)} sessions can be learned from, at least "
             f"{FEWEST} are needed. {why}"
@@ -210,21 +236,5 @@ def learned_together(archive: Path, sessions: list[LearnedSession], left_out: Ma
         f"{_WORTH:g} sessions more"
     )
     tolerances = replace(found, origin=origin, instruments=usual_noise([one.instruments for one in sessions]))
-    return LearnedLaboratory(
-        archive,
-        created,
-        tolerances,
-        norms([row for one in sessions for row in one.seen]),
-        tuple(one.name for one in sessions),
-        shown_by(nulls, tolerances),
-        dict(left_out),
-        normal_curves(_by_person(sessions)),
-    )
-
-
-def _by_person(sessions: list[LearnedSession]) -> dict[str, list[CurveGroup]]:
-    """Return the curves of every person over all their sessions."""
-    people: dict[str, list[CurveGroup]] = {}
-    for one in sessions:
-        people.setdefault(one.person or one.name, []).extend(one.curves)
-    return people
+    shown = shown_by(nulls, tolerances)
+    return LearnedLaboratory(archive, created, tolerances, seen, names, shown, dict(left_out), healthy)

@@ -1,14 +1,17 @@
 """What moved in a visit: every trial's events, cycles and curves, with the parameters that the visit identified."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from biodance import display
 from biodance.cycles.curves import NormalCurve
-from biodance.cycles.cut import STRIDE_UNITS
 from biodance.cycles.movement import TrialMovement
+from biodance.cycles.scores import DeviationReference, GaitScores, gait_scores
+from biodance.cycles.strides import STRIDE_UNITS
+from biodance.cycles.summary import Repetitions, repetitions_of
 from biodance.errors import BiodanceError
 from biodance.lab.session.read import read_session
 from biodance.pipeline.lab_file import read_lab
@@ -41,6 +44,10 @@ class SessionMovement:
         Trial -> why nothing is told of its movement.
     normal : tuple of NormalCurve
         Bands of the laboratory's own people to be shown behind (`learn_laboratory`).
+    normal_beside : tuple of NormalCurve
+        The same of plug-in gait's own angles: its scores are told against these.
+    deviation : DeviationReference or None
+        What the gait deviation index is told against.
 
     Examples
     --------
@@ -54,6 +61,8 @@ class SessionMovement:
     mass: float
     left_out: dict[str, str]
     normal: tuple[NormalCurve, ...] = ()
+    normal_beside: tuple[NormalCurve, ...] = ()
+    deviation: DeviationReference | None = None
 
     def __repr__(self) -> str:
         said = ", ".join(f"{one.trial} {one.told}" for one in self.trials if one.cycles)
@@ -68,6 +77,25 @@ class SessionMovement:
 
     def __iter__(self) -> Iterator[TrialMovement]:
         return iter(self.trials)
+
+    @cached_property
+    def repetitions(self) -> Mapping[str, Repetitions]:
+        """All good repetitions over all trials, by kind ("gait", "squat", "sit_to_stand"), the kinds that there are."""
+        kinds = dict.fromkeys(cycle.kind for one in self.trials for cycle in one.cycles)
+        return {kind: repetitions_of(kind, self.trials) for kind in kinds}
+
+    @property
+    def gait(self) -> Repetitions | None:
+        """All good gait cycles; None where nobody walks."""
+        return self.repetitions.get("gait")
+
+    @cached_property
+    def scores(self) -> tuple[GaitScores | None, GaitScores | None]:
+        """Gait scores of our angles and of those in the files; None without a reference."""
+        if self.gait is None:
+            return None, None
+        ours = gait_scores(self.gait.curves, self.normal, self.deviation)
+        return ours, gait_scores(self.gait.file_curves, self.normal_beside)
 
     def table(self) -> "pd.DataFrame":
         """Return mean and sd of every curve of every trial.
@@ -162,7 +190,9 @@ def describe_movement(
     if not isinstance(session, SessionResult):
         read = session if isinstance(session, Session) else read_session(session, tell=tell)
         session = examine(read, tell=tell)
-    return replace(session_movement(session, tell=tell), normal=read_lab(lab).normal)
+    known = read_lab(lab)
+    moved = session_movement(session, tell=tell)
+    return replace(moved, normal=known.normal, normal_beside=known.beside, deviation=known.deviation)
 
 
 @one_thread()

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.special import ndtr
 
-from biodance.cycles.curves import KeyValue, key_values, leading_foot, stride_values
+from biodance.cycles.keys import KeyValue, key_values, leading_foot, stride_values
 from biodance.errors import BiodanceError
 from biodance.identification.knowledge import SIGMAS, Known
 from biodance.identification.sessions import Difference, differences

@@ -44,9 +44,9 @@ def _elsewhere(finding: Finding) -> str:
 
 
 def _estimated(one: Estimate) -> str:
-    """Return a parameter with its standard deviation as people say it: ``gain 6 ± 0.2 %``."""
+    """Return a parameter with its 95 % interval as people say it: ``gain 6 ± 0.4 %``."""
     factor, unit = shown_unit(one.unit)
-    return f"{spaced(one.name)} {digits(factor * one.value, 2)} ± {digits(factor * one.sd, 1)} {unit}".strip()
+    return f"{spaced(one.name)} {digits(factor * one.value, 2)} ± {digits(SIGMAS * factor * one.sd, 1)} {unit}".strip()
 
 
 def cause_of(checked: str, findings: Sequence[Finding]) -> str:

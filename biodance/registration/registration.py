@@ -8,6 +8,7 @@ import numpy as np
 
 from biodance import display
 from biodance.errors import TrialRefused
+from biodance.identification.knowledge import SIGMAS
 from biodance.records import Array, Plate, freeze
 from biodance.registration.alignment import Alignment, Forces, FramePose
 from biodance.registration.refinement import ENOUGH_ROWS, HEIGHT_SD, Refined
@@ -133,11 +134,11 @@ class Registration:
         if self.pose is None:
             return f"Registration({self.status}: {self.reason})"
         where = ", ".join(
-            f"{one.name} at {one.position[0]:.3f}, {one.position[1]:.3f} m ± {1e3 * one.sd[:2].max():.0f} mm, "
-            f"{np.degrees(one.yaw):.1f} ± {np.degrees(one.yaw_sd):.1f} deg"
+            f"{one.name} at {one.position[0]:.3f}, {one.position[1]:.3f} m ± {1e3 * SIGMAS * one.sd[:2].max():.0f} mm, "
+            f"{np.degrees(one.yaw):.1f} ± {np.degrees(SIGMAS * one.yaw_sd):.1f} deg"
             for one in self.plates
         )
-        late = f"delay {1e3 * self.pose.delay:.1f} ± {1e3 * self.delay_sd:.1f} ms"
+        late = f"delay {1e3 * self.pose.delay:.1f} ± {1e3 * SIGMAS * self.delay_sd:.1f} ms"
         return f"Registration({self.status}: {late}, {where})"
 
     def _repr_html_(self) -> str:

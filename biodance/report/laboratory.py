@@ -3,7 +3,8 @@
 
 ``[laboratory]`` says when and from what; ``[tolerances]`` is what the diagnosis needs (`uncertainty.tolerances`),
 every size with what it rests on; ``[norms."..."]`` is what is usual of instruments, people and observations;
-``[normal."..."]`` are bands of joint angles, moments and powers. Corrections that were accepted stand in
+``[normal."..."]`` are bands of joint angles, moments and powers of healthy people, ``[gait_deviation_index]`` what that
+index is told against. Corrections that were accepted stand in
 ``[corrections]`` of the same file.
 """
 
@@ -13,6 +14,8 @@ import re
 from rich.console import Console
 
 from biodance.cycles.curves import normal_toml
+from biodance.cycles.scores import deviation_toml
+from biodance.pipeline.lab_file import PLUG_IN_GAIT
 from biodance.pipeline.learn import LearnedLaboratory
 from biodance.report.plates import print_left_out
 from biodance.report.tables.schema import Row, Schema
@@ -31,10 +34,10 @@ NORM_ROW = Schema(
 
 def learned_document(found: LearnedLaboratory) -> Row:
     """Return what was learned: sessions, norms, and the sizes that changed most."""
-    before = shipped()
+    before, own = shipped(), found.tolerances
     ratio = {
         key: size / before.size(key)
-        for key, size in found.tolerances.sizes.items()
+        for key, size in (own.sizes if own else {}).items()
         if before.size(key) > 0 and found.shown.get(key, 0.0) >= HARDLY
     }
     most = sorted(ratio, key=lambda key: -max(ratio[key], 1 / ratio[key]))[:10]
@@ -44,9 +47,14 @@ def learned_document(found: LearnedLaboratory) -> Row:
         "learned_utc": found.created,
         "norms": NORM_ROW.rows(found.norms),
         "changed_most": [
-            {"key": key, "size": found.tolerances.size(key), "shipped": before.size(key), "values": found.shown[key]}
+            {"key": key, "size": own.size(key), "shipped": before.size(key), "values": found.shown[key]}
             for key in most
+            if own
         ],
+        "healthy": {
+            "bands": [Schema("kind quantity unit people").row(one) for one in found.healthy.normal],
+            "gait_deviation_index": found.healthy.deviation is not None,
+        },
     }
 
 
@@ -66,11 +74,16 @@ def lab_file_text(found: LearnedLaboratory) -> str:
         *[f"# left out: {name}: {' '.join(why.split())}" for name, why in found.left_out.items()],
         "",
     ]
-    return "\n".join([*head, *_tolerances(found), "", *_norms(found), *normal_toml(found.normal)]).rstrip() + "\n"
+    healthy = found.healthy
+    bands = [*normal_toml(healthy.normal), *normal_toml(healthy.beside, PLUG_IN_GAIT)]
+    bands += [*(deviation_toml(healthy.deviation) if healthy.deviation else ())]
+    return "\n".join([*head, *_tolerances(found), "", *_norms(found), *bands]).rstrip() + "\n"
 
 
 def _tolerances(found: LearnedLaboratory) -> list[str]:
     """Return the lines of ``[tolerances]``, every size with what it rests on."""
+    if found.tolerances is None:
+        return ["# Too few sessions without fault for tolerances of its own: the shipped ones hold."]
     lines, before, within = [], shipped(), ""
     for line in to_toml(found.tolerances, under="tolerances").splitlines():
         within = line if line.startswith("[") else within
@@ -109,4 +122,8 @@ def print_learned(document: Row, console: Console) -> None:
     print_table(NORM_ROW, document["norms"], console)
     for one in document["changed_most"]:
         print_line(console, f"{one['key']}: {one['size']:.3g} instead of {one['shipped']:.3g}")
+    if bands := document["healthy"]["bands"]:
+        people = max(one["people"] for one in bands)
+        index = "with" if document["healthy"]["gait_deviation_index"] else "too few legs or strides for"
+        print_line(console, f"Healthy reference: {people} people, {len(bands)} curves, {index} gait deviation index.")
     print_left_out(document["left_out"], console)

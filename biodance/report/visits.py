@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 
-from biodance.cycles.curves import ANGLE_PANELS, LOAD_PANELS, CurveGroup
+from biodance.cycles.curves import CurveGroup
 from biodance.cycles.cut import PERCENT
+from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
 from biodance.display import BLUE, GREY, RED, spaced
 from biodance.pipeline.provenance import now, provenance
 from biodance.pipeline.visit_quantities import ComparedQuantity, Untested
 from biodance.pipeline.visits import VisitComparison
+from biodance.report.figures.cycles import CYCLE_AXES, LEAST_SPANS, curve_title
 from biodance.report.figures.vector import Curve, CurveFigure, Strip, Stroke
 from biodance.report.files import for_spreadsheets, write_files
-from biodance.report.pages.movement import CYCLE_AXES, CYCLE_KINDS, LEAST_SPANS, curve_title
+from biodance.report.pages.movement import CYCLE_KINDS
 from biodance.report.pages.template import print_sheet, render, template_text
 from biodance.report.tables.schema import Row, Schema, plain_values, table_of, to_text
 from biodance.report.tables.session import PROVENANCE_ROW
@@ -164,7 +166,7 @@ def visits_figure(found: VisitComparison, kind: str, side: str, quantities: Sequ
     if not cells:
         return ""
     about = f"{CYCLE_KINDS[kind]}, {side} side, all visits on one plot"
-    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="± 1 sd between cycles").html()
+    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band="one sd between cycles").html()
 
 
 def _counts(some: Sequence[CurveGroup | None]) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from biodance.display import SHOWN_UNITS, cause_in_words, spaced
+from biodance.identification.knowledge import SIGMAS
 from biodance.records.attention import Attention
 
 _ABSURD = 30.0
@@ -100,17 +101,18 @@ def causes_by_effect(causes: Iterable[tuple[str, str]]) -> str:
 
 
 def sizes_in_words(parameters: dict[str, dict[str, Any]]) -> str:
-    """Return the parameters of a finding (its JSON) with their standard deviations; three axes as one vector."""
+    """Return the parameters of a finding (its JSON) with their 95 % intervals; three axes as one vector."""
     vectors = {name: row for name, row in parameters.items() if isinstance(row["value"], list)}
     rows = {name: row for name, row in parameters.items() if name.rpartition("_")[0] not in vectors}
     return ", ".join(f"{spaced(name)} {_size_in_words(row)}" for name, row in rows.items())
 
 
 def _size_in_words(row: dict[str, Any]) -> str:
-    """Return a value, or three, with their standard deviations and unit: ``−19, −186, −28 ± 41, 75, 40 mm``."""
-    parts = [row[key] if isinstance(row[key], list) else [row[key]] for key in ("value", "sd")]
+    """Return a value, or three, with half their 95 % intervals and unit: ``−19, −186, −28 ± 41, 75, 40 mm``."""
     factor, unit, digits = SHOWN_UNITS.get(row["unit"], (1.0, row["unit"], 2))
-    said = [", ".join(format_number(factor * x, digits) for x in part if x is not None) for part in parts]
+    parts = [(row["value"], factor), (row["sd"], SIGMAS * factor)]
+    several = [(one if isinstance(one, list) else [one], scale) for one, scale in parts]
+    said = [", ".join(format_number(scale * x, digits) for x in part if x is not None) for part, scale in several]
     return f"{' ± '.join(filter(None, said))} {unit}".strip()
 
 
@@ -126,3 +128,8 @@ def trial_and_subject(one: Attention) -> str:
         return one.trial if about else f"Trial {one.trial}"
     place = f", {one.trial}" if one.trial else ""
     return f"{about[:1].upper()}{about[1:]}{place}" or "Session"
+
+
+def first_upper(text: str) -> str:
+    """Return ``text`` with a capital first letter and nothing else changed."""
+    return text[:1].upper() + text[1:]

@@ -30,6 +30,7 @@ from biodance.report.pages.movement import movement_section
 from biodance.report.pages.session import page
 from biodance.report.pages.subject import subject_page
 from biodance.report.tables.diagnosis import ATTENTION_ROW, JUDGED_ROW, cause_name, diagnosis_document
+from biodance.report.tables.gait import gait_document
 from biodance.report.tables.identification import corrected_document, identification_document
 from biodance.report.tables.schema import plain_values, to_text
 from biodance.report.tables.session import PROVENANCE_ROW, filter_document, movement_document, results_document
@@ -57,6 +58,7 @@ def write_report(
         "attention": ATTENTION_ROW.rows(first),
         "judged": JUDGED_ROW.rows(judged),
         "movement": movement_document(movement),
+        "gait": gait_document(movement),
     }
     found: dict[str, Any] = plain_values(numbers)
     files = {_NUMBERS: to_text(found), METHODS: methods_text(found)}
@@ -75,9 +77,15 @@ def _kept(result: SessionResult, folder: Path) -> dict[str, str]:
     return {BODY_FILE if fit is not None else SCALED: body_text(*body_of_result(result))}
 
 
-def write_subject_page(result: SessionResult, folder: Path, *, diagnosis: SessionDiagnosis | None = None) -> Path:
+def write_subject_page(
+    result: SessionResult,
+    folder: Path,
+    *,
+    diagnosis: SessionDiagnosis | None = None,
+    movement: SessionMovement | None = None,
+) -> Path:
     """Write ``subject.html``, the page for the person who was measured, into ``folder`` and return its path."""
-    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis))})
+    write_files(folder, {SUBJECT_PAGE: subject_page(account_for(result, diagnosis, movement))})
     return folder / SUBJECT_PAGE
 
 
@@ -104,6 +112,7 @@ def write_identification(
         "corrected": corrected_document(found),
         "filter": filter_document(result),
         "movement": movement_document(movement),
+        "gait": gait_document(movement),
         "provenance": PROVENANCE_ROW.row(made),
     }
     told: dict[str, Any] = plain_values(numbers)
@@ -134,6 +143,7 @@ def write_diagnosis(
         **diagnosis_document(found),
         "filter": filter_document(result),
         "movement": movement_document(movement),
+        "gait": gait_document(movement),
         "failures": failures,
         "provenance": PROVENANCE_ROW.row(made),
     }

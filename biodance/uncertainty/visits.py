@@ -149,9 +149,10 @@ def placement_sd(of: KeyKind) -> float:
       which turns a segment by that over the lever of its markers. Skin over pelvis and trunk goes with the limbs by
       ``slide``, each of four markers by itself. A range has no shift.
     - A moment (N·m/kg) changes by the weight of 1 kg times centre at the most, a power (W/kg) by that times ``rate``.
-    - A stride's length changes by marker, a step's length and width, of two feet, by sqrt(2) marker, a speed by marker
-      times ``rate``. Stance (% of the stride) and step time change by `_EVENT`, double support by sqrt(2) of it;
-      stride time and cadence, from one strike of a foot to its next, by nothing.
+    - A stride's length changes by marker, a step's length and width, of two feet, and a margin by sqrt(2) marker, a
+      speed by marker times ``rate``. Stance (% of the stride) and the times of a step, on the ground and in the air
+      change by `_EVENT`, double support by sqrt(2) of it; stride time and cadence, from one strike of a foot to its
+      next, by nothing.
     """
     if of.unit == "deg":
         return _of_angle(of)
@@ -164,7 +165,11 @@ def placement_sd(of: KeyKind) -> float:
         "speed": marker * of.rate,
         "step_length": two * marker,
         "step_width": two * marker,
+        "margin_aside": two * marker,
+        "margin_ahead": two * marker,
         "step_time": _EVENT,
+        "contact_time": _EVENT,
+        "flight_time": _EVENT,
         "stance": 100 * _EVENT * of.rate,
         "double_support": 100 * two * _EVENT * of.rate,
     }

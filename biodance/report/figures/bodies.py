@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from biodance.display import BLACK, BLUE, GREEN, GREY, RED, Interval, spaced
+from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, Interval, spaced
 from biodance.identification.identification import Identification
 from biodance.identification.knowledge import known_interval
 from biodance.report.figures.vector import Axis, Frame, Stroke, panel, points, segments
@@ -13,8 +13,8 @@ ROW = 19.0
 """px of a segment's row."""
 _LIGHT = 5.0
 """kg: segments below are drawn in a panel of their own, or their intervals could not be seen beside the trunk's."""
-_INSIDE = {"known": "", "partly known": "#f2b08a", "cannot be known": "#fff"}
-_WORDS = ("grey ring: table", "orange point: identified, known", "pale: partly known", "black ring: cannot be known")
+_INSIDE = {"known": "", "partly known": "#8fd1b9", "cannot be known": "#fff"}
+_WORDS = ("grey ring: table", "green point: identified, known", "pale: partly known", "black ring: cannot be known")
 _SHAPE = (
     *((f"com {axis}", 1000.0, f"centre of mass, {axis} (mm)") for axis in "xyz"),
     *((f"I{axis}{axis}", 1.0, f"inertia I{axis}{axis} (kg·m²)") for axis in "xyz"),
@@ -61,7 +61,7 @@ def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load
     y = Axis(-0.6, len(rows) - 0.4, "", ticks)
     marks = []
     for (at, _), row in zip(ticks, rows, strict=True):
-        edge = BLACK if row.known == "cannot be known" else RED
+        edge = BLACK if row.known == "cannot be known" else GREEN
         for up, (value, low, high), colour, inside, wide in (
             (at + 0.17, row.before, GREY, "#fff", 1.0),
             (at - 0.17, row.after, edge, _INSIDE[row.known], 1.8),
@@ -70,7 +70,7 @@ def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load
             marks.append(points(x, y, np.array([value]), np.array([up]), Stroke(colour), inside=inside, size=6.5))
         if load is not None and row.name == load[0]:
             ends = np.array([[row.after[0] - load[1], at - 0.4], [row.after[0], at - 0.4]])
-            marks.append(segments(x, y, ends, Stroke(GREEN, "", 2.4)))
+            marks.append(segments(x, y, ends, Stroke(PINK, "", 2.4)))
         if row.name in beside:
             marks.append(points(x, y, np.array([beside[row.name]]), np.array([at]), Stroke(BLUE)))
     frame = Frame(height=ROW * len(rows), left=112.0, above=4.0)
@@ -78,6 +78,6 @@ def _forest(rows: Sequence[Interval], beside: dict[str, float], label: str, load
 
 
 def _with_legend(drawn: Sequence[str], paper: Identification | None, load: _Load) -> str:
-    more = {"blue point: the paper's programme": paper is not None, "green: load": load is not None}
+    more = {"blue point: the paper's programme": paper is not None, "pink: load": load is not None}
     legend = "".join(f"<span>{word}</span>" for word in (*_WORDS, *(word for word, there in more.items() if there)))
     return f'<div class="legend">{legend}</div><div class="cells">{"".join(drawn)}</div>'

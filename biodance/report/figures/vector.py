@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biodance.display import BLACK, BLUE, GREY, RED
+from biodance.display import BLACK, BLUE, GREEN, GREY, RED
 from biodance.records import Array, runs
 from biodance.report.wording import format_number
 
@@ -40,7 +40,8 @@ class Stroke:
         return f'stroke="{self.colour}" stroke-width="{self.width:g}"{dash}'
 
 
-MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(BLUE, "6 3"), Stroke(RED, "2 2", 1.6)
+MEASURED, TABLE, IDENTIFIED = Stroke(BLACK), Stroke(GREY, "6 3"), Stroke(GREEN, "2 2", 1.6)
+"""No side of the body: blue is right, red left alone."""
 LEFT_SIDE, RIGHT_SIDE, MIDDLE_SIDE = Stroke(RED, "5 3"), Stroke(BLUE), Stroke(GREY)
 
 
@@ -231,6 +232,8 @@ _MUCH = 0.7
 """Share of used frames below which a figure begins with these."""
 _NARROW, _TALL = 46.0, 110.0
 """px of the height of a difference and of a curve."""
+_THREE = 300.0
+"""px of width below which three panels stand beside each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +252,8 @@ class Curve:
 @dataclass(frozen=True, eq=False)
 class Strip:
     """Curves that share one y axis: ``title`` says what it is, with its unit; ``least`` what the axis spans at least;
-    ``even`` puts zero in the middle (a difference); ``shown`` (T,) True where values decide what the axis spans.
+    ``even`` puts zero in the middle (a difference); ``shown`` (T,) True where values decide what the axis spans;
+    ``rules`` upright lines, each at a place on the x axis.
     """
 
     title: str
@@ -257,6 +261,7 @@ class Strip:
     least: float = 0.0
     even: bool = False
     shown: NDArray[np.bool_] | None = None
+    rules: Sequence[tuple[float, Stroke]] = ()
 
     @property
     def axis(self) -> Axis:
@@ -280,7 +285,8 @@ class CurveFigure:
 
     ``time`` (T,); ``about`` what it shows, one sentence; ``used`` (T,) False where frames are left out (grey);
     ``trial`` makes the cursor go with the replay of that trial; ``label`` of the time axis; ``band`` what bands mean;
-    ``filled`` (T,) True where angles rest on markers that were put into a gap (yellow).
+    ``filled`` (T,) True where angles rest on markers that were put into a gap (yellow); ``width`` px of a panel: of
+    narrow ones three stand beside each other.
     """
 
     time: Array
@@ -291,6 +297,7 @@ class CurveFigure:
     label: str = "time (s)"
     band: str = "95 % interval"
     filled: NDArray[np.bool_] | None = None
+    width: float = 390.0
 
     def html(self) -> str:
         """Return the figure as HTML: legend of switches, panels, and a line that tells the values at the cursor."""
@@ -305,7 +312,7 @@ class CurveFigure:
         return (
             f'<div class="curves" role="group" aria-label="{escape(self.about)}"{trial}>'
             f'<div class="legend">{self._legend(bool(left_out), bool(filled))}</div><p class="reading"></p>'
-            f'<div class="cells">{cells}</div></div>'
+            f'<div class="cells{" three" * (self.width < _THREE)}">{cells}</div></div>'
         )
 
     def _first_view(self, x: Axis) -> str:
@@ -323,6 +330,7 @@ class CurveFigure:
         for i, strip in enumerate(strips):
             y = strip.axis
             marks = list(shades) + ([rule(y, 0.0, upright=False)] if y.low < 0 < y.high else [])
+            marks += [rule(x, at, upright=True, look=look) for at, look in strip.rules]
             for one in strip.curves:
                 if one.half_width is not None:
                     low, high = one.values - one.half_width, one.values + one.half_width
@@ -330,7 +338,7 @@ class CurveFigure:
                 marks.append(curve_line(x, y, self.time, one.values, one.look, name=one.name, kind=one.kind))
             height, last = _NARROW if strip.even else _TALL, i == len(strips) - 1
             about = f"{strip.title}: {', '.join(dict.fromkeys(one.name for one in strip.curves))}"
-            out.append(panel(x, y, marks, about, frame=Frame(height=height), numbers=last))
+            out.append(panel(x, y, marks, about, frame=Frame(self.width, height), numbers=last))
         return "".join(out)
 
     def _legend(self, left_out: bool, filled: bool) -> str:

@@ -38,6 +38,7 @@ from biodance.report.tables.schema import Row, Schema
 from biodance.report.wording import (
     NEVER,
     causes_by_effect,
+    first_upper,
     format_number,
     moment,
     share_of,
@@ -120,11 +121,6 @@ def limits_figure(rows: tuple[Unobservable, ...]) -> str:
     about = "per kind of cause the smallest size that this session would have seen"
     drawn = panel(x, y, marks, about, frame=Frame(480.0, 16.0 * len(order), left=130.0, above=4.0))
     return f'<div class="single">{drawn}</div>'
-
-
-def first_upper(text: str) -> str:
-    """Return ``text`` with a capital first letter and nothing else changed."""
-    return text[:1].upper() + text[1:]
 
 
 def estimated(one: Estimate) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from biodance.display import BLACK, BLUE, GREY, RED, spaced
+from biodance.display import BLACK, BLUE, GREEN, GREY, PINK, RED, spaced
 from biodance.identification.knowledge import QUANTITIES
 from biodance.identification.load_words import say_load
 from biodance.identification.sessions import certain_changes
@@ -92,7 +92,7 @@ _RANKED = 15
 
 def impact_figure(found: Sequence[Impact]) -> str:
     """Return the quantities with the largest impact: left the pull from the prior with what is left of its standard
-    deviation, right what that does to the moments of knee (blue) and hip (orange ring).
+    deviation, right what that does to the moments of knee (green) and hip (pink ring).
     """
     rows = list(found[:_RANKED])
     ticks = tuple((len(rows) - 1.0 - i, spaced(f"{row.segment} {row.quantity}")) for i, row in enumerate(rows))
@@ -107,13 +107,13 @@ def impact_figure(found: Sequence[Impact]) -> str:
         ends = np.array([[row.pull - row.left, at], [row.pull + row.left, at]])
         left += [segments(pulled, y, ends, Stroke(BLACK)), _point(pulled, y, row.pull, at, Stroke(BLACK))]
         knee, hip = (np.array([[0.0, at + up], [size, at + up]]) for up, size in ((0.16, row.knee), (-0.16, row.hip)))
-        right += [segments(moment, y, knee, Stroke(BLUE, "", 2.0)), segments(moment, y, hip, Stroke(RED, "4 2", 2.0))]
-        right += [_point(moment, y, row.knee, at + 0.16, RIGHT_SIDE)]
-        right += [_point(moment, y, row.hip, at - 0.16, LEFT_SIDE, inside="#fff")]
+        right += [segments(moment, y, knee, Stroke(GREEN, "", 2.0)), segments(moment, y, hip, Stroke(PINK, "4 2", 2.0))]
+        right += [_point(moment, y, row.knee, at + 0.16, Stroke(GREEN))]
+        right += [_point(moment, y, row.hip, at - 0.16, Stroke(PINK), inside="#fff")]
     frame = Frame(height=ROW * len(rows), left=138.0, above=4.0)
     drawn = panel(pulled, y, left, "pull of every quantity", frame=frame)
     drawn += panel(moment, y, right, "impact on knee and hip", frame=frame)
-    words = ("grey: one prior standard deviation", "blue point: knee flexion", "orange ring: hip flexion")
+    words = ("grey: one prior standard deviation", "green point: knee flexion", "pink ring: hip flexion")
     legend = "".join(f"<span>{word}</span>" for word in words)
     return f'<div class="legend">{legend}</div><div class="cells">{drawn}</div>'
 
@@ -155,7 +155,7 @@ def torque_figure(bands: TorqueBands) -> str:
             curves.append(Curve(f"{side or 'trunk'} identified", torque, look, half))
             curves.append(Curve(f"{side or 'trunk'} with the table", table, Stroke(look.colour, "1 3", 0.9)))
         cells.append([Strip(f"{title} (N·m)", curves, 4.0)])
-    about = "Torques of the large joints; the largest values are in the table below"
+    about = "Moments of the large joints; the largest values are in the table below"
     filled = bands.state == AngleState.FILLED
     return CurveFigure(bands.time, cells, about, bands.use, bands.trial, filled=filled).html()
 

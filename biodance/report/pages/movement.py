@@ -1,163 +1,204 @@
-"""The section of the report on what moved: tables, figures and sentences; computes nothing."""
+"""The section of the report on how the person moved: figures, tables and sentences of one record; computes nothing.
 
+All good repetitions of all trials together, one part for each kind; the window of the laboratory shows the same.
+"""
+
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from biodance.cycles.curves import ANGLE_PANELS, LOAD_PANELS, CurveGroup, NormalCurve
-from biodance.cycles.cut import PERCENT, STRIDE_UNITS
-from biodance.cycles.movement import TrialMovement
-from biodance.display import GREY, spaced
-from biodance.identification.knowledge import SIGMAS
+from biodance.cycles.curves import NormalCurve
+from biodance.cycles.keys import ANGLE_PANELS, LOAD_PANELS
+from biodance.cycles.scores import SCORE_ANGLES, GaitScores
+from biodance.cycles.summary import KeySummary, LeftOutBecause, Repetitions, Spread
+from biodance.display import spaced
 from biodance.pipeline.movement import SessionMovement
-from biodance.report.figures.vector import LEFT_SIDE, MIDDLE_SIDE, RIGHT_SIDE, Curve, CurveFigure, Strip, Stroke
+from biodance.records import SIDES
+from biodance.report.figures.cycles import GROUND_PANELS, consistency_figure, pressure_figure, repetitions_figure
 from biodance.report.pages.template import render
 from biodance.report.tables.schema import Row, Schema
 from biodance.report.tables.session import FILE_ANGLE_ROW
-from biodance.report.wording import format_number
-
-_LOOKS = {"left": LEFT_SIDE, "right": RIGHT_SIDE, "middle": MIDDLE_SIDE}
-_NORMAL = Stroke(GREY, "1 3", 0.8)
-_THIN = 0.4
-"""px of one repetition."""
-_MOST = 12
-"""Repetitions of a side that are drawn; the mean is over all."""
-LEAST_SPANS = {"deg": 10.0, "N·m/kg": 0.2, "W/kg": 0.5, "m": 0.05}
-"""What an axis spans at least, by unit."""
-POSITIVE: Mapping[str, str] = {
-    "pelvis_tilt": "forwards +",
-    "pelvis_obliquity": "own side up +",
-    "pelvis_rotation": "own side forwards +",
-    "hip_rotation": "inwards +",
-    "foot_progression": "inwards +",
-    "trunk_bending": "own side down +",
-    "trunk_rotation": "own side forwards +",
-}
-"""The positive sense where the name does not say it, in a gait cycle."""
-_BOTH: Mapping[str, str] = {
-    "pelvis_obliquity": "right side up +",
-    "pelvis_rotation": "right side forwards +",
-    "trunk_bending": "to the right +",
-    "trunk_rotation": "to the left +",
-}
-"""The same where both sides move alike."""
-CYCLE_AXES = {"gait": "% of the gait cycle", "squat": "% of the squat", "sit_to_stand": "% of the rise"}
-
-
-def movement_figure(
-    one: TrialMovement, kind: str, quantities: Sequence[str], normal: Sequence[NormalCurve] = ()
-) -> str:
-    """Return one panel for each quantity of the cycles of a ``kind``, before the ``normal`` bands of the laboratory's
-    own people; "" where none is known.
-
-    Bands of angles are one sd between repetitions; of moments and powers the 95 % that the inertial parameters leave
-    uncertain in the mean.
-    """
-    groups = [group for group in one.groups if group.kind == kind and np.isfinite(group.mean).any()]
-    cells = []
-    for quantity in quantities:
-        same = [group for group in groups if group.quantity == quantity]
-        if same:
-            behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (kind, quantity, same[0].unit)]
-            usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
-            curves = [*usual, *_curves(same)]
-            cells.append([Strip(curve_title(same[0]), curves, least=LEAST_SPANS.get(same[0].unit, 0.0))])
-    if not cells:
-        return ""
-    loads = quantities == LOAD_PANELS
-    about = f"{'Moments and powers' if loads else 'Angles'} of trial {one.trial}, left beside right"
-    band = "95 %, inertial parameters" if loads else "± 1 sd, repetitions"
-    if any(n.kind == kind for n in normal):
-        band += "; grey: ± 1 sd, people"
-    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[kind], band=band).html()
-
-
-def curve_title(group: CurveGroup) -> str:
-    """Return what a panel of curves shows: quantity, unit, and which way is positive where the name does not say it."""
-    name = spaced(group.quantity)
-    sense = (POSITIVE if group.kind == "gait" else {**POSITIVE, **_BOTH}).get(group.quantity)
-    return f"{name} ({group.unit}{f', {sense}' if sense else ''})"
-
-
-def _curves(groups: Sequence[CurveGroup]) -> list[Curve]:
-    """Return the repetitions of each side, thin, then its mean with the band."""
-    curves = []
-    for group in groups:
-        look = _LOOKS[group.side]
-        thin = Stroke(look.colour, look.dash, _THIN)
-        half = group.sd if group.unit in ("deg", "m") else SIGMAS * group.parameters_sd
-        if len(group.values) > 1:
-            curves += [Curve(group.side, values, thin, kind="each") for values in group.values[:_MOST]]
-        curves.append(Curve(group.side, group.mean, look, half if np.isfinite(half).any() else None))
-    return curves
-
+from biodance.report.wording import first_upper, format_number
 
 CYCLE_KINDS = {"gait": "Walking", "squat": "Squats", "sit_to_stand": "Rises from a chair"}
-_DIGITS = {"m": 3, "m/s": 2, "s": 2, "%": 1, "steps/min": 0}
+_UPRIGHT = {"gait": "foot off", "squat": "lowest", "sit_to_stand": "off the seat"}
+_COUNTED = {"gait": "gait cycles", "squat": "squats", "sit_to_stand": "rises"}
+_BECAUSE = {
+    LeftOutBecause.SHARED_PLATE: "in {n} both feet were on one plate for a part, which has no loads",
+    LeftOutBecause.SPIKE: "{n} with a spike left out",
+    LeftOutBecause.TURN: "{n} left out because the person turned",
+}
+_DIGITS = {"m": 3, "m/s": 2, "s": 2, "steps/min": 0, "N·m/kg": 2, "W/kg": 2, "kN/m": 1, "%/s": 0}
+_FIRST = (
+    *("hip_flexion_maximum", "hip_flexion_minimum", "hip_adduction_maximum"),
+    *("knee_flexion_at_strike", "knee_flexion_maximum", "knee_flexion_range"),
+    *("ankle_dorsiflexion_maximum", "ankle_dorsiflexion_minimum", "foot_progression_mean"),
+    *("knee_flexion_moment_maximum", "ankle_dorsiflexion_moment_minimum", "ankle_power_maximum"),
+)
+"""Key values of walking that are seen at once; all others are folded."""
 
 
 @dataclass(frozen=True)
 class MovementPart:
-    """One trial with its figures, ready to be shown."""
+    """All repetitions of one kind, ready to be shown: what is drawn ("" = nothing), and rows of tables."""
 
-    moved: TrialMovement
-    figures: Sequence[tuple[str, str, str]]
+    title: str
+    told: str
+    upright: str
+    counted: str
+    flags: Sequence[str]
+    angles: str
+    loads: str
+    ground: str
+    consistency: str
+    trials: Sequence[str]
     values: Sequence[Row]
+    keys: Sequence[Row]
+    more_keys: Sequence[Row]
+
+
+_STRIDES = Schema("", shown="value: {value} | right: {right} | left: {left} | both: {both}")
+_KEYS = Schema(
+    "", shown="value: {value} | right: {right} | left: {left} | right less left: {apart} | symmetry (%): {symmetry}"
+)
+_FILE_KEYS = Schema("", shown=f"{_KEYS.shown} | plug-in gait right: {{file_right}} | left there: {{file_left}}")
+_PROFILE = Schema("", shown="score: {value} | right: {right} | left: {left}")
 
 
 def movement_section(moved: SessionMovement) -> str:
     """Return the section as HTML text; "" where no trial holds a repetition and none has another program's angles."""
-    parts = [_part(one, moved.normal) for one in moved if one.cycles]
+    parts = [_part(one, moved.normal) for one in moved.repetitions.values() if one.good]
     compared = [one for one in moved if one.file_angles]
     if not parts and not compared:
         return ""
-    filters = {"milli": _milli, "beside": _beside}
-    angles = [row for one in compared for row in FILE_ANGLE_ROW.rows(one.file_angles, trial=one.trial)]
+    beside = bool(moved.gait and moved.gait.file_curves)
     return render(
         "movement.html.j2",
-        filters=filters,
-        schemas={"strides": _STRIDES, "file_angle": FILE_ANGLE_ROW},
+        filters={"milli": _milli, "beside": _beside, "first_upper": first_upper},
+        schemas={
+            "strides": _STRIDES,
+            "keys": _FILE_KEYS if beside else _KEYS,
+            "file_angle": FILE_ANGLE_ROW,
+            "profile": _PROFILE,
+        },
         parts=parts,
+        **_scores(*moved.scores),
         compared=compared,
-        file_angles=angles,
+        file_angles=[row for one in compared for row in FILE_ANGLE_ROW.rows(one.file_angles, trial=one.trial)],
+        notes=list(dict.fromkeys(note for one in moved if one.cycles for note in one.notes)),
         moved=moved,
     )
 
 
-def _part(one: TrialMovement, normal: Sequence[NormalCurve]) -> MovementPart:
-    kinds = [kind for kind in CYCLE_KINDS if any(cycle.kind == kind for cycle in one.cycles)]
-    figures = [
-        (
-            CYCLE_KINDS[kind],
-            movement_figure(one, kind, ANGLE_PANELS, normal),
-            movement_figure(one, kind, LOAD_PANELS, normal),
-        )
-        for kind in kinds
-    ]
-    both, left, right = (one.spatiotemporal(side) for side in ("both", "left", "right"))
+def _part(found: Repetitions, normal: Sequence[NormalCurve]) -> MovementPart:
+    title = "Running" if found.runs else CYCLE_KINDS[found.kind]
+    rows = {one.name: _key(one) for one in found.keys}
+    first = (
+        _FIRST
+        if found.kind == "gait"
+        else tuple(one.name for one in found.keys if one.key == "range" and not one.middle)
+    )
+    ground = repetitions_figure(found, GROUND_PANELS, f"{title}: ground reaction, left beside right", normal)
+    both, left, right = (found.spatiotemporal(side) for side in ("both", "left", "right"))
     values = [
-        {
-            "value": f"{spaced(name)} ({STRIDE_UNITS[name]})",
-            "left": _value(name, left),
-            "right": _value(name, right),
-            "both": _value(name, both),
-        }
-        for name in both
+        {"value": f"{spaced(name)} ({unit})"}
+        | {side: _said(some.get(name), unit) for side, some in (("left", left), ("right", right), ("both", both))}
+        for name, unit in found.units.items()
+        if name in both
     ]
-    return MovementPart(one, figures, values)
+    return MovementPart(
+        title,
+        _told(found, both),
+        _UPRIGHT[found.kind],
+        f"{'Steps and strides' if found.kind == 'gait' else title}: mean (standard deviation; number).",
+        _flags(found),
+        repetitions_figure(found, ANGLE_PANELS, f"{title}: joint angles, left beside right", normal),
+        repetitions_figure(found, LOAD_PANELS, f"{title}: moments and powers, left beside right", normal),
+        ground.removesuffix("</div></div>") + f"{pressure_figure(found)}</div></div>" if ground else "",
+        consistency_figure(found),
+        found.trials,
+        values,
+        [rows[name] for name in first if name in rows],
+        [row for name, row in rows.items() if name not in first],
+    )
 
 
-_STRIDES = Schema("", shown="value: {value} | left: {left} | right: {right} | both: {both}")
+def _told(found: Repetitions, values: Mapping[str, Spread]) -> str:
+    """Return in one sentence how much was measured, and how fast somebody walked."""
+    counts = Counter(one.side for one in found.good)
+    sides = ", ".join(f"{counts[side]} {side}" for side in SIDES if counts[side])
+    trials = f"{len(found.trials)} trial{'s' * (len(found.trials) != 1)}"
+    number = f"{sides} {_COUNTED[found.kind]}" if sides else f"{len(found.good)} {_COUNTED[found.kind]}"
+    pace = ""
+    if "speed" in values:
+        pace = (
+            f"{format_number(values['speed'].mean, 2)} m/s, {format_number(values['cadence'].mean, 0)} steps a minute: "
+        )
+    return f"{pace}{number} of {trials}."
 
 
-def _value(name: str, found: dict[str, tuple[float, float, int]]) -> str:
-    """Return mean ± sd as text; the mean alone of one stride."""
-    if name not in found:
+def _flags(found: Repetitions) -> list[str]:
+    """Return what counts in no mean, and why, each reason once with the trials."""
+    told = []
+    for because, said in _BECAUSE.items():
+        some = [one for one in found.left_out if one.because is because]
+        if some:
+            trials = ", ".join(dict.fromkeys(one.cycle.trial for one in some))
+            what = ", ".join(dict.fromkeys(spaced(one.quantity) for one in some if because is LeftOutBecause.SPIKE))
+            told.append(f"{said.format(n=len(some))}{f' ({what})' if what else ''}: {trials}")
+    if found.speeds:
+        slow, fast = (format_number(one, 1) for one in found.speeds)
+        told.append(f"the trials differ in speed ({slow} to {fast} m/s), so that one mean of them is of neither")
+    return told
+
+
+def _key(one: KeySummary) -> Row:
+    """Return one key value as a row of text."""
+    apart = "–"
+    if one.right and one.left:
+        apart = _number(one.difference, one.unit)
+        apart += f" ± {_number((one.ci95[1] - one.ci95[0]) / 2, one.unit)}" if one.ci95 else ""
+    return {
+        "value": f"{spaced(one.name)} ({one.unit}{', middle' * (one.middle is not None)})",
+        "right": _said(one.middle or one.right, one.unit),
+        "left": _said(one.middle or one.left, one.unit),
+        "apart": apart,
+        "symmetry": format_number(one.symmetry, 0) if np.isfinite(one.symmetry) else "–",
+        **{f"file_{side}": _number(one.beside[side].mean, one.unit) if side in one.beside else "–" for side in SIDES},
+    }
+
+
+def _number(value: float, unit: str) -> str:
+    return format_number(value, _DIGITS.get(unit, 1))
+
+
+def _said(found: Spread | None, unit: str) -> str:
+    """Return mean (sd; number) as text; "–" for none."""
+    if found is None:
         return "–"
-    mean, sd, count = found[name]
-    digits = _DIGITS[STRIDE_UNITS[name]]
-    return format_number(mean, digits) + (f" ± {format_number(sd, digits)}" if count > 1 else "")
+    about = f"{_number(found.sd, unit)}; {found.count}" if found.count > 1 else "1"
+    return f"{_number(found.mean, unit)} ({about})"
+
+
+def _scores(ours: GaitScores | None, theirs: GaitScores | None) -> dict[str, Any]:
+    """Return the scores of both sides and the profile as rows of text, none without a reference."""
+    if ours is None:
+        return {"scores": ()}
+    rows = [_score("gait profile score (deg)", ours.gps)]
+    if theirs is not None:
+        rows.append(_score("the same of plug-in gait's angles, against its own reference", theirs.gps))
+    if ours.gdi:
+        rows.append(_score("gait deviation index (100 = healthy)", ours.gdi))
+    by_side = [(name, {side: told for (n, side), told in ours.variables.items() if n == name}) for name in SCORE_ANGLES]
+    profile = [_score(spaced(name), told) for name, told in by_side]
+    return {"scores": rows, "profile": profile, "people": ours.people, "overall": ours.overall}
+
+
+def _score(name: str, found: Mapping[str, Spread]) -> Row:
+    return {"value": name, **{side: _said(found.get(side), "deg") for side in SIDES}}
 
 
 def _milli(value: float) -> str:

@@ -207,12 +207,31 @@ def _contents(inner: str, *, replayed: bool) -> list[tuple[str, str]]:
     """Return address and title of every section of the page, of which ``inner`` holds those in the middle."""
     found = re.findall(r'<section id="([^"]+)">\s*<h2>([^<]+)</h2>', inner)
     last = {"checks": "Quality checks", "standing": "Quiet standing", "trials": "Trials", "made": "How it was made"}
+    first = [(where, unescape(title)) for where, title in found]
+    seen = [*(one for one in first if one[0] == "movement"), *([("replay", "Replay")] if replayed else [])]
     return [
+        *seen,
+        ("figures", "Forces and masses"),
+        *(one for one in first if one not in seen),
         ("body", "The body"),
-        *([("replay", "Replay")] if replayed else []),
-        *((where, unescape(title)) for where, title in found),
         *last.items(),
     ]
+
+
+_UNFOLDED = {"verdict", "movement", "replay", "figures", "masses"}
+_SECTION = re.compile(r'<section id="(?P<id>[^"]+)">\s*(?P<title><h2>[^\n]*</h2>)(?P<rest>.*?)</section>', re.DOTALL)
+
+
+def _folded(whole: str) -> str:
+    """Return a page with every section but those that are read first folded under its title."""
+    return _SECTION.sub(_fold, whole)
+
+
+def _fold(found: re.Match[str]) -> str:
+    where, title, rest = found.group("id", "title", "rest")
+    if where in _UNFOLDED:
+        return found.group()
+    return f'<details class="part"><summary>{title}</summary>\n<section id="{where}">{rest}</section></details>'
 
 
 def page(
@@ -240,7 +259,7 @@ def page(
     worst = result.more_stills[0] if result.more_stills else result.still
     others = [still for still in (result.still, *result.more_stills) if still is not None and still is not worst]
     name, made = result.session.folder.name, f"biodance {provenance.versions['biodance']}, {moment(provenance.created)}"
-    return render(
+    whole = render(
         "page.html.j2",
         filters={"place": place_words, "apart": _apart},
         schemas={"gap": GAP_ROW},
@@ -252,7 +271,7 @@ def page(
         attention=[(trial_and_subject(one), one.text) for one in lines if one.level != "note"],
         noted=[(trial_and_subject(one), one.text) for one in lines if one.level == "note"],
         tiles=key_figures(result),
-        contents=_contents(f"{diagnosis}{identified}{movement}", replayed=replay is not None),
+        contents=_contents(f"{movement}{identified}{diagnosis}", replayed=replay is not None),
         check_table=check_table(result),
         result=result,
         provenance=provenance,
@@ -266,3 +285,4 @@ def page(
         identification=Markup(identified),
         words=STATUS_WORDS,
     )
+    return _folded(whole)

@@ -13,6 +13,7 @@ from biodance.pipeline import for_subject
 from biodance.pipeline.for_subject import PartMass, SubjectAccount
 from biodance.pipeline.still import silhouettes
 from biodance.records import Array
+from biodance.report.pages.subject_movement import plain_movement
 from biodance.report.pages.template import render, template_text
 
 _SPREAD = {"shoulder_adduction": -0.35, "hip_adduction": -0.1}
@@ -137,6 +138,7 @@ def subject_page(account: SubjectAccount) -> str:
         "subject.html.j2",
         style=Markup(template_text("subject.css")),
         account=account,
+        moved=plain_movement(account.moved) if account.moved else None,
         facts=[
             (what, str(value)[:10] if what == "Date" else value)
             for what, value in (("Lab", visit.lab), ("Done by", visit.operator), ("Date", visit.date))

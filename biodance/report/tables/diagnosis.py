@@ -34,13 +34,13 @@ OBSERVED_ROW = Schema(
     "witness=observer what value sd unit expected expected_sd z trial counts",
     {"cause": lambda _: ""},
     "observer: {witness:name} | of what: {what} | trial: {trial} | value: {value:size} | "
-    "expected: {expected:size} ± {expected_sd:size} | z: {z:1}",
+    "expected: {expected:size} {expected_sd:±size} | z: {z:1}",
 )
 """An observation; ``cause`` is the one to which it responds most, "" where to none."""
 VISIBILITY_ROW = Schema(
     "effect target sd unit witnesses=observers would_be_seen_by=would",
     {"alike": lambda one: list(map(cause_name, one.alike))},
-    "cause: {effect:name} {target:name} | seen to: ± {sd:size} | seen by: {witnesses:name} | "
+    "cause: {effect:name} {target:name} | seen to: {sd:±size} | seen by: {witnesses:name} | "
     "could also be: {alike:name}",
 )
 """How well a cause was seen; an ``sd`` of null: nothing responds to it."""

@@ -79,9 +79,9 @@ SEGMENT_ROW = Schema(
         "from_data": lambda rows: {row.quantity: row.from_data for row in rows},
         "verdict": lambda rows: {row.quantity: row.verdict for row in rows},
     },
-    "segment: {name:name} | mass (kg): {mass_kg:2} ± {mass_sd_kg:2} | table (kg): {mass_prior_kg:2} ± "
-    "{mass_prior_sd_kg:2} | x (mm): {com_m[0]:mm0} ± {com_sd_m[0]:mm0} | y (mm): {com_m[1]:mm0} ± {com_sd_m[1]:mm0} | "
-    "z (mm): {com_m[2]:mm0} ± {com_sd_m[2]:mm0} | from the data: {information:%0 %}",
+    "segment: {name:name} | mass (kg): {mass_kg:2} {mass_sd_kg:±2} | table (kg): {mass_prior_kg:2} "
+    "{mass_prior_sd_kg:±2} | x (mm): {com_m[0]:mm0} {com_sd_m[0]:±mm0} | y (mm): {com_m[1]:mm0} {com_sd_m[1]:±mm0} | "
+    "z (mm): {com_m[2]:mm0} {com_sd_m[2]:±mm0} | from the data: {information:%0 %}",
 )
 
 
@@ -107,7 +107,7 @@ _LOAD = Schema(
 )
 SUSPECT_ROW = Schema(
     "segment kg=mass sd_kg=sd ci95_kg=interval probability log_bayes_factor smallest_detectable_kg=smallest",
-    shown="segment: {segment:name} | probability: {probability:3} | load (kg): {kg:2} ± {sd_kg:2} | "
+    shown="segment: {segment:name} | probability: {probability:3} | load (kg): {kg:2} {sd_kg:±2} | "
     "smallest that would be found (kg): {smallest_detectable_kg:2}",
 )
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from biodance.display import cause_in_words
+from biodance.identification.knowledge import SIGMAS
 from biodance.report.wording import changed, format_number, size_seen, sized, small
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class Schema:
         More keys -> `Schema` of the record or records of that name, or a function of the whole record; one that stands
         among the fields, too, has its place there.
     shown : str
-        What people see of a row, column by column: ``"segment: {segment:name} | mass (kg): {kg:2} ± {sd_kg:2}"``
+        What people see of a row, column by column: ``"segment: {segment:name} | mass (kg): {kg:2} {sd_kg:±2}"``
         (`RowFormat`).
     """
 
@@ -132,7 +133,8 @@ class RowFormat(Formatter):
 
     ``2 kg`` with two decimals and unit, ``mm0`` m in whole millimetres, ``ms1`` s in milliseconds, ``%1`` a share in
     per cent, ``deg1`` rad in degrees; ``size`` with the unit of the row, ``change`` with its sign, too; ``seen`` the
-    size of a cause, ``p`` a probability; ``name`` a name as words; several values one by one, or their ``count``; what
+    size of a cause, ``p`` a probability; ``±`` before any of them makes of a standard deviation half the width of a
+    95 % interval, with the sign; ``name`` a name as words; several values one by one, or their ``count``; what
     is not known as "–", without its unit.
     """
 
@@ -149,6 +151,8 @@ class RowFormat(Formatter):
         """Return one value as text."""
         if format_spec == "count":
             return str(len(value))
+        if format_spec.startswith("±"):
+            return f"± {self.format_field(value if value is None else SIGMAS * value, format_spec[1:])}"
         if format_spec == "seen":
             return size_seen(value, self.row["typical"], self.row["unit"])
         if isinstance(value, list | tuple | np.ndarray):

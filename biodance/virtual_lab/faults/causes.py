@@ -246,7 +246,8 @@ def parse_cause(text: str) -> Hidden:
             values[key] = tuple(float(number) for number in value.split(";"))
         except ValueError as error:
             raise BiodanceError(
-                f"--effect {text}: {value!r} is not a number (or three, as 0.05;0;0), for {key}."
+                f"--effect {text}: {value!r} is not a number (or three, as 0.05;0;0), for {key}. Where a cause lies is "
+                f"said by target=...; `biodance effects {name}` lists its parameters."
             ) from error
     return Hidden(name, target, values)
 

@@ -1,0 +1,176 @@
+"""How far a gait lies from a reference of healthy people, in one number: GPS with its MAP, and GDI."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from biodance.cycles.curves import CycleCurve, NormalCurve
+from biodance.cycles.cut import Cycle
+from biodance.cycles.summary import Spread, spread
+from biodance.errors import BiodanceError
+from biodance.records import SIDES, Array, freeze
+
+SCORE_ANGLES = (
+    *("pelvis_tilt", "pelvis_obliquity", "pelvis_rotation", "hip_flexion", "hip_adduction", "hip_rotation"),
+    *("knee_flexion", "ankle_dorsiflexion", "foot_progression"),
+)
+"""The nine angles of both scores, in the order of a gait vector."""
+_EVERY = 2
+"""% between two of the 51 instants of a cycle that the scores look at."""
+_PELVIS = 3
+"""The first of `SCORE_ANGLES` are the pelvis': both sides share them."""
+FEATURES = 15
+"""Gait features that the index keeps (Schwartz and Rozumalski 2008: 98 % of the variance of their strides)."""
+
+
+@dataclass(frozen=True)
+class GaitScores:
+    """How far a gait lies from a reference.
+
+    ``variables`` (quantity, side) -> gait variable score, deg, mean over cycles: the movement analysis profile; ``gps``
+    side -> gait profile score, deg; ``overall`` that of both sides, deg, NaN where one is missing; ``gdi`` side -> gait
+    deviation index, {} without a `DeviationReference`; ``people`` that the reference is of.
+    """
+
+    variables: Mapping[tuple[str, str], Spread]
+    gps: Mapping[str, Spread]
+    overall: float
+    gdi: Mapping[str, Spread]
+    people: int
+
+
+@dataclass(frozen=True, eq=False)
+class DeviationReference:
+    """What the gait deviation index is told against: ``basis`` (k, 459), orthonormal rows, the features; ``control``
+    (k,) the healthy mean of the features; ``mean`` and ``sd`` of the logarithm of the healthy people's distance to it.
+    """
+
+    basis: Array
+    control: Array
+    mean: float
+    sd: float
+
+    def __post_init__(self) -> None:
+        k = len(self.control)
+        freeze(self, "DeviationReference", basis=(k, 51 * len(SCORE_ANGLES)), control=(k,))
+
+    def index(self, vector: Array) -> float:
+        """Return the index of a gait vector (459,) deg: 100 healthy, every 10 less one standard deviation."""
+        return 100.0 - 10.0 * (float(np.log(_distance(self.basis, self.control, vector))) - self.mean) / self.sd
+
+
+def deviation_reference(strides: Array, healthy: Array, *, features: int = FEATURES) -> DeviationReference:
+    """Return the reference of the gait deviation index.
+
+    Parameters
+    ----------
+    strides : (n, 459) array
+        Gait vectors, deg, of all who were measured, patients too: their singular vectors are the features.
+    healthy : (m, 459) array
+        One of each healthy leg.
+    features : int
+        How many features are kept; at most n.
+
+    Raises
+    ------
+    BiodanceError
+        Fewer strides than features, or fewer than two healthy legs.
+
+    References
+    ----------
+    Schwartz and Rozumalski 2008, doi:10.1016/j.gaitpost.2008.05.001: the singular vectors are of the vectors as they
+    are, without their mean taken off.
+    """
+    if len(strides) < features or len(healthy) < 2:
+        raise BiodanceError(
+            f"A gait deviation index needs at least {features} strides and two healthy legs; there are {len(strides)} "
+            f"and {len(healthy)}. Measure more people."
+        )
+    basis = np.linalg.svd(strides, full_matrices=False)[2][:features]
+    control = (healthy @ basis.T).mean(axis=0)
+    distance = np.log([_distance(basis, control, one) for one in healthy])
+    return DeviationReference(basis, control, float(distance.mean()), float(distance.std(ddof=1)))
+
+
+def deviation_toml(one: DeviationReference) -> list[str]:
+    """Return the lines of ``[gait_deviation_index]`` in lab.toml."""
+    rows = ["    [" + ",\n     ".join(_nine(row)) + "]," for row in one.basis]
+    control = ",\n  ".join(_nine(one.control))
+    said = [f"control = [{control}]", f"mean = {one.mean:.6g}", f"sd = {one.sd:.6g}"]
+    return ["[gait_deviation_index]", *said, "basis = [", *rows, "]", ""]
+
+
+def _nine(row: Array) -> list[str]:
+    """Return numbers as text, nine to a line."""
+    return [", ".join(f"{value:.6g}" for value in row[k : k + 9]) for k in range(0, len(row), 9)]
+
+
+def deviation_of(raw: Mapping[str, Any] | None) -> DeviationReference | None:
+    """Return the reference that `deviation_toml` wrote; None of None."""
+    if raw is None:
+        return None
+    basis, control = (np.array(raw[key], dtype=float) for key in ("basis", "control"))
+    return DeviationReference(basis, control, float(raw["mean"]), float(raw["sd"]))
+
+
+def _distance(basis: Array, control: Array, vector: Array) -> float:
+    return float(np.linalg.norm(basis @ vector - control))
+
+
+def gait_vectors(curves: Sequence[CycleCurve]) -> dict[Cycle, Array]:
+    """Return the gait vector (459,) deg of every gait cycle in which all nine angles are known throughout."""
+    found: dict[Cycle, dict[str, Array]] = {}
+    for one in curves:
+        if one.quantity in SCORE_ANGLES and one.cycle.kind == "gait" and np.isfinite(one.value).all():
+            found.setdefault(one.cycle, {})[one.quantity] = one.value[::_EVERY]
+    whole = {cycle: angles for cycle, angles in found.items() if len(angles) == len(SCORE_ANGLES)}
+    return {cycle: np.concatenate([angles[name] for name in SCORE_ANGLES]) for cycle, angles in whole.items()}
+
+
+def gait_scores(
+    curves: Sequence[CycleCurve], normal: Sequence[NormalCurve], deviation: DeviationReference | None = None
+) -> GaitScores | None:
+    """Return the scores of the gait cycles of which ``curves`` are; None without all nine angles in ``normal``, or
+    without a cycle in which all are known.
+
+    Notes
+    -----
+    A gait variable score is the root mean square, over 51 instants of the cycle, of the difference to the reference's
+    mean; a side's profile score the root mean square of its nine; that of both sides of 15: the pelvis counts once,
+    with the left cycles (Baker et al. 2009, doi:10.1016/j.gaitpost.2009.05.020). The index: see `deviation_reference`.
+    """
+    bands = {one.quantity: one for one in normal if one.kind == "gait" and one.unit == "deg"}
+    vectors = gait_vectors(curves)
+    if not set(SCORE_ANGLES) <= set(bands) or not vectors:
+        return None
+    usual = np.stack([bands[name].mean[::_EVERY] for name in SCORE_ANGLES])
+    profile = {
+        cycle: np.sqrt(np.mean((vector.reshape(usual.shape) - usual) ** 2, axis=1)) for cycle, vector in vectors.items()
+    }
+    by_side = {side: [rows for cycle, rows in profile.items() if cycle.side == side] for side in SIDES}
+    seen = {side: np.stack(rows) for side, rows in by_side.items() if rows}
+    variables = {
+        (name, side): told
+        for side, rows in seen.items()
+        for name, values in zip(SCORE_ANGLES, rows.T, strict=True)
+        if (told := spread(values))
+    }
+    gps = {side: told for side, rows in seen.items() if (told := spread(np.sqrt(np.mean(rows**2, axis=1))))}
+    gdi = {
+        side: told
+        for side in seen
+        if deviation is not None
+        if (told := spread(deviation.index(one) for cycle, one in vectors.items() if cycle.side == side))
+    }
+    people = min(bands[name].people for name in SCORE_ANGLES)
+    return GaitScores(variables, gps, _overall(seen), gdi, people)
+
+
+def _overall(seen: Mapping[str, Array]) -> float:
+    """Return the profile score of both sides of a person; NaN where a side is missing."""
+    if set(seen) != set(SIDES):
+        return float("nan")
+    right, left = (seen[side].mean(axis=0) for side in SIDES)
+    return float(np.sqrt(np.mean(np.concatenate([left, right[_PELVIS:]]) ** 2)))

@@ -1,0 +1,161 @@
+"""Figures of repetitions over 0 to 100 %: angles, loads, ground reaction, and what each trial gave."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from biodance.cycles.curves import CurveGroup, NormalCurve
+from biodance.cycles.cut import PERCENT
+from biodance.cycles.summary import Repetitions
+from biodance.display import GREY, spaced
+from biodance.records import SIDES, Array
+from biodance.report.figures.vector import (
+    LEFT_SIDE,
+    MIDDLE_SIDE,
+    RIGHT_SIDE,
+    Axis,
+    Curve,
+    CurveFigure,
+    Frame,
+    Strip,
+    Stroke,
+    around,
+    panel,
+    points,
+    segments,
+)
+from biodance.report.wording import format_number
+
+_LOOKS = {"right": RIGHT_SIDE, "left": LEFT_SIDE, "middle": MIDDLE_SIDE}
+_NORMAL = Stroke(GREY, "1 3", 0.8)
+_THIN, _MOST = 0.4, 12
+"""px of one repetition, and repetitions of a side that are drawn; the mean is over all."""
+LEAST_SPANS = {"deg": 10.0, "N·m/kg": 0.2, "W/kg": 0.5, "m": 0.05, "%": 10.0}
+"""What an axis spans at least, by unit."""
+POSITIVE: Mapping[str, str] = {
+    "pelvis_tilt": "forwards +",
+    "pelvis_obliquity": "own side up +",
+    "pelvis_rotation": "own side forwards +",
+    "hip_rotation": "inwards +",
+    "foot_progression": "inwards +",
+    "trunk_bending": "own side down +",
+    "trunk_rotation": "own side forwards +",
+}
+"""The positive sense where the name does not say it, in a gait cycle."""
+_BOTH: Mapping[str, str] = {
+    "pelvis_obliquity": "right side up +",
+    "pelvis_rotation": "right side forwards +",
+    "trunk_bending": "to the right +",
+    "trunk_rotation": "to the left +",
+}
+"""The same where both sides move alike."""
+GROUND_PANELS = ("ground_reaction_up", "ground_reaction_forward", "ground_reaction_inward")
+CYCLE_AXES = {"gait": "% of the gait cycle", "squat": "% of the squat", "sit_to_stand": "% of the rise"}
+_CONSISTENT = (
+    *("hip_flexion_range", "knee_flexion_maximum", "ankle_dorsiflexion_maximum"),
+    *("pelvis_tilt_range", "ankle_dorsiflexion_moment_minimum", "ankle_power_maximum"),
+)
+"""Key values of which every repetition is drawn by trial."""
+
+
+def repetitions_figure(
+    found: Repetitions, quantities: Sequence[str], about: str, normal: Sequence[NormalCurve] = ()
+) -> str:
+    """Return one panel for each quantity: repetitions thin, mean and one sd of each side, when the foot leaves, plug-in
+    gait's own mean where the files hold it, before the ``normal`` bands; "" where none is known.
+    """
+    groups = [one for one in found.groups if np.isfinite(one.mean).any()]
+    cells = []
+    for quantity in quantities:
+        same = sorted((one for one in groups if one.quantity == quantity), key=lambda one: list(_LOOKS).index(one.side))
+        if same:
+            behind = [n for n in normal if (n.kind, n.quantity, n.unit) == (found.kind, quantity, same[0].unit)]
+            usual = [Curve(f"normal, {one.people} people", one.mean, _NORMAL, one.sd) for one in behind]
+            theirs = [_of_file(one) for one in found.file_groups if one.quantity == quantity]
+            least = LEAST_SPANS.get(same[0].unit, 0.0)
+            cells.append(
+                [Strip(curve_title(same[0]), [*usual, *_curves(same), *theirs], least=least, rules=_offs(found))]
+            )
+    if not cells:
+        return ""
+    people = "; grey: between people" if any(n.kind == found.kind for n in normal) else ""
+    band = f"one sd between cycles{people}"
+    return CurveFigure(PERCENT, cells, about, label=CYCLE_AXES[found.kind], band=band, width=270.0).html()
+
+
+def _of_file(one: CurveGroup) -> Curve:
+    return Curve(f"{one.side}, plug-in gait", one.mean, Stroke(_LOOKS[one.side].colour, "1 2", 1.1))
+
+
+def _offs(found: Repetitions) -> list[tuple[float, Stroke]]:
+    """Return where a foot leaves the ground on average (a seat is left, a squat is lowest), in the look of its side."""
+    sides = SIDES if found.kind == "gait" else ("middle",)
+    offs = [(found.off(side), _LOOKS[side]) for side in sides]
+    return [(off.mean, Stroke(look.colour, look.dash, 0.8)) for off, look in offs if off is not None]
+
+
+def curve_title(group: CurveGroup) -> str:
+    """Return what a panel of curves shows: quantity, unit, and which way is positive where the name does not say it."""
+    name = spaced(group.quantity)
+    sense = (POSITIVE if group.kind == "gait" else {**POSITIVE, **_BOTH}).get(group.quantity)
+    return f"{name} ({group.unit}{f', {sense}' if sense else ''})"
+
+
+def _curves(groups: Sequence[CurveGroup]) -> list[Curve]:
+    """Return the repetitions of each side, thin, then its mean with the band."""
+    curves = []
+    for group in groups:
+        look = _LOOKS[group.side]
+        thin = Stroke(look.colour, look.dash, _THIN)
+        if len(group.values) > 1:
+            curves += [Curve(group.side, values, thin, kind="each") for values in group.values[:_MOST]]
+        curves.append(Curve(group.side, group.mean, look, group.sd if np.isfinite(group.sd).any() else None))
+    return curves
+
+
+def pressure_figure(found: Repetitions) -> str:
+    """Return the mean way of the pressure along each sole, from the heel up; "" where none is known."""
+    ways = {}
+    for side in SIDES:
+        same = {one.quantity: _of_most(one) for one in found.groups if one.side == side}
+        if "pressure_ahead" in same:
+            ways[side] = 1000 * np.stack([same["pressure_outward"], same["pressure_ahead"]], axis=1)
+    if not ways:
+        return ""
+    every = np.concatenate(list(ways.values()))
+    x, y = around(every[:, 0], least=120.0), around(every[:, 1], least=150.0)
+    x = Axis(x.low, x.high, "outward of the line heel to toe (mm)")
+    y = Axis(y.low, y.high, "centre of pressure ahead of the heel (mm)")
+    marks = [segments(x, y, way, _LOOKS[side]) for side, way in ways.items()]
+    drawn = panel(
+        x, y, marks, "Mean way of the centre of pressure on each sole.", frame=Frame(width=270.0, height=150.0)
+    )
+    return f'<div class="cell">{drawn}</div>'
+
+
+def _of_most(group: CurveGroup) -> Array:
+    """Return the mean where at least half of the cycles are known: elsewhere it is of another few."""
+    return np.where(2 * np.isfinite(group.values).sum(axis=0) >= len(group.values), group.mean, np.nan)
+
+
+def consistency_figure(found: Repetitions) -> str:
+    """Return every repetition's key values by trial, a panel for each; "" for a single trial."""
+    if len(found.trials) < 2:
+        return ""
+    place = {trial: float(k) for k, trial in enumerate(found.trials, 1)}
+    ticks = tuple((at, format_number(at, 0)) for at in place.values())
+    x, cells = Axis(0.5, len(place) + 0.5, "trial", ticks), []
+    for name in _CONSISTENT:
+        some = [one for one in found.key_values if one.name == name]
+        if some:
+            y = around(np.array([one.value for one in some]), least=LEAST_SPANS[some[0].unit])
+            y = Axis(y.low, y.high, f"{spaced(name)} ({some[0].unit})")
+            marks = []
+            for side, shift in (("right", -0.12), ("left", 0.12)):
+                own = [(place[one.cycle.trial] + shift, one.value) for one in some if one.side == side]
+                across, up = np.array(own).reshape(-1, 2).T
+                inside = "" if side == "right" else "#ffffff"
+                marks.append(points(x, y, across, up, _LOOKS[side], inside=inside))
+            about = f"{spaced(name)} of every cycle by trial, right and left."
+            cells.append(f'<div class="cell">{panel(x, y, marks, about, frame=Frame(width=270.0, height=80.0))}</div>')
+    return f'<div class="curves"><div class="cells three">{"".join(cells)}</div></div>' if cells else ""
