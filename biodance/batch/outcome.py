@@ -15,6 +15,8 @@ from biodance.version import __version__
 
 OUTCOME = "outcome.json"
 """In a session's folder: where it and the manifest are, the session is done."""
+TABLES = "tables"
+"""Folder of a session's tables, in that of its results."""
 TrialRows = tuple[dict[str, Any], ...]
 """One row of plain values for each trial."""
 
@@ -58,6 +60,8 @@ class SessionTask:
         Whether the page is drawn; numbers are written always.
     limit : float
         s after which the session is given up.
+    tables : bool
+        Whether the results are also written as tables, into the folder `TABLES`.
     """
 
     name: str
@@ -67,6 +71,7 @@ class SessionTask:
     chosen: tuple[str, ...] = ()
     pages: bool = True
     limit: float = 1800.0
+    tables: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,7 @@ class Outcome:
     def is_final(self, task: SessionTask) -> bool:
         """Return whether doing the ``task`` again, as it is asked for now, would give the same."""
         same = self.fingerprint == task.fingerprint
+        same &= not task.tables or self.unread or (Path(task.out) / TABLES).is_dir()
         return same and (self.why is Why.SESSION or (self.why is Why.LIMIT and task.limit <= self.limit))
 
     @property

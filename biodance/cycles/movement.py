@@ -207,7 +207,8 @@ def trial_movement(
     if contact is not None and feet is not None:
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
-    cycles = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
+    found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
+    cycles = tuple(one for one in found if not any(a < one.end and b > one.start for a, b in trial.left_out))
     curves: list[CycleCurve] = []
     for cycle in cycles:
         curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]

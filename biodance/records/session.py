@@ -103,6 +103,8 @@ class Trial:
         What the analyst chose when it was read.
     defects : tuple of Defect
         What was wrong in the recording and was left out.
+    left_out : tuple of tuple of float
+        Spans (from, to) s without forces and cycles, because the analyst leaves them out.
 
     Examples
     --------
@@ -121,17 +123,13 @@ class Trial:
     warnings: tuple[str, ...] = ()
     settings: Settings = USUAL
     defects: tuple[Defect, ...] = ()
+    left_out: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         known_index("trial role", self.role, ROLES)
-        assign(
-            self,
-            plates=tuple(self.plates),
-            measurements=MappingProxyType(dict(self.measurements)),
-            history=tuple(self.history),
-            warnings=tuple(self.warnings),
-            defects=tuple(self.defects),
-        )
+        listed = ("plates", "history", "warnings", "defects", "left_out")
+        assign(self, **{name: tuple(getattr(self, name)) for name in listed})
+        assign(self, measurements=MappingProxyType(dict(self.measurements)))
 
     @property
     def worn(self) -> str:
