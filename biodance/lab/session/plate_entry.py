@@ -161,7 +161,7 @@ def plate_lines(session: Session) -> Iterator[str]:
         yield f"# corners_m = {json.dumps(corners)} {_WRITTEN_ORDER}"
         if plate.type:
             yield f"# type = {plate.type} # of the C3D standard"
-            yield from _channel_lines(*_channels_line(plate, trial))
+            yield from _channel_lines(*plate_channels(plate, trial))
         yield from _use_lines()
     if hidden is None:
         return
@@ -184,7 +184,7 @@ def _undescribed(session: Session) -> tuple[RawC3d, tuple[tuple[int, ...], ...]]
     return None
 
 
-def _channels_line(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float, ...]]:
+def plate_channels(plate: Plate, trial: Trial) -> tuple[list[str | int], tuple[float, ...]]:
     """Return the labels (or numbers) of a plate's channels, and N or N·m per unit where there is no matrix."""
     if trial.source.format != "C3D":
         return [], ()
