@@ -18,7 +18,7 @@ from biodance.lab.plain_text import write_whole
 from biodance.lab.session.file import check_session_text
 from biodance.lab.session.results_folder import made_folder
 
-Change = tuple[Sequence[str], Any]
+KeyChange = tuple[Sequence[str], Any]
 """Where in session.toml, as ``("subject", "mass_kg")``, and the new value; None takes the key out."""
 _DEEPEST = 4
 
@@ -61,7 +61,7 @@ class SessionText:
         changed = bool(states) and _read(states[at]) != self.text
         return at > 0 or changed, at < len(states) - 1 and not changed
 
-    def change(self, changes: Sequence[Change], revision: str) -> None:
+    def change(self, changes: Sequence[KeyChange], revision: str) -> None:
         """Change keys of the file, which must be as at the ``revision``; comments and order stay.
 
         Raises
@@ -142,7 +142,7 @@ def _read(path: Path) -> str:
     return path.read_bytes().decode("utf-8")
 
 
-def changed_text(text: str, changes: Sequence[Change]) -> str:
+def changed_text(text: str, changes: Sequence[KeyChange]) -> str:
     """Return a TOML text with keys set or taken out; all else, comments included, is as before.
 
     Raises

@@ -28,8 +28,8 @@ _MOST_ROWS = 20_000
 """Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)."""
 _SECTION = re.compile(r'<section id="([^"]+)">')
 _PARTS: Mapping[str, tuple[str, ...]] = {
-    "gait": ("movement", "gait", "torques"),
-    "body": ("body", "replay", "masses", "predicts", "impact", "load", "danced", "changes", "standing"),
+    "gait": ("movement", "gait"),
+    "body": ("body", "replay", "masses", "predicts", "torques", "impact", "load", "danced", "changes", "standing"),
     "quality": ("checks", "trials", "made"),
 }
 """Sections of report.html by the tab that shows them."""
@@ -64,7 +64,7 @@ def read_results(place: SessionPlace) -> dict[str, Any]:
         raise BiodanceError(f"{place.results}: the results cannot be read ({error}). Run it again.") from error
 
 
-def results_document(place: SessionPlace) -> dict[str, Any]:
+def shown_results(place: SessionPlace) -> dict[str, Any]:
     """Return what the tabs Steps, Quality and Files show of the results."""
     found = read_results(place)
     told = found["diagnosis"] or {}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.app.edits import SessionText
-from biodance.batch.outcome import OUTCOME, SessionTask, fingerprint_of
+from biodance.batch.outcome import OUTCOME, TABLES, SessionTask, fingerprint_of
 from biodance.batch.run import Ledger, told_of_book
 from biodance.batch.summary import SESSIONS, folder_name
 from biodance.errors import BiodanceError, UnknownName
@@ -35,14 +35,15 @@ class SessionPlace:
         return SessionTask(self.name, folder, out, fingerprint_of(self.folder, ()), tables=True)
 
     def found(self) -> dict[str, Any] | None:
-        """Return what became of the session in the last run, and whether that is of the recordings as they are now
-        (``fresh``); None where there was none.
+        """Return what became of the session in the last run, whether that is of the recordings as they are now
+        (``fresh``), and whether it wrote ``tables``; None where there was none.
         """
         try:
             told = parse_json((self.results / OUTCOME).read_text(encoding="utf-8"))
             row: dict[str, Any] = next(iter(told["rows"]), {})
             found = {"status": str(told["status"]), "reason": str(told["reason"]), "verdict": row.get("verdict") or ""}
-            return found | {"fresh": told["fingerprint"] == fingerprint_of(self.folder, ())}
+            fresh = told["fingerprint"] == fingerprint_of(self.folder, ())
+            return found | {"fresh": fresh, "tables": (self.results / TABLES).is_dir()}
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
 

@@ -96,11 +96,18 @@ def _killed(task: SessionTask) -> Outcome:
     return untold(task, SessionStatus.FAILED, why, Why.MACHINE)
 
 
+def prepare_workers() -> None:
+    """Start the process from which workers are forked and let it load what they need, so that the first is quick."""
+    multiprocessing.get_context("forkserver").set_forkserver_preload(
+        ["biodance.pipeline.front", "biodance.report.write"]
+    )
+    start_forkserver()
+
+
 def _process() -> ProcessPoolExecutor:
     """Return one process that ends with us, even when we are killed."""
+    prepare_workers()
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["biodance.pipeline.front", "biodance.report.write"])
-    start_forkserver()
     return ProcessPoolExecutor(1, mp_context=context, initializer=end_with_parent, max_tasks_per_child=_FRESH)
 
 

@@ -74,7 +74,7 @@ export async function showArchive(main, page) {
     );
   const run = async (rows) => {
     try {
-      await tell("run", { names: rows.map((row) => row.name) });
+      page.run = (await tell("run", { names: rows.map((row) => row.name) })).run;
       await page.refresh();
     } catch (error) {
       say(error.message);

@@ -33,8 +33,12 @@ function floor(view, forces) {
         "stroke-dasharray": one.placed ? null : "6 4",
       }),
     );
-    corners.forEach(([x, y], corner) => parts.push(h("text", { x, y, "text-anchor": "middle" }, String(corner + 1))));
-    const [x, y] = at([0, 1].map((i) => one.corners_m.reduce((sum, p) => sum + p[i], 0) / 4));
+    const middle = [0, 1].map((i) => one.corners_m.reduce((sum, p) => sum + p[i], 0) / 4);
+    one.corners_m.forEach((point, corner) => {
+      const [x, y] = at([0, 1].map((i) => point[i] + 0.1 * (middle[i] - point[i]))); // inside, where no neighbour is
+      parts.push(h("text", { x, y: Number(y) + 4, "text-anchor": "middle" }, String(corner + 1)));
+    });
+    const [x, y] = at(middle);
     parts.push(h("text", { x, y, "text-anchor": "middle", "font-weight": "bold" }, one.name));
     const path = forces?.plates.find((plate) => plate.name === one.name)?.cop_m || [];
     path.map(at).forEach(([cx, cy]) => parts.push(h("circle", { cx, cy, r: 1.6, fill: colour })));

@@ -60,7 +60,7 @@ export async function showQuality(all) {
       ? h(
           "p",
           {},
-          "Why: ",
+          "Reasons: ",
           found.reasons.map((one) => [chip(words(one)), " "]),
         )
       : "",
@@ -323,7 +323,7 @@ export async function showFiles(all) {
     h(
       "p",
       { cls: "small" },
-      `${view.folder}/session.toml: all that this window changes. What you write here is checked before it is saved; Undo goes back.`,
+      `${view.folder}/session.toml: all that this window changes. It is checked before it is saved; Undo goes back.`,
     ),
     textEditor(view, changed),
   );

@@ -212,7 +212,7 @@ export async function markerScene(data, { chosen, onchoose }) {
     h(
       "p",
       { cls: "small" },
-      "Black: seen. Orange, open: in a gap, as a run would fill it. Pink: the chosen marker. Drag to turn, wheel to come nearer.",
+      "Black: seen. Orange, open: in a gap, as a run would fill it. Pink: chosen. Drag to turn, wheel to come nearer.",
     ),
   );
   return {

@@ -40,7 +40,7 @@ export async function showSession(main, page, name, tab) {
   const edit = (...changes) => changed("edit", { changes });
   const run = async () => {
     try {
-      await tell("run", { names: [name] });
+      page.run = (await tell("run", { names: [name] })).run;
       await page.refresh();
     } catch (error) {
       say(error.message);
@@ -60,7 +60,7 @@ export async function showSession(main, page, name, tab) {
   async function draw(now) {
     const kept = document.activeElement?.dataset?.key,
       running = page.run?.state === "running";
-    const status = now.found && now.found.fresh ? "Run again" : "Run";
+    const whole = now.found?.fresh && now.found.tables; // there is nothing that a run would change
     main.replaceChildren(
       h(
         "div",
@@ -74,12 +74,12 @@ export async function showSession(main, page, name, tab) {
           "button",
           {
             cls: "main",
-            disabled: running || (now.found?.fresh && status !== "Run"),
+            disabled: running || whole,
             onclick: run,
             "data-key": "run",
-            title: now.found?.fresh ? "The results are of what you see: nothing changed since." : null,
+            title: whole ? "The results are of what you see: nothing changed since." : null,
           },
-          running ? "Running …" : now.found?.fresh ? "Results are up to date" : "Run",
+          running ? "Running …" : whole ? "Results are up to date" : "Run",
         ),
       ),
       h(

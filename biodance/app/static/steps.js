@@ -203,7 +203,8 @@ function timeLine(row, forces, moved, onspan) {
         h(
           "title",
           {},
-          `${one.side} foot ${one.down ? "strikes" : "leaves"} at ${one.time_s.toFixed(3)} s, by the ${one.source === "force" ? "plates" : "markers"}`,
+          `${one.side} foot ${one.down ? "strikes" : "leaves"} at ${one.time_s.toFixed(3)} s, ` +
+            `by the ${one.source === "force" ? "plates" : "markers"}`,
         ),
       ),
     );
@@ -230,7 +231,9 @@ function timeLine(row, forces, moved, onspan) {
     {
       viewBox: `0 0 ${WIDE} ${HIGH + 3 * ROW + 18}`,
       role: "img",
-      "aria-label": `Forces and steps of ${row.name} from ${begin.toFixed(2)} to ${end.toFixed(2)} s; the table below lists the cycles`,
+      "aria-label":
+        `Forces and steps of ${row.name}, ${begin.toFixed(2)} to ${end.toFixed(2)} s. ` +
+        "The table below lists the cycles.",
     },
     parts,
     mark,

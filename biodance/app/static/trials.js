@@ -233,7 +233,7 @@ export function showTrials({ panel, view, edit }) {
             .map(([file, why]) => `${file} (${why})`)
             .join(" ")}`,
         )
-      : null,
+      : "",
   );
   showPlates(panel, view, edit);
   panel.append(
