@@ -103,15 +103,18 @@ class SessionText:
 
     def _write(self, text: str) -> None:
         check_session_text(self.path, text)
+        if text == self.text:
+            return
         self._keep()
-        if text != self.text:
-            self._put(text)
-            self._add(text)
+        if self._position() < len(self._states()) - 1:
+            self._add(self.text)
+        self._add(text)
+        self._put(text)
 
     def _keep(self) -> None:
-        """Keep what stands there now as the last state, unless it is that."""
-        states, at, now = self._states(), self._position(), self.text
-        if not states or at < len(states) - 1 or _read(states[at]) != now:
+        """Keep what stands there now as the last state, unless it is the one that was written here."""
+        states, now = self._states(), self.text
+        if not states or _read(states[self._position()]) != now:
             self._add(now)
 
     def _add(self, text: str) -> None:
