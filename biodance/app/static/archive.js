@@ -23,7 +23,9 @@ function ordered(rows) {
 export async function showArchive(main, page) {
   Object.assign(page, { name: "", revision: "", refresh: () => showArchive(main, page) });
   document.title = "biodance";
-  const found = await ask("listed");
+  const turn = page.turn,
+    found = await ask("listed");
+  if (turn !== page.turn) return;
   document.getElementById("folder").textContent = found.folder;
   const body = h("tbody"),
     count = h("p", { cls: "small", role: "status" });

@@ -4,13 +4,14 @@ import { ask, h, say, tell } from "./dom.js";
 import { showSession } from "./session.js";
 
 const main = document.getElementById("main");
-const page = { name: "", revision: "", refresh: null, run: null };
+const page = { turn: 0, name: "", revision: "", refresh: null, run: null };
 
 export function address(name, tab = "trials") {
   return name ? `#/${encodeURIComponent(name)}/${tab}` : "#/";
 }
 
 async function show() {
+  page.turn += 1;
   const [, name, tab] = location.hash.split("/").map(decodeURIComponent);
   try {
     if (name) await showSession(main, page, name, tab || "trials");

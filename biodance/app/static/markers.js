@@ -75,8 +75,12 @@ export async function showMarkers({ panel, view, edit }) {
           h("button", { onclick: () => choose(row.label), "aria-label": `Show ${row.label}` }, row.label),
         ),
         h("td", { cls: guessed ? "guess" : "" }, menu(row)),
-        h("td", { cls: guessed ? "guess-word" : "small" }, BY[row.by]),
-        h("td", { cls: "n" }, row.gaps_percent ? `${number(row.gaps_percent, 1)} %` : "none"),
+        h("td", { cls: guessed ? "guess-word" : "small", "data-label": "Known by" }, BY[row.by]),
+        h(
+          "td",
+          { cls: "n", "data-label": "Not seen" },
+          row.gaps_percent ? `${number(row.gaps_percent, 1)} %` : "none",
+        ),
       );
       rows.set(row.label, tr);
       return tr;
@@ -112,7 +116,7 @@ export async function showMarkers({ panel, view, edit }) {
           onclick: () => {
             field.value = scene.time().toFixed(3);
           },
-          "aria-label": `${field.getAttribute("aria-label")}: the time shown`,
+          "aria-label": `now: ${field.getAttribute("aria-label")}`,
         },
         "now",
       );
@@ -277,7 +281,7 @@ export async function showMarkers({ panel, view, edit }) {
         { cls: "list", tabindex: "0", role: "region", "aria-label": "Labels" },
         h(
           "table",
-          {},
+          { cls: "stack" },
           h(
             "thead",
             {},

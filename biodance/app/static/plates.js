@@ -10,7 +10,7 @@ function floor(view, forces) {
   const low = [0, 1].map((k) => Math.min(0, ...all.map((p) => p[k])) - 0.15);
   const high = [0, 1].map((k) => Math.max(0, ...all.map((p) => p[k])) + 0.15);
   const size = [high[0] - low[0], high[1] - low[1]],
-    scale = 700 / Math.max(...size);
+    scale = Math.min(700, Math.max(340, innerWidth - 60)) / Math.max(...size);
   const at = ([x, y]) => [((x - low[0]) * scale).toFixed(1), ((high[1] - y) * scale).toFixed(1)];
   const parts = [];
   const [ox, oy] = at([0, 0]);

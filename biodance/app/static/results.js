@@ -111,7 +111,7 @@ function judged(rows) {
               .map(([why, s]) => `${words(why)} ${number(s, 2)} s`)
               .join(", ") || "nothing",
           ),
-          h("td", { "data-label": "Why not" }, one.why_not || ""),
+          h("td", { "data-label": one.why_not ? "Why not" : null }, one.why_not || ""),
         ),
       ),
     ),

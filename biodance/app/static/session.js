@@ -18,7 +18,9 @@ const TABS = {
 const NEEDS_SESSION = ["trials", "markers", "steps"];
 
 export async function showSession(main, page, name, tab) {
-  const view = await ask("session", { name });
+  const turn = page.turn,
+    view = await ask("session", { name });
+  if (turn !== page.turn) return; // somebody went on meanwhile
   document.title = `${name} · biodance`;
   Object.assign(page, { name, revision: view.revision });
   page.refresh = async () => showSession(main, page, name, tab);
@@ -104,6 +106,10 @@ export async function showSession(main, page, name, tab) {
       ),
       panel,
     );
+    if (page.focus) {
+      page.focus = false;
+      document.getElementById(`tab-${tab}`).focus();
+    }
     const unread = now.why && h("p", { cls: "verdict fail" }, now.why);
     panel.replaceChildren();
     if (unread && NEEDS_SESSION.includes(tab)) {
@@ -114,10 +120,6 @@ export async function showSession(main, page, name, tab) {
       );
     } else await TABS[tab]({ panel, view: now, name, edit, changed, page });
     if (kept) main.querySelector(`[data-key="${CSS.escape(kept)}"]`)?.focus();
-    if (page.focus) {
-      page.focus = false;
-      document.getElementById(`tab-${tab}`).focus();
-    }
   }
   await draw(view);
 }

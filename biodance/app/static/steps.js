@@ -3,8 +3,7 @@ import { ask, h, number, say } from "./dom.js";
 
 const SIDES = { left: "#b3261e", right: "#0058a3" };
 const kept = { trial: "" };
-const WIDE = 1000,
-  HIGH = 240,
+const HIGH = 240,
   ROW = 16;
 
 export async function showSteps({ panel, view, name, edit }) {
@@ -147,7 +146,7 @@ function cycles(row, moved, add) {
                   {
                     "data-key": `cycle ${k}`,
                     onclick: () => add(one.start_s, one.end_s),
-                    "aria-label": `Switch ${one.kind} ${k + 1} off`,
+                    "aria-label": `Switch off ${one.kind} ${k + 1}`,
                   },
                   "Switch off",
                 ),
@@ -159,9 +158,11 @@ function cycles(row, moved, add) {
 }
 
 function timeLine(row, forces, moved, onspan) {
+  const wide = Math.min(1000, Math.max(340, innerWidth - 40)), // so that its letters are as large as others
+    ticks = wide < 600 ? 4 : 10;
   const [begin, end] = forces.ends_s,
     most = Math.max(100, ...forces.plates.flatMap((one) => one.force_n.filter((f) => f !== null)));
-  const x = (t) => ((t - begin) / Math.max(end - begin, 1e-9)) * WIDE,
+  const x = (t) => ((t - begin) / Math.max(end - begin, 1e-9)) * wide,
     y = (f) => HIGH - (Math.max(f, 0) / most) * (HIGH - 20);
   const parts = row.leave_out.map(([a, b]) =>
     h("rect", {
@@ -220,16 +221,16 @@ function timeLine(row, forces, moved, onspan) {
       }),
     );
   }
-  for (let k = 0; k <= 10; k++) {
-    const t = begin + (k / 10) * (end - begin);
-    parts.push(h("text", { x: Math.min(x(t), WIDE - 34), y: HIGH + 3 * ROW + 12 }, `${t.toFixed(2)}`));
+  for (let k = 0; k <= ticks; k++) {
+    const t = begin + (k / ticks) * (end - begin);
+    parts.push(h("text", { x: Math.min(x(t), wide - 34), y: HIGH + 3 * ROW + 12 }, `${t.toFixed(2)}`));
   }
-  parts.push(h("text", { x: WIDE - 70, y: 14 }, `${most.toFixed(0)} N`));
+  parts.push(h("text", { x: wide - 70, y: 14 }, `${most.toFixed(0)} N`));
   const mark = h("rect", { y: 0, height: HIGH + 3 * ROW, width: 0, fill: "#f59e0b44" });
   const picture = h(
     "svg",
     {
-      viewBox: `0 0 ${WIDE} ${HIGH + 3 * ROW + 18}`,
+      viewBox: `0 0 ${wide} ${HIGH + 3 * ROW + 18}`,
       role: "img",
       "aria-label":
         `Forces and steps of ${row.name}, ${begin.toFixed(2)} to ${end.toFixed(2)} s. ` +

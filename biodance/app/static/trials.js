@@ -168,7 +168,7 @@ function trialRow(row, view, edit) {
     h("td", { "data-label": "Plates" }, row.name ? row.plates.join(", ") || "none" : "–"),
     h(
       "td",
-      { "data-label": "To be seen" },
+      { "data-label": row.why || parts || row.warnings?.length ? "To be seen" : null },
       row.why ? h("span", { cls: "warn" }, row.why) : null,
       parts,
       row.name && row.warnings.length
