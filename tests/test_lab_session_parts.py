@@ -8,9 +8,11 @@ from hidden_faults import hidden
 from lab_sessions import two_trials
 
 from biodance import describe_movement
+from biodance.cycles.cut import Cycle, is_left_out
 from biodance.errors import FileRefused, SessionRefused
 from biodance.lab.session.file import check_session_text, read_session_file
 from biodance.lab.session.read import read_session
+from biodance.records import LeftOutSpan
 
 
 @pytest.fixture
@@ -73,7 +75,31 @@ def test_forces_of_a_span_that_is_left_out_are_unknown(folder):
     inside = (time >= 0.2) & (time <= 0.5)
     assert np.isnan(value[inside]).all()
     assert np.isfinite(value[~inside]).all()
-    assert trial.left_out == ((0.2, 0.5),)
+    assert trial.left_out == (LeftOutSpan(0.2, 0.5),)
+
+
+def test_the_forces_stay_where_the_steps_of_one_foot_are_left_out(folder):
+    name = moving(folder).name
+    told(folder, f'[trials.{name}]\nleave_out = [[0.2, 0.5, "left"]]\n')
+    trial = moving(folder)
+    assert np.isfinite(trial.plates[0].wrench.value).all()
+    assert trial.left_out == (LeftOutSpan(0.2, 0.5, "left"),)
+
+
+@pytest.mark.parametrize(
+    ("span", "out"),
+    [
+        (LeftOutSpan(1.0, 2.0), True),
+        (LeftOutSpan(1.4, 1.45), True),
+        (LeftOutSpan(1.4, 1.45, "left"), True),
+        (LeftOutSpan(1.4, 1.45, "right"), False),
+        (LeftOutSpan(0.0, 1.01), False),  # the step before, whose end is this one's beginning
+        (LeftOutSpan(1.99, 3.0), False),
+        (LeftOutSpan(0.0, 1.1), True),
+    ],
+)
+def test_which_cycle_a_span_leaves_out(span, out):
+    assert is_left_out(Cycle("walk", "gait", "left", 1.0, 2.0, 1.6), [span]) is out
 
 
 def test_a_squat_that_reaches_into_a_span_left_out_is_not_told(tmp_path):
@@ -98,6 +124,7 @@ def test_a_squat_that_reaches_into_a_span_left_out_is_not_told(tmp_path):
         ("[trials.a]\nleave_out = [[2.0]]", "leave_out"),
         ("[trials.a]\nleave_out = [[2.0, 1.0]]", "leave_out"),
         ("[trials.a]\nleave_out = [[1.0, nan]]", "leave_out"),
+        ('[trials.a]\nleave_out = [[1.0, 2.0, "rigth"]]', "leave_out"),
         ('[markers]\ndrop = "T10"', "drop"),
         ('[markers.map]\nLASI = "left_assis"', "left_assis"),
         ("[settings]\nfilter.cutof = 6", "cutof"),
@@ -117,4 +144,4 @@ def test_the_exact_name_wins_over_a_pattern(folder):
     told(folder, '[trials."s*"]\nleave_out = [[0, 1]]\n[trials.squat]\nleave_out = []\n')
     said = read_session_file(folder)
     assert said.parts("squat").left_out == ()
-    assert said.parts("stand").left_out == ((0.0, 1.0),)
+    assert said.parts("stand").left_out == (LeftOutSpan(0.0, 1.0),)

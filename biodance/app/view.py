@@ -15,6 +15,7 @@ from biodance.lab.markers.guess import guess_set
 from biodance.lab.markers.names import meanings_of, plain_labels
 from biodance.lab.markers.sets import GUESSED, LANDMARKS, MARKED_SEGMENTS, MarkerSet, read_marker_set
 from biodance.lab.markers.signals import report_gaps
+from biodance.lab.markers.upright import is_still, movement
 from biodance.lab.session.file import SessionFile, read_session_file
 from biodance.lab.session.plate_entry import plate_channels
 from biodance.lab.session.read import read_session
@@ -105,7 +106,7 @@ class SessionView:
                 "told": role is not None,
                 "why": session.refused.get(path.name, ""),
                 "exchange": [_exchange(one.one, one.other, one.start, one.end) for one in parts.exchanges],
-                "leave_out": parts.left_out,
+                "leave_out": [[one.start, one.end, *([one.side] if one.side else [])] for one in parts.left_out],
             }
             yield row | (_of_trial(trial) if trial else {"name": ""})
 
@@ -177,6 +178,7 @@ def _of_trial(trial: Trial) -> dict[str, Any]:
         "rate_hz": row["rate (Hz)"],
         "start_s": float(clock.time[0]) if clock is not None else 0.0,
         "markers": row["markers"],
+        "travels_m": None if trial.markers is None or is_still(trial) else movement(trial.markers),
         "plates": [plate.name for plate in trial.plates],
         "warnings": [*trial.warnings, *(one.text for one in trial.defects)],
     }

@@ -22,6 +22,7 @@ from biodance.cycles.cut import (
     compare_events,
     foot_events,
     gait_cycles,
+    is_left_out,
     joined_events,
     kinematic_events,
     mean_values,
@@ -208,7 +209,7 @@ def trial_movement(
         force = foot_events(feet, contact)
     events = joined_events(force, markers) if markers else ()
     found = (*gait_cycles(trial.name, events), *repetitions(trial.name, body, motion, soles))
-    cycles = tuple(one for one in found if not any(a < one.end and b > one.start for a, b in trial.left_out))
+    cycles = tuple(one for one in found if not is_left_out(one, trial.left_out))
     curves: list[CycleCurve] = []
     for cycle in cycles:
         curves += [*angle_curves(cycle, body, motion), *lab_curves(cycle, body, motion, soles)]

@@ -12,8 +12,14 @@ export function h(tag, props = {}, ...children) {
     else if (key === "value" || key === "checked") one[key] = value;
     else one.setAttribute(key === "cls" ? "class" : key, value === true ? "" : value);
   }
-  one.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
-  return one;
+  return put(one, ...children);
+}
+
+export function put(place, ...children) {
+  place.append(
+    ...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false),
+  );
+  return place;
 }
 h.svg = new Set(["g", "path", "polygon", "polyline", "line", "rect", "circle", "text", "title"]);
 

@@ -1,5 +1,5 @@
 // The labels and what each marks; two exchanged, in a trial or a span of it; one dropped; a click in 3-D finds its row.
-import { ask, h, number, say, words } from "./dom.js";
+import { ask, h, number, put, say, words } from "./dom.js";
 import { markerScene } from "./scene.js";
 
 const BY = {
@@ -11,10 +11,14 @@ const BY = {
 };
 const kept = { trial: "", label: "" };
 
+export function showMarker(label) {
+  kept.label = label;
+}
+
 export async function showMarkers({ panel, view, edit }) {
   const found = view.markers,
     trials = view.trials.filter((row) => row.name && row.markers);
-  if (!trials.length) return panel.append(h("p", {}, "No recording has markers."));
+  if (!trials.length) return put(panel, h("p", {}, "No recording has markers."));
   if (!trials.some((row) => row.name === kept.trial))
     kept.trial = (trials.find((row) => row.role !== "static") || trials[0]).name;
   const place = h("div"),
@@ -231,7 +235,8 @@ export async function showMarkers({ panel, view, edit }) {
     ),
   );
   const worn = found.set ? `Marker set: ${found.set}.` : "No marker set is known.";
-  panel.append(
+  put(
+    panel,
     h(
       "div",
       { cls: "bar" },

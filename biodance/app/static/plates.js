@@ -1,5 +1,5 @@
 // The plates as they lie on the floor, with the way of the pressure over them; corners, type, channels, foot and use.
-import { ask, chip, h, number, say } from "./dom.js";
+import { ask, chip, h, number, put, say } from "./dom.js";
 
 const COLOURS = ["#0058a3", "#b3261e", "#00694b", "#7a3e9d", "#8a5a00", "#3d5a5b"];
 
@@ -169,8 +169,8 @@ function channels(text) {
 }
 
 export function showPlates(panel, view, edit) {
-  panel.append(h("h2", {}, "Plates"));
-  if (!view.plates.length) return panel.append(h("p", {}, "No recording has a force plate."));
+  put(panel, h("h2", {}, "Plates"));
+  if (!view.plates.length) return put(panel, h("p", {}, "No recording has a force plate."));
   const drawn = h("div", {}, floor(view, null));
   const loaded = view.trials.filter((row) => row.name && row.plates.length);
   const pressure = async (trial) => {
@@ -192,7 +192,8 @@ export function showPlates(panel, view, edit) {
       loaded.map((row) => h("option", { value: row.name }, row.name)),
     ),
   );
-  panel.append(
+  put(
+    panel,
     h(
       "div",
       { cls: "two" },

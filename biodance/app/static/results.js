@@ -1,22 +1,22 @@
 // What the last run found: verdict and reasons, the pages that it drew, its files; and what acceptance would change.
-import { ask, chip, download, h, number, say, tell, words } from "./dom.js";
+import { ask, chip, download, h, number, put, say, tell, words } from "./dom.js";
+import { address } from "./main.js";
+import { showMarker } from "./markers.js";
 import { textEditor } from "./session.js";
 
 const CHANNELS = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
 
 async function resultsOf({ panel, view, name }) {
   if (!view.found) {
-    panel.append(h("p", {}, "This session has not been run yet. Press Run."));
+    put(panel, h("p", {}, "This session has not been run yet. Press Run."));
     return null;
   }
   if (!view.found.fresh)
-    panel.append(
-      h("p", { cls: "guess-word" }, "Something changed since this run. Run again to see what it changes."),
-    );
+    put(panel, h("p", { cls: "guess-word" }, "Something changed since this run. Run again to see what it changes."));
   try {
     return await ask("results", { name });
   } catch (error) {
-    panel.append(h("p", { cls: "warn" }, view.found.reason || error.message));
+    put(panel, h("p", { cls: "warn" }, view.found.reason || error.message));
     return null;
   }
 }
@@ -30,13 +30,12 @@ function frame(name, part, title) {
 }
 
 export async function showGait(all) {
-  if (await resultsOf(all))
-    all.panel.append(frame(all.name, "gait", "What moved: curves and values of the last run"));
+  if (await resultsOf(all)) put(all.panel, frame(all.name, "gait", "What moved: curves and values of the last run"));
 }
 
 export async function showBody(all) {
   if (await resultsOf(all))
-    all.panel.append(frame(all.name, "body", "The body of the last run, its replay and masses"));
+    put(all.panel, frame(all.name, "body", "The body of the last run, its replay and masses"));
 }
 
 export async function showQuality(all) {
@@ -52,7 +51,8 @@ export async function showQuality(all) {
       {},
       rows.map((one) => h("li", {}, one.trial ? h("strong", {}, `${one.trial}: `) : "", one.text)),
     );
-  panel.append(
+  put(
+    panel,
     first
       ? h("p", { cls: `verdict ${first.level}` }, first.text)
       : h("p", { cls: "verdict note" }, "Nothing needs a person."),
@@ -69,7 +69,7 @@ export async function showQuality(all) {
       ? h("details", {}, h("summary", {}, `${notes.length} notes that ask nobody for anything`), list(notes))
       : "",
     h("h2", {}, "Findings"),
-    found.findings.length ? findings(found.findings) : h("p", {}, "No cause was found."),
+    found.findings.length ? findings(found.findings, all) : h("p", {}, "No cause was found."),
     acceptance(all, found),
     h("h2", {}, "Seconds that this rests on"),
     judged(found.judged),
@@ -129,7 +129,19 @@ const size = (one) =>
     )
     .join(", ");
 
-function findings(rows) {
+function shownMarkers(one, { name, view }) {
+  // where a finding is about labels, the way to where they are exchanged
+  const labels = view.markers?.labels.map((row) => row.label) || [];
+  return (one.target || "")
+    .split("/")
+    .filter((label) => labels.includes(label))
+    .map((label) => [
+      h("a", { href: address(name, "markers"), onclick: () => showMarker(label) }, `Show ${label}`),
+      " ",
+    ]);
+}
+
+function findings(rows, all) {
   return h(
     "table",
     { cls: "stack" },
@@ -156,7 +168,7 @@ function findings(rows) {
             { cls: "n", "data-label": "Probability" },
             one.probability === null || one.probability === undefined ? "–" : `${number(100 * one.probability, 0)} %`,
           ),
-          h("td", { "data-label": "What to do" }, one.advice || ""),
+          h("td", { "data-label": "What to do" }, one.advice || "", " ", shownMarkers(one, all)),
         ),
       ),
     ),
@@ -278,7 +290,8 @@ export async function showFiles(all) {
         ),
       );
     links();
-    panel.append(
+    put(
+      panel,
       h("h2", {}, "Results"),
       h(
         "div",
@@ -318,7 +331,8 @@ export async function showFiles(all) {
       ),
     );
   }
-  panel.append(
+  put(
+    panel,
     h("h2", {}, "session.toml"),
     h(
       "p",

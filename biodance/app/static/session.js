@@ -1,5 +1,5 @@
 // One session: its name, what can be undone and run, and its tabs.
-import { ask, chips, h, say, tell } from "./dom.js";
+import { ask, chips, h, put, say, tell } from "./dom.js";
 import { showBody, showFiles, showGait, showQuality } from "./results.js";
 import { showMarkers } from "./markers.js";
 import { address } from "./main.js";
@@ -113,7 +113,8 @@ export async function showSession(main, page, name, tab) {
     const unread = now.why && h("p", { cls: "verdict fail" }, now.why);
     panel.replaceChildren();
     if (unread && NEEDS_SESSION.includes(tab)) {
-      panel.append(
+      put(
+        panel,
         unread,
         h("p", {}, "Correct session.toml here, or the folder, and it is read again."),
         textEditor(now, changed),

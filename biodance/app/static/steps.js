@@ -1,5 +1,5 @@
 // One recording in time: forces of the plates, foot strikes and offs of the last run, and spans that are left out.
-import { ask, h, number, say } from "./dom.js";
+import { ask, h, number, put, say } from "./dom.js";
 
 const SIDES = { left: "#b3261e", right: "#0058a3" };
 const kept = { trial: "" };
@@ -12,7 +12,8 @@ export async function showSteps({ panel, view, name, edit }) {
     kept.trial = (trials.find((row) => row.role !== "static") || trials[0]).name;
   const results = view.found ? await ask("results", { name }).catch(() => null) : null;
   const place = h("div");
-  panel.append(
+  put(
+    panel,
     h(
       "div",
       { cls: "bar" },
@@ -51,7 +52,8 @@ export async function showSteps({ panel, view, name, edit }) {
     const from = h("input", { cls: "short", inputmode: "decimal", "aria-label": "Leave out from, in s" });
     const to = h("input", { cls: "short", inputmode: "decimal", "aria-label": "Leave out to, in s" });
     const leave = (spans) => edit([["trials", row.stem, "leave_out"], spans.length ? spans : null]);
-    const add = (a, b) => leave([...row.leave_out, [Number(a.toFixed(3)), Number(b.toFixed(3))]]);
+    const add = (a, b, side) =>
+      leave([...row.leave_out, [Number(a.toFixed(3)), Number(b.toFixed(3)), ...(side in SIDES ? [side] : [])]]);
     const line = timeLine(row, forces, moved, (a, b) => {
       from.value = a.toFixed(3);
       to.value = b.toFixed(3);
@@ -92,7 +94,8 @@ export async function showSteps({ panel, view, name, edit }) {
               h(
                 "li",
                 {},
-                `${number(span[0], 2)} to ${number(span[1], 2)} s is left out: no forces, no step. `,
+                `${number(span[0], 2)} to ${number(span[1], 2)} s is left out: ` +
+                  `${span[2] ? `no ${span[2]} step` : "no forces, no step"}. `,
                 h("button", { onclick: () => leave(row.leave_out.filter((_, i) => i !== k)) }, "Use it again"),
               ),
             ),
@@ -127,7 +130,9 @@ function cycles(row, moved, add) {
       "tbody",
       {},
       moved.cycles.map((one, k) => {
-        const out = row.leave_out.some(([a, b]) => a < one.end_s && b > one.start_s);
+        const out = row.leave_out.some(
+          ([a, b, side]) => (!side || side === one.side) && Math.min(b, one.end_s) - Math.max(a, one.start_s) > 0.02,
+        );
         return h(
           "tr",
           { cls: out ? "off" : "" },
@@ -145,7 +150,7 @@ function cycles(row, moved, add) {
                   "button",
                   {
                     "data-key": `cycle ${k}`,
-                    onclick: () => add(one.start_s, one.end_s),
+                    onclick: () => add(one.start_s, one.end_s, one.side),
                     "aria-label": `Switch off ${one.kind} ${k + 1}`,
                   },
                   "Switch off",
@@ -164,15 +169,13 @@ function timeLine(row, forces, moved, onspan) {
     most = Math.max(100, ...forces.plates.flatMap((one) => one.force_n.filter((f) => f !== null)));
   const x = (t) => ((t - begin) / Math.max(end - begin, 1e-9)) * wide,
     y = (f) => HIGH - (Math.max(f, 0) / most) * (HIGH - 20);
-  const parts = row.leave_out.map(([a, b]) =>
-    h("rect", {
-      x: x(Math.max(a, begin)),
-      y: 0,
-      width: Math.max(1, x(Math.min(b, end)) - x(Math.max(a, begin))),
-      height: HIGH + 3 * ROW,
-      fill: "#00000022",
-    }),
-  );
+  const parts = row.leave_out.map(([a, b, side]) => {
+    const from = x(Math.max(a, begin)),
+      width = Math.max(1, x(Math.min(b, end)) - from),
+      fill = side ? `${SIDES[side]}33` : "#00000022"; // of one foot: its row of triangles alone
+    if (!side) return h("rect", { x: from, y: 0, width, height: HIGH + 3 * ROW, fill });
+    return h("rect", { x: from, y: HIGH + (side === "left" ? ROW : 2 * ROW) - 8, width, height: ROW, fill });
+  });
   forces.plates.forEach((one, k) => {
     const pieces = one.time_s.map((t, i) =>
       one.force_n[i] === null ? null : `${x(t).toFixed(1)} ${y(one.force_n[i]).toFixed(1)}`,

@@ -1,6 +1,6 @@
 // Who was measured, what every recording is for, and the plates on the floor. What was guessed is orange until somebody
 // says so in session.toml.
-import { chip, h, number, words } from "./dom.js";
+import { chip, h, number, put, words } from "./dom.js";
 import { showPlates } from "./plates.js";
 
 const LIMBS = ["right", "left"].flatMap((side) =>
@@ -149,6 +149,7 @@ function trialRow(row, view, edit) {
   ]
     .filter(Boolean)
     .join(", ");
+  const moves = row.role === "static" && row.travels_m;
   return h(
     "tr",
     { cls: row.role === "skip" || row.why ? "off" : "" },
@@ -168,8 +169,11 @@ function trialRow(row, view, edit) {
     h("td", { "data-label": "Plates" }, row.name ? row.plates.join(", ") || "none" : "–"),
     h(
       "td",
-      { "data-label": row.why || parts || row.warnings?.length ? "To be seen" : null },
+      { "data-label": row.why || moves || parts || row.warnings?.length ? "To be seen" : null },
       row.why ? h("span", { cls: "warn" }, row.why) : null,
+      moves
+        ? h("span", { cls: "warn" }, `Nobody stands still in it: markers travel ${number(row.travels_m, 2)} m. `)
+        : null,
       parts,
       row.name && row.warnings.length
         ? h(
@@ -193,7 +197,8 @@ export function showTrials({ panel, view, edit }) {
   const guesses = open.map((row) => [["trials", row.stem, "role"], row.role]);
   if (sex.guessed) guesses.push([["subject", "sex"], sex.value]);
   const notes = view.notes.filter((one) => one);
-  panel.append(
+  put(
+    panel,
     subject(view, edit),
     h("h2", {}, "Recordings"),
     h(
@@ -236,7 +241,8 @@ export function showTrials({ panel, view, edit }) {
       : "",
   );
   showPlates(panel, view, edit);
-  panel.append(
+  put(
+    panel,
     h(
       "details",
       {},

@@ -29,7 +29,8 @@ that points up, by default z).
 
 ``[markers] drop = ["T10"]`` leaves markers out of every trial. In a table ``[trials.NAME]``, ``exchange = [["LKNE",
 "RKNE"], ["LANK", "RANK", 1.2, 3.4]]`` gives two labels each other's places, from 1.2 to 3.4 s or in the whole trial;
-``leave_out = [[2.5, 3.1]]`` takes the forces and the cycles of these seconds out (`spans`).
+``leave_out = [[2.5, 3.1]]`` takes the forces and the cycles of these seconds out, ``[[2.5, 3.1, "right"]]`` the cycles
+of that foot alone (`spans`).
 
 ``[subject] prosthesis = "left_shank"`` says that this limb is a prosthesis from there on; ``[devices] right_shank =
 0.6`` what is worn there in kg, on top of ``mass_kg`` (`worn`).
@@ -102,7 +103,7 @@ class _TrialEntry(_Entry):
 
     role: Role | None = None
     exchange: list[list[str | float]] | None = None
-    leave_out: list[list[float]] | None = None
+    leave_out: list[list[float | str]] | None = None
 
 
 class _MarkersEntry(_Entry):
@@ -339,5 +340,5 @@ _HELP = {
     "role": f"Legal are {', '.join(get_args(Role))}.",
     "drop": 'Write the labels, for example ["T10", "RBAK"].',
     "exchange": 'Write [["LKNE", "RKNE"]], or with from and to in s: [["LKNE", "RKNE", 1.2, 3.4]].',
-    "leave_out": "Write spans from and to in s: [[2.5, 3.1]].",
+    "leave_out": 'Write spans from and to in s: [[2.5, 3.1]], or of one foot: [[2.5, 3.1, "right"]].',
 }

@@ -9,7 +9,7 @@ from math import inf, isfinite
 import numpy as np
 
 from biodance.errors import SessionRefused
-from biodance.records import Array, Mask, Trial
+from biodance.records import SIDES, Array, LeftOutSpan, Mask, Trial
 from biodance.records.attention import WARNING
 
 
@@ -48,20 +48,24 @@ def legal_exchanges(given: Sequence[Sequence[str | float]] | None) -> tuple[Exch
     return tuple(found)
 
 
-def legal_spans(given: Sequence[Sequence[float]] | None) -> tuple[tuple[float, float], ...]:
-    """Return spans (from, to) in s, in the order of time.
+def legal_spans(given: Sequence[Sequence[float | str]] | None) -> tuple[LeftOutSpan, ...]:
+    """Return the spans that a list of ``[from s, to s]`` or ``[from s, to s, side]`` says, in the order of time.
 
     Raises
     ------
     SessionRefused
-        One has not two numbers, or ends before it begins.
+        An entry is none of the two, or ends before it begins.
     """
+    found = []
     for entry in given or ():
-        if not _is_span(entry):
+        span, side = list(entry[:2]), str(entry[2]) if len(entry) == 3 else ""
+        if not _is_span(span) or len(entry) > 3 or side not in ("", *SIDES):
             raise SessionRefused(
-                f"leave_out has {list(entry)!r}, which is not legal. Write from and to in s: [[2.5, 3.1]]."
+                f"leave_out has {list(entry)!r}, which is not legal. Write from and to in s, [2.5, 3.1], or with the "
+                f'foot whose steps alone are left out: [2.5, 3.1, "right"].'
             )
-    return tuple(sorted((float(start), float(end)) for start, end in given or ()))
+        found.append(LeftOutSpan(float(span[0]), float(span[1]), side))
+    return tuple(sorted(found, key=lambda one: (one.start, one.end)))
 
 
 def _is_span(given: Sequence[str | float]) -> bool:
@@ -72,16 +76,16 @@ def _is_span(given: Sequence[str | float]) -> bool:
 
 @dataclass(frozen=True)
 class TrialParts:
-    """What is said of parts of a trial: ``exchanges`` and ``dropped`` of labels, spans ``left_out`` (from, to) s."""
+    """What is said of parts of a trial: ``exchanges`` and ``dropped`` of labels, and spans ``left_out``."""
 
     exchanges: tuple[Exchange, ...] = ()
     dropped: tuple[str, ...] = ()
-    left_out: tuple[tuple[float, float], ...] = ()
+    left_out: tuple[LeftOutSpan, ...] = ()
 
 
 def with_parts_corrected(trial: Trial, said: TrialParts) -> Trial:
-    """Return a trial as the analyst says of its parts: labels exchanged, markers dropped, and the forces of the spans
-    that are left out unknown (NaN). What was done stands in the history.
+    """Return a trial as the analyst says of its parts: labels exchanged, markers dropped, and the forces of the
+    spans that are left out for both feet unknown (NaN). What was done stands in the history.
     """
     trial = _exchanged(trial, said.exchanges) if said.exchanges else trial
     trial = _without(trial, said.dropped) if said.dropped else trial
@@ -115,14 +119,15 @@ def _without(trial: Trial, dropped: Sequence[str]) -> Trial:
     return replace(trial, markers=kept, history=(*trial.history, said))
 
 
-def _left_out(trial: Trial, spans: tuple[tuple[float, float], ...]) -> Trial:
+def _left_out(trial: Trial, spans: tuple[LeftOutSpan, ...]) -> Trial:
     plates = []
     for plate in trial.plates:
-        out = np.any([within(plate.wrench.time, *span) for span in spans], axis=0)
-        value = np.where(out[:, None], np.nan, plate.wrench.value)
+        value = plate.wrench.value.copy()
+        for one in spans:
+            if not one.side:
+                value[within(plate.wrench.time, one.start, one.end)] = np.nan
         plates.append(replace(plate, wrench=replace(plate.wrench, value=value)))
-    told = ", ".join(f"{start:g} to {end:g} s" for start, end in spans)
-    history = (*trial.history, f"Left out, as session.toml says: {told}.")
+    history = (*trial.history, f"Left out, as session.toml says: {', '.join(map(str, spans))}.")
     return replace(trial, plates=tuple(plates), left_out=spans, history=history)
 
 
