@@ -4,12 +4,10 @@ Excel and CSV, and the formats of other programs, written by `biodance export` i
 
 import io
 import re
-import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -182,7 +180,7 @@ def exported(place: SessionPlace, kind: str, trial: str) -> tuple[str, bytes]:
     with tempfile.TemporaryDirectory(prefix="biodance-") as folder:
         out = Path(folder) / (f"{stem}.{EXPORTS[kind]}" if EXPORTS[kind] else f"{stem}_{kind}")
         chosen = [f"--trial={trial}"] if trial and kind in _OF_TRIALS else []
-        _command("export", str(place.results), f"--format={kind}", f"--out={out}", *chosen)
+        run_command("export", str(place.results), f"--format={kind}", f"--out={out}", *chosen)
         if out.is_dir():
             inside = (path for path in sorted(out.rglob("*")) if path.is_file())
             return f"{out.name}.zip", _zipped({path.relative_to(out).as_posix(): path for path in inside})
@@ -197,67 +195,13 @@ def _zipped(paths: Mapping[str, Path]) -> bytes:
     return buffer.getvalue()
 
 
-def _command(*arguments: str) -> str:
+def run_command(*arguments: str, module: str = "biodance") -> str:
     """Run a command of biodance in a process of its own and return what it prints; BiodanceError says why it failed."""
     try:
-        done = run_python("-m", "biodance", *arguments, timeout=_LONGEST)
+        done = run_python("-m", module, *arguments, timeout=_LONGEST)
     except subprocess.TimeoutExpired:
         raise BiodanceError(f"biodance {arguments[0]} gave no answer within {_LONGEST:.0f} s and was ended.") from None
     if done.returncode not in (0, 1):
         said = done.stderr.decode("utf-8", "replace").strip().splitlines()
         raise BiodanceError(said[-1] if said else f"biodance {arguments[0]} ended with code {done.returncode}.")
     return done.stdout.decode("utf-8", "replace")
-
-
-def preview_of_acceptance(place: SessionPlace, out: Path) -> dict[str, Any]:
-    """Diagnose a session and write what acceptance would write into a folder beside; return before and after.
-
-    Returns
-    -------
-    dict
-        ``findings`` with their gain (RMS before and after, N and N·m), ``gain`` of all together, ``written`` files with
-        what they are, ``not_applied`` causes with why. The recordings are not touched.
-    """
-    with _preview(place, out) as folder:
-        told = parse_json(_command("diagnose", str(place.folder), "--accept", f"--out={folder}", "--force", "--json"))
-    accepted = told.get("accepted") or {}
-    return {
-        "findings": [{key: one.get(key) for key in _FINDING} for one in told["findings"]],
-        "gain": told.get("gain"),
-        **{key: accepted.get(key, []) for key in ("written", "not_applied", "corrections")},
-    }
-
-
-def keep_acceptance(place: SessionPlace, out: Path) -> Path:
-    """Give what `preview_of_acceptance` wrote its own place and return it; an earlier one is kept beside it.
-
-    Raises
-    ------
-    BiodanceError
-        There is no preview.
-    """
-    preview, kept = _preview_folder(place, out), out / "accepted" / folder_name(place.name)
-    if not preview.is_dir():
-        raise BiodanceError(f"{place.name}: there is nothing to keep. Look at before and after first.")
-    if kept.exists():
-        names = (kept.with_name(f"{kept.name} {number}") for number in range(2, 10_000))
-        kept = next(path for path in names if not path.exists())
-    preview.rename(kept)
-    return kept
-
-
-def _preview_folder(place: SessionPlace, out: Path) -> Path:
-    return out / "accepted" / f"{folder_name(place.name)} (preview)"
-
-
-@contextmanager
-def _preview(place: SessionPlace, out: Path) -> Iterator[Path]:
-    """Yield the folder of a preview, empty; it is gone where it fails."""
-    folder = _preview_folder(place, out)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        yield folder
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise

@@ -7,12 +7,11 @@ from typing import Any
 
 from starlette.responses import Response
 
+from biodance.app.acceptance import keep_acceptance, preview_of_acceptance
 from biodance.app.outputs import (
     csv_archive,
     exported,
-    keep_acceptance,
     page_part,
-    preview_of_acceptance,
     results_file,
     shown_results,
     workbook,

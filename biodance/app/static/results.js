@@ -125,7 +125,7 @@ const size = (one) =>
         `${words(key)} ${[value.value]
           .flat()
           .map((x) => number(x, 3))
-          .join("; ")} ${value.unit || ""}`,
+          .join("; ")} ${value.unit === "1" ? "" : value.unit || ""}`,
     )
     .join(", ");
 
@@ -191,48 +191,39 @@ function acceptance({ name }, found) {
     place.replaceChildren(h("p", {}, "Working out before and after …"));
     try {
       const told = await tell("accept", { name });
-      const gained = told.findings.filter((one) => one.gain);
+      const head = ["Recording", "", ...CHANNELS].map((one) =>
+        h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
+      );
+      const line = (one, when) =>
+        h(
+          "tr",
+          {},
+          h("th", { scope: "row" }, one.trial),
+          h("td", {}, when),
+          one[when].map((x) => h("td", { cls: "n" }, number(x, 1))),
+        );
       place.replaceChildren(
-        gained.length
+        told.residuals.length
           ? h(
-              "table",
-              {},
+              "div",
+              { cls: "wide", tabindex: "0", role: "region", "aria-label": "Before and after" },
               h(
-                "caption",
-                {},
-                "What is left between plates and simulation (RMS; N, N·m), before and after taking off what was found",
-              ),
-              h(
-                "thead",
+                "table",
                 {},
                 h(
-                  "tr",
+                  "caption",
                   {},
-                  ["Cause", "", ...CHANNELS].map((one) =>
-                    h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "When")),
-                  ),
+                  "What plates and simulation differ by (RMS; N, N·m) as recorded, and with what was found taken off",
                 ),
-              ),
-              h(
-                "tbody",
-                {},
-                gained.flatMap((one) =>
-                  [
-                    ["before", one.gain.rms_before],
-                    ["after", one.gain.rms_after],
-                  ].map(([when, rms]) =>
-                    h(
-                      "tr",
-                      {},
-                      h("th", { scope: "row" }, `${words(one.effect)} ${words(one.target || "")}`),
-                      h("td", {}, when),
-                      rms.map((x) => h("td", { cls: "n" }, number(x, 1))),
-                    ),
-                  ),
+                h("thead", {}, h("tr", {}, head)),
+                h(
+                  "tbody",
+                  {},
+                  told.residuals.flatMap((one) => [line(one, "before"), line(one, "after")]),
                 ),
               ),
             )
-          : h("p", {}, "Nothing that was found has a gain on data that were not used."),
+          : "",
         told.written.length
           ? h(
               "div",
@@ -241,9 +232,7 @@ function acceptance({ name }, found) {
               h(
                 "ul",
                 {},
-                told.written.map((one) =>
-                  h("li", {}, `${one.file}: ${one.what || one.text || Object.values(one).slice(1).join(" ")}`),
-                ),
+                told.written.map((one) => h("li", {}, `${one.file}: ${one.what}`)),
               ),
             )
           : h("p", {}, "There is nothing to accept: nothing would be written."),
