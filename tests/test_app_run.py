@@ -42,7 +42,13 @@ def test_a_run_goes_through_its_sessions_and_what_is_done_is_fresh(archive):
     assert found["s2"] is None
     (archive["s0"].folder / "session.toml").write_text("[subject]\nage = 30\n")
     assert not archive["s0"].found()["fresh"]
-    assert archive["s1"].found() is not None
+
+
+def test_what_is_said_of_the_subject_in_the_folder_above_makes_results_old(archive):
+    before = archive["s1"].task().fingerprint
+    assert archive["s1"].task().fingerprint == before
+    (archive.folder / "subject.toml").write_text("[subject]\nage = 30\n")
+    assert archive["s1"].task().fingerprint != before
 
 
 def test_a_refused_session_says_why(archive):

@@ -1,5 +1,6 @@
 """The window's server: who is let in, what can be asked for, what is written to session.toml, and its undoing."""
 
+import errno
 import io
 import json
 import tomllib
@@ -239,6 +240,23 @@ def test_a_key_taken_out_takes_its_empty_table_along(user, archive):
     edited(user, [["trials", "squat_1", "role"], "fit"], [["subject", "age"], 30])
     edited(user, [["trials", "squat_1", "role"], None])
     assert tomllib.loads(session_toml(archive).read_text(encoding="utf-8")) == {"subject": {"age": 30}}
+
+
+def test_on_a_full_disk_the_file_stays_and_the_window_says_why(user, archive, monkeypatch):
+    edited(user, [["subject", "age"], 30])
+    before, seen = session_toml(archive).read_bytes(), viewed(user)["revision"]
+
+    def full(path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    with monkeypatch.context() as disk:
+        disk.setattr("biodance.lab.plain_text.flush", full)
+        body = {"name": NAME, "revision": seen, "changes": [[["subject", "age"], 40]]}
+        answer = user.post("/api/edit", json=body, headers=ORIGIN)
+    assert answer.status_code == 400
+    assert "No space left" in answer.json()["error"]
+    assert session_toml(archive).read_bytes() == before
+    assert edited(user, [["subject", "age"], 40])["subject"]["age"]["value"] == 40
 
 
 def test_markers_are_exchanged_dropped_and_mapped(user):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from biodance.errors import FileRefused
+from biodance.lab.session.file import FILES
 from biodance.lab.session.results_folder import read_manifest, refuse_mixture
 from biodance.library import parse_json
 from biodance.version import __version__
@@ -129,12 +130,15 @@ def only_row(status: SessionStatus, reason: str) -> TrialRows:
 
 
 def fingerprint_of(session: Path, chosen: tuple[str, ...]) -> str:
-    """Return what changes when recordings, settings or version change: of names, sizes and times of the files."""
+    """Return what changes when recordings, settings or version change: of names, sizes and times of the files, those
+    that tell of the subject in the folder above included.
+    """
     seen = hashlib.sha256(repr((__version__, sorted(chosen))).encode())
-    for path in sorted(session.rglob("*")):
+    above = (session.resolve().parent / name for name in FILES)
+    for path in (*sorted(session.rglob("*")), *above):
         if path.is_file():
-            known = path.stat()
-            seen.update(repr((str(path.relative_to(session)), known.st_size, known.st_mtime_ns)).encode())
+            known, name = path.stat(), os.path.relpath(path, session)
+            seen.update(repr((name, known.st_size, known.st_mtime_ns)).encode())
     return seen.hexdigest()[:24]
 
 

@@ -16,7 +16,9 @@ def app_command(
         Path | None, Parameter(name="--out", help="Folder of the results; default: FOLDER-results beside the folder.")
     ] = None,
     port: Annotated[int, Parameter(converter=whole, help="Port of 127.0.0.1; 0 takes a free one.")] = 0,
-    browser: Annotated[bool, Parameter(negative=("--no-browser", "--no-open"), help="Open the window in the browser.")] = True,
+    browser: Annotated[
+        bool, Parameter(negative=("--no-browser", "--no-open"), help="Open the window in the browser.")
+    ] = True,
 ) -> int:
     """Open the laboratory's window in the browser: the sessions of a folder, their roles, markers, plates and steps to
     be corrected with the mouse, runs, results and exports. Ends with Ctrl-C; nothing leaves this machine.
