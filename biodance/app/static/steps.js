@@ -121,7 +121,7 @@ function cycles(row, moved, add) {
       h(
         "tr",
         {},
-        ["Cycle", "Side", "From", "Foot off", "To", ""].map((one) =>
+        ["Cycle", "Side", "From", "Foot off, lowest", "To", ""].map((one) =>
           h("th", { scope: "col" }, one || h("span", { cls: "visually-hidden" }, "Switch off")),
         ),
       ),
@@ -139,7 +139,11 @@ function cycles(row, moved, add) {
           h("th", { scope: "row" }, `${one.kind.replaceAll("_", " ")} ${k + 1}`),
           h("td", { "data-label": "Side" }, one.side),
           h("td", { cls: "n", "data-label": "From" }, `${number(one.start_s, 2)} s`),
-          h("td", { cls: "n", "data-label": "Foot off" }, one.off_s === null ? "–" : `${number(one.off_s, 2)} s`),
+          h(
+            "td",
+            { cls: "n", "data-label": "Foot off, lowest" },
+            one.off_s === null ? "–" : `${number(one.off_s, 2)} s`,
+          ),
           h("td", { cls: "n", "data-label": "To" }, `${number(one.end_s, 2)} s`),
           h(
             "td",
