@@ -11,7 +11,7 @@ from typing import Any
 import tomlkit
 from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import Table
+from tomlkit.items import AbstractTable
 
 from biodance.errors import BiodanceError, FileRefused
 from biodance.lab.plain_text import write_whole
@@ -196,10 +196,10 @@ def _take_out(document: Container, keys: list[str]) -> None:
         inner = table.get(key)
         if key == keys[-1] and table is tables[-1]:
             table.pop(key, None)
-        elif isinstance(inner, Table) and not inner and not _says_more(inner):
+        elif isinstance(inner, AbstractTable) and not inner and not _says_more(inner):
             table.pop(key)
 
 
-def _says_more(table: Table) -> bool:
+def _says_more(table: AbstractTable) -> bool:
     """Return whether an empty table holds comments."""
-    return bool(tomlkit.dumps(table.value).strip()) if hasattr(table, "value") else False
+    return bool(tomlkit.dumps(table.value).strip())
