@@ -310,6 +310,19 @@ def test_results_that_are_not_there_are_asked_for_in_vain(user):
         assert "error" in answer.json()
 
 
+def test_a_part_of_the_page_stands_alone_and_can_do_nothing_to_the_window(user, archive):
+    folder = archive[NAME].results
+    folder.mkdir(parents=True)
+    text = '<html><head></head><body><header></header><main><section id="{}"></section></main></body></html>'
+    (folder / "report.html").write_text(text.format("movement"), encoding="utf-8")
+    answer = user.get("/page", params={"name": NAME, "part": "gait"})
+    assert "main > :not(#movement) { display: none; }" in answer.text
+    assert "allow-same-origin" not in answer.headers["content-security-policy"]
+    assert answer.headers["content-security-policy"].startswith("sandbox ")
+    assert "nothing to show" in user.get("/page", params={"name": NAME, "part": "body"}).text
+    assert user.get("/page", params={"name": NAME}).text == text.format("movement")
+
+
 @pytest.mark.parametrize("out", [".", "archive", "archive/S02/.."])
 def test_results_do_not_go_among_recordings(archive, tmp_path, out):
     with pytest.raises(BiodanceError, match="among the recordings"):

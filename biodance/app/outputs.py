@@ -3,7 +3,6 @@ Excel and CSV, and the formats of other programs, written by `biodance export` i
 """
 
 import io
-import re
 import subprocess
 import tempfile
 import zipfile
@@ -24,11 +23,10 @@ _LONGEST = 600.0
 """s that a program started for one download may take."""
 _MOST_ROWS = 20_000
 """Rows of a sheet: tables by frame have more, and are for programs (CSV, Parquet)."""
-_SECTION = re.compile(r'<section id="([^"]+)">')
 _PARTS: Mapping[str, tuple[str, ...]] = {
     "gait": ("movement", "gait"),
     "body": ("body", "replay", "masses", "predicts", "torques", "impact", "load", "danced", "changes", "standing"),
-    "quality": ("checks", "trials", "made"),
+    "quality": ("figures", "checks", "trials", "made"),
 }
 """Sections of report.html by the tab that shows them."""
 EXPORTS: Mapping[str, str] = {
@@ -85,14 +83,14 @@ def shown_results(place: SessionPlace) -> dict[str, Any]:
 def page_part(place: SessionPlace, part: str) -> str:
     """Return report.html with the sections of one ``part`` alone; the whole page for "" and where it has none."""
     page = _file(place, "report.html").read_text(encoding="utf-8")
-    sections = _SECTION.findall(page)
-    kept = [one for one in sections if one in _PARTS.get(part, ())]
     if not part:
         return page
+    kept = [one for one in _PARTS.get(part, ()) if f'<section id="{one}">' in page]
     if not kept:
         return _NOTHING
-    hidden = ", ".join(f"#{one}" for one in sections if one not in kept)
-    return page.replace("</head>", f"<style>body > header, main > nav, {hidden} {{ display: none; }}</style></head>", 1)
+    shown = ", ".join(f"#{one}" for one in kept)
+    alone = f"<style>body > header, main > :not({shown}) {{ display: none; }}</style></head>"
+    return page.replace("</head>", alone, 1)
 
 
 _NOTHING = """<!doctype html><html lang="en"><title>biodance</title>
